@@ -1,0 +1,1 @@
+//! Layouts (LIF) and courses: drivable nodes and edges a test may use, mapped onto the real floor.

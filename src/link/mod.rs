@@ -1,0 +1,104 @@
+//! What connects the harness with the device: publish, and see what happens.
+//!
+//! [`Link`] is the whole bench as the engine sees it. `mqtt` is the real one (rumqttc, broker, tap and map
+//! server), `memory` an in-process bus with MQTT's retain, will and QoS rules in virtual time. A link
+//! reports everything as journal occurrences and judges nothing.
+
+use crate::clock::{Moment, Stamp};
+use crate::journal::event::{LinkFault, Occurrence};
+use crate::suite::model::ServeBehaviour;
+
+/// From where the harness can see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Vantage {
+    /// Every packet of the device.
+    Tap,
+    /// Only what the broker delivers.
+    Subscriber,
+}
+
+/// A message the harness publishes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outgoing {
+    /// Full topic.
+    pub topic: String,
+    /// Payload.
+    pub payload: bytes::Bytes,
+    /// QoS.
+    pub qos: u8,
+    /// RETAIN.
+    pub retain: bool,
+}
+
+/// A file for the map server.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Offer {
+    /// Name of the offer.
+    pub name: String,
+    /// The file.
+    pub body: bytes::Bytes,
+    /// How it is served.
+    pub behaviour: ServeBehaviour,
+}
+
+/// Why a link could not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The broker is gone or was never there.
+    #[error("the broker at {address} is not reachable: {reason}")]
+    Broker {
+        /// Where it should be.
+        address: String,
+        /// What the transport said.
+        reason: String,
+    },
+    /// A port could not be opened.
+    #[error("cannot listen on {address}: {reason}")]
+    Listen {
+        /// Which.
+        address: String,
+        /// What the system said.
+        reason: String,
+    },
+    /// The link cannot do that from its vantage.
+    #[error("{what} needs the tap, and this run only has vantage `subscriber`")]
+    NeedsTap {
+        /// What was asked.
+        what: String,
+    },
+    /// Credentials, certificates or addresses are wrong.
+    #[error("{0}")]
+    Setup(String),
+}
+
+/// The bench as the engine sees it. Not used as a trait object; the engine is generic over it.
+#[expect(async_fn_in_trait, reason = "the engine runs on one thread and needs no Send bound")]
+pub trait Link {
+    /// The present moment.
+    fn now(&self) -> Stamp;
+
+    /// From where it can see.
+    fn vantage(&self) -> Vantage;
+
+    /// Publishes a message. Returns when it is on its way; the engine journals it before calling.
+    async fn publish(&mut self, message: Outgoing) -> Result<(), LinkError>;
+
+    /// The next thing that happens, or `None` when `until` has come. With `until` in the past it only
+    /// returns what has already happened. Cancel-safe.
+    async fn next(&mut self, until: Moment) -> Result<Option<Occurrence>, LinkError>;
+
+    /// Changes what the tap does. Takes effect before it returns.
+    async fn fault(&mut self, fault: LinkFault) -> Result<(), LinkError>;
+
+    /// Starts a fresh subscriber; what it receives comes as `Retained` and then `RetainedEnd` occurrences
+    /// with the number returned.
+    async fn fresh_subscriber(&mut self, topic: &str) -> Result<u64, LinkError>;
+
+    /// Sends the harness a message through the broker; its return comes as `ProbeReceived` with the number
+    /// returned.
+    async fn probe(&mut self) -> Result<u64, LinkError>;
+
+    /// Offers a file; returns its address as the device must use it.
+    async fn serve(&mut self, offer: Offer) -> Result<String, LinkError>;
+}

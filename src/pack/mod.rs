@@ -1,0 +1,49 @@
+//! A protocol version as data, and the catalogue of requirements.
+//!
+//! A [`Pack`] is one folder of `schemas/`: six JSON schemas, `protocol.toml` and `vocabulary.yaml`. The
+//! [`Catalogue`] is `suites/requirements/`. Versions are data: no code below or above names one. What a
+//! message *means* is left to patterns, checks and the judge.
+
+mod catalogue;
+mod protocol;
+mod version;
+
+pub use catalogue::RequirementId;
+pub use protocol::Pack;
+pub use version::{Version, VersionRange};
+
+/// The two sides of the interface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// The vehicle.
+    Agv,
+    /// The fleet manager.
+    MasterControl,
+}
+
+impl Role {
+    /// The word used in files and outputs.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Agv => "agv",
+            Self::MasterControl => "master-control",
+        }
+    }
+
+    /// The other side.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Agv => Self::MasterControl,
+            Self::MasterControl => Self::Agv,
+        }
+    }
+}
+
+impl std::fmt::Display for Role {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.word())
+    }
+}

@@ -1,0 +1,9 @@
+//! Pictures of the part of a message that matters: match, witness, nearest miss.
+//!
+//! A [`Term`] is a value with variables in it, a [`Pattern`] a picture with variables; binding both gives a
+//! [`Bound`] pattern that is matched without further look-ups. Which message is looked at, and when, is
+//! left to the judge.
+
+mod ast;
+
+pub use ast::{Compare, Comparison, Element, Elements, Pattern, PatternKind, Piece, Term, TermKind};

@@ -1,0 +1,247 @@
+//! The canonical result of a run; every rendering is a pure function of it (and of the journal).
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::journal::event::Setting;
+use crate::verdict::Verdict;
+
+/// `result.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunResult {
+    /// `vda5050-tck.result/1`.
+    pub format: String,
+    /// Tool name and version.
+    pub tool: String,
+    /// Identifier of the run.
+    pub run: String,
+    /// Start in UTC, RFC 3339 with milliseconds.
+    pub started: String,
+    /// Length of the run in seconds.
+    pub seconds: f64,
+    /// `agv` or `master-control`.
+    pub role: String,
+    /// Protocol version judged by.
+    pub protocol: String,
+    /// Whether the run ended before its plan did.
+    pub partial: bool,
+    /// Why it is partial.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partial_reason: Option<String>,
+    /// Join over tests and monitors; absent when nothing was decided.
+    pub verdict: Option<Verdict>,
+    /// The device.
+    pub device: DeviceIdentity,
+    /// `tap` or `subscriber`.
+    pub vantage: String,
+    /// SHA-256 over suites, schemas and requirements.
+    pub suites_sha256: String,
+    /// Whether the suites differ from the built-in ones.
+    pub suites_modified: bool,
+    /// Where the journal is, beside this file.
+    pub journal: String,
+    /// Tests in the order they ran; not applicable ones after them.
+    pub tests: Vec<TestResult>,
+    /// Monitors.
+    pub monitors: Vec<MonitorResult>,
+    /// Requirements of this role and version, in catalogue order, decided or not.
+    pub requirements: Vec<RequirementResult>,
+    /// Where capabilities come from: name, value, source (factsheet, profile, contradiction).
+    pub capabilities: Vec<Capability>,
+    /// What restricts this statement, one sentence each.
+    pub limits: Vec<String>,
+    /// Declared deviations of the profile: requirement id to reason.
+    pub deviations: BTreeMap<String, String>,
+    /// Effective settings with their origins.
+    pub settings: Vec<Setting>,
+}
+
+/// Who was judged.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct DeviceIdentity {
+    /// Manufacturer.
+    pub manufacturer: String,
+    /// Serial number.
+    pub serial_number: String,
+    /// Series name of the factsheet, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series_name: Option<String>,
+}
+
+/// One test.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TestResult {
+    /// Id.
+    pub id: String,
+    /// Title.
+    pub title: String,
+    /// Verdict; absent when not applicable.
+    pub verdict: Option<Verdict>,
+    /// Why it does not apply.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_applicable: Option<String>,
+    /// How long it took.
+    pub seconds: f64,
+    /// Why the verdict is not a pass, in one line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// `watchlist` or `reviewed`.
+    pub maturity: String,
+    /// First and last journal number.
+    pub journal: Option<(u64, u64)>,
+    /// What was decided.
+    pub decisions: Vec<Decision>,
+    /// The steps as they went.
+    pub steps: Vec<StepResult>,
+}
+
+/// One step of a test.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StepResult {
+    /// Path.
+    pub path: String,
+    /// Verb and object, such as `expect state`.
+    pub verb: String,
+    /// Title.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub title: Option<String>,
+    /// File and line.
+    pub place: String,
+    /// `done`, `failed`, `not run`, `broken` or `interrupted`.
+    pub outcome: String,
+    /// First and last journal number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub journal: Option<(u64, u64)>,
+    /// The message it took, by journal number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub took: Option<u64>,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+/// One requirement decided by one clause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Decision {
+    /// Requirement id.
+    pub requirement: String,
+    /// What was decided.
+    pub verdict: Verdict,
+    /// Path of the clause, such as `steps[6].assert`.
+    pub clause: String,
+    /// File and line of the clause.
+    pub place: String,
+    /// The message that decided it, by journal number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub witness: Option<u64>,
+    /// One line.
+    pub message: String,
+    /// What was expected, values filled in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected: Option<String>,
+    /// The nearest miss.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearest: Option<NearestMiss>,
+    /// What was waited for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub waited: Option<Waited>,
+    /// The failure as rustc would show it, without colour.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub explanation: Option<String>,
+    /// The ruling of the catalogue this rests on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interpretation: Option<String>,
+}
+
+/// The message that came closest to what was expected.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NearestMiss {
+    /// Journal number.
+    pub seq: u64,
+    /// Path of the value that did not fit.
+    pub path: String,
+    /// What stood there, bounded.
+    pub found: String,
+    /// What should have stood there.
+    pub expected: String,
+}
+
+/// A wait that was part of a decision.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Waited {
+    /// How long, in seconds.
+    pub seconds: f64,
+    /// Since which journal number.
+    pub since: u64,
+    /// How many messages on the topic came meanwhile.
+    pub messages: u64,
+}
+
+/// One monitor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MonitorResult {
+    /// Id.
+    pub id: String,
+    /// Title.
+    pub title: String,
+    /// Verdict; absent when there was nothing to judge.
+    pub verdict: Option<Verdict>,
+    /// How many messages it judged.
+    pub judged: u64,
+    /// What it found.
+    pub findings: Vec<MonitorFinding>,
+}
+
+/// All findings of a monitor of one kind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MonitorFinding {
+    /// Requirement id.
+    pub requirement: String,
+    /// How bad.
+    pub verdict: Verdict,
+    /// How often.
+    pub count: u64,
+    /// The first journal numbers.
+    pub first: Vec<u64>,
+    /// One line about the first occurrence.
+    pub message: String,
+    /// The ruling of the catalogue this rests on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interpretation: Option<String>,
+}
+
+/// What is known about one requirement.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RequirementResult {
+    /// Requirement id.
+    pub id: String,
+    /// Join over everything that decided it; absent when nothing did.
+    pub verdict: Option<Verdict>,
+    /// Tests and monitors that decided it.
+    pub decided_by: Vec<String>,
+    /// Why nothing did: `not applicable`, `no test`, `not testable: …`, `not selected`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_decided: Option<String>,
+}
+
+/// A capability and its source.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Capability {
+    /// Name, such as `action downloadMap INSTANT`.
+    pub name: String,
+    /// `yes`, `no`, or a value.
+    pub value: String,
+    /// `factsheet`, `profile`, or both when they contradict each other.
+    pub source: String,
+}

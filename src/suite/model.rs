@@ -1,0 +1,594 @@
+//! What a test is, once it has been read and linted.
+
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use crate::diagnostic::{Source, Span};
+use crate::pack::{RequirementId, Role, VersionRange};
+use crate::pattern::{Pattern, Term};
+
+/// One scripted exchange; one row of `cases:` is one test.
+#[derive(Clone, Debug)]
+pub struct Test {
+    /// Path below `suites/<role>/` without extension, and `[case]` for a row of a table.
+    pub id: String,
+    /// The part of the id before the first slash.
+    pub group: String,
+    /// One sentence.
+    pub title: String,
+    /// Which side it tests.
+    pub device: Role,
+    /// Protocol versions it is written for.
+    pub spec: VersionRange,
+    /// What the device, bench or profile must offer.
+    pub needs: Vec<Need>,
+    /// Whether the vehicle will drive.
+    pub moves: bool,
+    /// How far the test itself is trusted.
+    pub maturity: Maturity,
+    /// Why anybody cares.
+    pub why: String,
+    /// Preamble: unreached is inconclusive.
+    pub given: Vec<Step>,
+    /// Body: decides.
+    pub steps: Vec<Step>,
+    /// Postamble: always runs, decides nothing.
+    pub finally: Vec<Step>,
+    /// The file.
+    pub source: Arc<Source>,
+    /// The names of course nodes it uses, in order of appearance, and the pairs it drives.
+    pub course: CourseNeed,
+}
+
+impl Test {
+    /// Every step with its section, in the order they run.
+    pub fn sections(&self) -> [(Section, &[Step]); 3] {
+        [
+            (Section::Given, &self.given),
+            (Section::Steps, &self.steps),
+            (Section::Finally, &self.finally),
+        ]
+    }
+
+    /// Every requirement a clause of this test decides, in order, once.
+    #[must_use]
+    pub fn requirements(&self) -> Vec<RequirementId> {
+        let mut all = Vec::new();
+        for step in &self.steps {
+            for (id, _) in step.clauses() {
+                if !all.contains(&id) {
+                    all.push(id);
+                }
+            }
+        }
+        all
+    }
+}
+
+/// A part of a test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Section {
+    /// `given`.
+    Given,
+    /// `steps`.
+    Steps,
+    /// `finally`.
+    Finally,
+}
+
+/// How far a test is trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Maturity {
+    /// Young: a failure wants a second look at the evidence.
+    Watchlist,
+    /// Reviewed.
+    Reviewed,
+}
+
+/// What a test needs to be applicable.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Need {
+    /// `action NAME` or `action NAME SCOPE`: the factsheet lists it (in that scope).
+    Action {
+        /// actionType.
+        name: String,
+        /// `INSTANT`, `NODE` or `EDGE`.
+        scope: Option<String>,
+    },
+    /// `no action NAME`: the factsheet does not list it.
+    NoAction(String),
+    /// `optional PATH`: the factsheet lists this optional parameter as supported or required.
+    Optional(String),
+    /// `no optional PATH`: the factsheet does not list it.
+    NoOptional(String),
+    /// `vantage tap`: packets can be seen.
+    Tap,
+    /// `maps`: the bench can serve map files to the device.
+    MapServer,
+    /// `hook NAME`: the profile has a hook of this name.
+    Hook(String),
+    /// `profile NAME`: the profile says so in `[device]`, such as `stops-between-nodes`,
+    /// `node-bound`, `interruptible-actions`.
+    Profile(String),
+    /// `limit NAME`: the factsheet states this protocol limit, such as `maxArrayLens.order.nodes`.
+    Limit(String),
+}
+
+/// What a test asks of the course.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct CourseNeed {
+    /// Names of nodes, in order of first use. `a` is where the vehicle stands.
+    pub nodes: Vec<String>,
+    /// Pairs of names that must be joined by an edge.
+    pub edges: Vec<(String, String)>,
+}
+
+/// One step.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// Where it stands: `steps[3]`; inlined steps carry the state's name: `given[0]/idle-on-course[2]`.
+    pub path: String,
+    /// One line for people.
+    pub title: Option<String>,
+    /// Versions it is for.
+    pub spec: Option<VersionRange>,
+    /// The verb and its arguments.
+    pub verb: Verb,
+    /// The whole step.
+    pub span: Span,
+    /// Key and value of the verb, for carets: `expect: state`.
+    pub verb_span: Span,
+}
+
+impl Step {
+    /// The clauses of this step: requirement and path of the clause.
+    #[must_use]
+    pub fn clauses(&self) -> Vec<(RequirementId, String)> {
+        let mut all = Vec::new();
+        let mut checks = |bindings: &[Binding], suffix: &str| {
+            all.extend(
+                bindings
+                    .iter()
+                    .map(|b| (b.requirement.clone(), format!("{}{suffix}", self.path))),
+            );
+        };
+        match &self.verb {
+            Verb::Expect(step) => {
+                checks(&step.checks, ".checks");
+                let asserts = step.assert.iter().chain(&step.prefer);
+                for assertion in asserts {
+                    let word = if step.prefer.iter().any(|other| std::ptr::eq(other, assertion)) {
+                        "prefer"
+                    } else {
+                        "assert"
+                    };
+                    all.push((assertion.requirement.clone(), format!("{}.{word}", self.path)));
+                }
+            }
+            Verb::Never(step) => checks(&step.checks, ".checks"),
+            Verb::Always(step) => {
+                checks(&step.checks, ".checks");
+                if let Extent::Until(until) = &step.extent {
+                    checks(&until.checks, ".until");
+                }
+            }
+            Verb::Action(step) => checks(&step.checks, ".checks"),
+            Verb::Retained(step) => {
+                checks(&step.checks, ".checks");
+                for assertion in &step.assert {
+                    all.push((assertion.requirement.clone(), format!("{}.assert", self.path)));
+                }
+            }
+            Verb::Send(_) | Verb::Link(_) | Verb::Serve(_) | Verb::Operator(_) | Verb::Vehicle(_) => {}
+        }
+        all
+    }
+}
+
+/// A requirement bound to the clause that decides it.
+#[derive(Clone, Debug)]
+pub struct Binding {
+    /// The requirement.
+    pub requirement: RequirementId,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// What a step does.
+#[derive(Clone, Debug)]
+pub enum Verb {
+    /// Publish something.
+    Send(Box<Send>),
+    /// A matching message arrives.
+    Expect(Box<Expect>),
+    /// No matching message arrives.
+    Never(Box<Never>),
+    /// Every message matches.
+    Always(Box<Always>),
+    /// An action walks through these statuses.
+    Action(Box<ActionWalk>),
+    /// A fresh subscriber receives it with RETAIN set.
+    Retained(Box<Retained>),
+    /// Act on the tap.
+    Link(LinkStep),
+    /// Offer a file over HTTP.
+    Serve(Serve),
+    /// Run a hook of the profile.
+    Operator(Operator),
+    /// Set the behaviour of a mock AGV (master control under test).
+    Vehicle(Term),
+}
+
+/// `send:`.
+#[derive(Clone, Debug)]
+pub struct Send {
+    /// Topic name.
+    pub topic: String,
+    /// Members laid over what the harness builds (JSON merge, `null` removes).
+    pub payload: Option<Term>,
+    /// Nodes and edges by course names.
+    pub route: Option<Route>,
+    /// Actions of an instantActions message.
+    pub actions: Vec<SendAction>,
+    /// How the finished message is broken.
+    pub patch: Option<Patch>,
+    /// These very bytes instead of a message.
+    pub raw: Option<Raw>,
+    /// QoS other than the pack's.
+    pub qos: Option<u8>,
+    /// Set RETAIN.
+    pub retain: bool,
+}
+
+/// What `raw:` publishes.
+#[derive(Clone, Debug)]
+pub enum Raw {
+    /// Text.
+    Text(Term),
+    /// `base64: …`.
+    Bytes(Vec<u8>),
+}
+
+/// One instant action, or one action of a route element.
+#[derive(Clone, Debug)]
+pub struct SendAction {
+    /// actionType.
+    pub action: Term,
+    /// The name other steps know it by; `${NAME.id}` is its actionId.
+    pub name: Option<String>,
+    /// Parameters.
+    pub with: Vec<(String, Term)>,
+    /// blockingType; `HARD` unless said.
+    pub blocking: Option<Term>,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// A way over the course.
+#[derive(Clone, Debug)]
+pub struct Route {
+    /// Released nodes.
+    pub base: Vec<String>,
+    /// Unreleased nodes.
+    pub horizon: Vec<String>,
+    /// sequenceId of the first node; found from the order sent before unless said.
+    pub from: Option<u32>,
+    /// Actions on nodes (`b`) and edges (`a-b`), by name. A name that occurs twice means the first.
+    pub actions: Vec<(RoutePlace, Vec<SendAction>)>,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// A node or an edge of a route.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RoutePlace {
+    /// `b`.
+    Node(String),
+    /// `a-b`.
+    Edge(String, String),
+}
+
+/// `patch:`.
+#[derive(Clone, Debug)]
+pub enum Patch {
+    /// A mapping: JSON Merge Patch (RFC 7396).
+    Merge(Term),
+    /// A list: JSON Patch (RFC 6902).
+    Operations(Term),
+}
+
+/// `where` and `check` of a clause.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// The picture of the message; absent takes any.
+    pub pattern: Option<Pattern>,
+    /// A named check that has to hold as well.
+    pub check: Option<CheckUse>,
+}
+
+/// A named check used in a test or monitor.
+#[derive(Clone, Debug)]
+pub struct CheckUse {
+    /// Name in the registry, such as `order/remaining-route`.
+    pub name: String,
+    /// Arguments, if it takes any.
+    pub with: Vec<(String, Term)>,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// A duration: `${time.react}` or `800 ms`, `5 s`, `2 min`.
+#[derive(Clone, Debug)]
+pub struct TimeTerm {
+    /// Resolves to a name of `time.*` or a number of milliseconds.
+    pub term: Term,
+}
+
+/// Where a scan begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum From {
+    /// At the cursor (`expect`), at the mark (`never`, `always`).
+    #[default]
+    Usual,
+    /// At the last stimulus.
+    Mark,
+    /// At the cursor.
+    Here,
+    /// The most recent message there is, whenever it came; then new ones.
+    Latest,
+    /// At the start of the test.
+    Test,
+}
+
+/// One requirement and the picture that decides it.
+#[derive(Clone, Debug)]
+pub struct Assertion {
+    /// The requirement.
+    pub requirement: RequirementId,
+    /// What the picked message must show.
+    pub selection: Selection,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// `expect:`.
+#[derive(Clone, Debug)]
+pub struct Expect {
+    /// Topic name, or `mqtt/connect`, `mqtt/publish`, `http/fetch` and so on.
+    pub topic: String,
+    /// What is decided by the picking itself.
+    pub checks: Vec<Binding>,
+    /// Which message is picked.
+    pub selection: Selection,
+    /// How long it may take, from the mark.
+    pub within: TimeTerm,
+    /// Where the scan begins.
+    pub from: From,
+    /// What the picked message must show.
+    pub assert: Vec<Assertion>,
+    /// What the picked message should show: broken is a warning by a ruling of the catalogue.
+    pub prefer: Vec<Assertion>,
+    /// Values to keep: name and path into the picked message.
+    pub save: Vec<(String, Path)>,
+}
+
+/// `never:`.
+#[derive(Clone, Debug)]
+pub struct Never {
+    /// Topic name.
+    pub topic: String,
+    /// What it decides.
+    pub checks: Vec<Binding>,
+    /// What must not come.
+    pub selection: Selection,
+    /// For how long, from now.
+    pub during: TimeTerm,
+    /// Where the scan begins.
+    pub from: From,
+}
+
+/// `always:`.
+#[derive(Clone, Debug)]
+pub struct Always {
+    /// Topic name.
+    pub topic: String,
+    /// What it decides.
+    pub checks: Vec<Binding>,
+    /// What every message must show.
+    pub selection: Selection,
+    /// Where the scan begins.
+    pub from: From,
+    /// How long.
+    pub extent: Extent,
+}
+
+/// How long an `always` looks.
+#[derive(Clone, Debug)]
+pub enum Extent {
+    /// `during:`, from now.
+    During(TimeTerm),
+    /// `until:` a message comes.
+    Until(Box<Until>),
+}
+
+/// `until:` of an `always`.
+#[derive(Clone, Debug)]
+pub struct Until {
+    /// Topic name; that of the `always` unless said.
+    pub topic: String,
+    /// What is decided by this message coming in time.
+    pub checks: Vec<Binding>,
+    /// The message.
+    pub selection: Selection,
+    /// How long it may take, from the mark.
+    pub within: TimeTerm,
+    /// Where it is written.
+    pub at: Span,
+}
+
+/// `action:`.
+#[derive(Clone, Debug)]
+pub struct ActionWalk {
+    /// Name given by `as`.
+    pub name: String,
+    /// What it decides.
+    pub checks: Vec<Binding>,
+    /// The walk that passes.
+    pub through: Walk,
+    /// A walk that is a warning by a ruling of the catalogue.
+    pub tolerated: Option<Walk>,
+    /// How long it may take, from the mark.
+    pub within: TimeTerm,
+    /// Values to keep, from the message that ended the walk.
+    pub save: Vec<(String, Path)>,
+}
+
+/// `WAITING? -> RUNNING -> FINISHED | FAILED`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Walk {
+    /// The stations in order.
+    pub stations: Vec<Station>,
+    /// As written.
+    pub text: String,
+}
+
+/// One station of a walk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Station {
+    /// Any of these statuses.
+    pub statuses: Vec<String>,
+    /// `?`: may be skipped, because states coalesce.
+    pub optional: bool,
+}
+
+/// `retained:`.
+#[derive(Clone, Debug)]
+pub struct Retained {
+    /// Topic name.
+    pub topic: String,
+    /// What it decides.
+    pub checks: Vec<Binding>,
+    /// What the message must show.
+    pub selection: Selection,
+    /// How long it may take, from now.
+    pub within: TimeTerm,
+    /// What the message must show, requirement by requirement.
+    pub assert: Vec<Assertion>,
+}
+
+/// `link:`.
+#[derive(Clone, Debug)]
+pub struct LinkStep {
+    /// What is done to the link.
+    pub fault: crate::journal::event::LinkFault,
+}
+
+/// `serve:`.
+#[derive(Clone, Debug)]
+pub struct Serve {
+    /// `${serve.NAME}` is the address.
+    pub name: String,
+    /// File of `fixtures/maps/` or of the profile; a built-in map unless said.
+    pub file: Option<Term>,
+    /// How it is served.
+    pub behaviour: ServeBehaviour,
+}
+
+/// How a map file is served.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ServeBehaviour {
+    /// As it should be.
+    #[default]
+    Well,
+    /// 404.
+    NotFound,
+    /// The connection is accepted and nothing ever comes.
+    Stall,
+    /// Half the body, then the connection is cut.
+    Cut,
+    /// Other bytes than the ones that were hashed.
+    WrongBytes,
+    /// Slowly.
+    Slow,
+    /// The port refuses connections.
+    Unreachable,
+}
+
+/// `operator:`.
+#[derive(Clone, Debug)]
+pub struct Operator {
+    /// Name of the hook.
+    pub hook: String,
+    /// Parameters.
+    pub with: Vec<(String, Term)>,
+    /// How long it may take.
+    pub within: Option<TimeTerm>,
+}
+
+/// A path into a message: member names and array indices.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Path {
+    /// As written: `maps`, `agvPosition.x`, `errors[0].errorType`.
+    pub text: String,
+}
+
+impl Path {
+    /// The value at this path.
+    #[must_use]
+    pub fn of<'a>(&self, message: &'a Value) -> Option<&'a Value> {
+        self.text
+            .split(['.', '[', ']'])
+            .filter(|part| !part.is_empty())
+            .try_fold(message, |value, part| match value {
+                Value::Array(items) => items.get(part.parse::<usize>().ok()?),
+                other => other.get(part),
+            })
+    }
+}
+
+/// An always-on check.
+#[derive(Clone, Debug)]
+pub struct Monitor {
+    /// Path below `suites/monitors/` without extension.
+    pub id: String,
+    /// One sentence.
+    pub title: String,
+    /// Which side it judges.
+    pub device: Option<Role>,
+    /// Protocol versions it is written for.
+    pub spec: VersionRange,
+    /// What must be given for it to apply.
+    pub needs: Vec<Need>,
+    /// What it decides.
+    pub checks: Vec<Binding>,
+    /// Why anybody cares.
+    pub why: String,
+    /// The rule.
+    pub rule: Rule,
+    /// The file.
+    pub source: Arc<Source>,
+}
+
+/// What a monitor holds true.
+#[derive(Clone, Debug)]
+pub enum Rule {
+    /// Every message on the topic that matches `when` matches `pattern`.
+    Always {
+        /// Topic name or `mqtt/…`.
+        topic: String,
+        /// Which messages are judged; absent is all.
+        when: Option<Pattern>,
+        /// What they must show.
+        pattern: Pattern,
+    },
+    /// No message on the topic matches.
+    Never {
+        /// Topic name or `mqtt/…`.
+        topic: String,
+        /// What must not come.
+        pattern: Pattern,
+    },
+    /// A named check sees everything.
+    Check(CheckUse),
+}
