@@ -128,6 +128,14 @@ impl Diagnostic {
         self
     }
 
+    /// Only the place with its caret, without title.
+    #[must_use]
+    pub fn render_place(&self) -> String {
+        let text = self.render(false);
+        let first = text.lines().position(|line| line.contains("-->")).unwrap_or(0);
+        text.lines().skip(first).collect::<Vec<_>>().join("\n")
+    }
+
     /// The diagnostic as rustc would show it.
     #[must_use]
     pub fn render(&self, color: bool) -> String {

@@ -303,6 +303,11 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<String>,
     },
+    /// What the run is going to do, and why it leaves things out.
+    Planned {
+        /// See [`Plan`].
+        plan: Box<Plan>,
+    },
     /// A test began.
     TestBegun {
         /// Its id.
@@ -537,6 +542,57 @@ pub struct RunHeader {
     pub settings: Vec<Setting>,
     /// The command line as typed, passwords left out.
     pub command: Vec<String>,
+}
+
+/// What a run is going to do, and why it leaves things out.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub struct Plan {
+    /// The selected tests, in the order they will run.
+    pub tests: Vec<PlannedTest>,
+    /// What the device can do, and who says so.
+    pub capabilities: Vec<Capability>,
+    /// What restricts the statement, one sentence each.
+    pub limits: Vec<String>,
+    /// Deviations the profile declares: requirement id to reason.
+    pub deviations: std::collections::BTreeMap<String, String>,
+    /// Series name of the factsheet.
+    pub series_name: Option<String>,
+    /// Whether every test of the suites was selected.
+    pub complete: bool,
+}
+
+/// One test of a plan.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct PlannedTest {
+    /// Id.
+    pub test: String,
+    /// What becomes of it.
+    pub gate: Gate,
+}
+
+/// Whether a test runs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gate {
+    /// It runs.
+    Runs,
+    /// The device declares that it lacks what the test needs.
+    NotApplicable(String),
+    /// The bench, the profile or the device leaves open what the test needs.
+    Unobservable(String),
+}
+
+/// A capability and its source.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Capability {
+    /// Name, such as `action downloadMap INSTANT`.
+    pub name: String,
+    /// `yes`, `no`, or a value.
+    pub value: String,
+    /// `factsheet`, `profile`, or both when they contradict each other.
+    pub source: String,
 }
 
 /// One effective setting and where it came from.

@@ -1,0 +1,20 @@
+//! Journal and test in, decisions out.
+//!
+//! Pure: no clock, no network, no engine. [`RunJudge`] sees every entry of a run, [`TestJudge`] those of one
+//! test, an evaluator those of one step; [`MonitorJudge`] watches everything. The engine shows it entries
+//! as they happen and asks what to wait for; `report --rejudge` shows it the same entries again.
+
+mod decide;
+mod limit;
+mod monitor;
+mod run;
+mod step;
+mod test;
+mod timeline;
+mod window;
+
+pub use monitor::MonitorJudge;
+pub use run::{JudgeError, RESULT_FORMAT, Rules, RunJudge, judge};
+pub use step::Progress;
+pub use test::{Ground, TestJudge};
+pub use timeline::Timeline;

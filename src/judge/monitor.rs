@@ -1,0 +1,222 @@
+//! Always-on checks, judged on everything that happens in a run.
+//!
+//! A monitor's findings are kept once per requirement and verdict, with a count and the first occurrences,
+//! not as noise in every test.
+
+use std::sync::Arc;
+
+use serde_json::Map;
+
+use super::decide::mood;
+use super::step::shown_path;
+use super::test::Ground;
+use crate::checks::{self, CheckContext, CheckFinding, Running};
+use crate::clock::Moment;
+use crate::journal::Entry;
+use crate::journal::event::Event;
+use crate::pattern::{Bindings, Bound};
+use crate::report::result::{MonitorFinding, MonitorResult};
+use crate::suite::model::{Monitor, Need, Rule};
+use crate::verdict::{Accumulated, Verdict};
+
+/// How many occurrences of a finding are kept by number.
+const FIRST: usize = 5;
+/// How many different findings a monitor keeps.
+const DIFFERENT: usize = 64;
+
+/// A monitor on duty.
+pub struct MonitorJudge {
+    monitor: Arc<Monitor>,
+    rule: Watching,
+    judged: u64,
+    findings: Vec<MonitorFinding>,
+}
+
+enum Watching {
+    Pattern {
+        topic: String,
+        when: Option<Bound>,
+        pattern: Bound,
+        forbidden: bool,
+    },
+    Check {
+        running: Box<dyn Running>,
+        with: Map<String, serde_json::Value>,
+    },
+    /// Something it needs is not there: judges nothing.
+    Off,
+}
+
+impl MonitorJudge {
+    /// Puts a monitor on duty; `None` when it is not meant for this version.
+    pub fn start(monitor: &Arc<Monitor>, ground: &Ground, tap: bool) -> Option<Self> {
+        let wanted = monitor.checks.iter().any(|binding| mood(&ground.catalogue, &ground.pack, binding.requirement.as_str()).is_some());
+        if !monitor.spec.contains(ground.pack.version) || !wanted {
+            return None;
+        }
+        let rule = if monitor.needs.contains(&Need::Tap) && !tap {
+            Watching::Off
+        } else {
+            Self::watch(&monitor.rule, ground).unwrap_or(Watching::Off)
+        };
+        Some(Self {
+            monitor: Arc::clone(monitor),
+            rule,
+            judged: 0,
+            findings: Vec::new(),
+        })
+    }
+
+    fn watch(rule: &Rule, ground: &Ground) -> Option<Watching> {
+        let mut bindings = ground.bindings.clone();
+        bindings.insert("vda".to_owned(), ground.pack.vocabulary().clone());
+        let bindings = Bindings::new(bindings);
+        Some(match rule {
+            Rule::Always { topic, when, pattern } => Watching::Pattern {
+                topic: topic.clone(),
+                when: when.as_ref().map(|when| when.bind(&bindings)).transpose().ok()?,
+                pattern: pattern.bind(&bindings).ok()?,
+                forbidden: false,
+            },
+            Rule::Never { topic, pattern } => Watching::Pattern {
+                topic: topic.clone(),
+                when: None,
+                pattern: pattern.bind(&bindings).ok()?,
+                forbidden: true,
+            },
+            Rule::Check(check) => {
+                let definition = checks::find(&check.name)?;
+                let mut with = Map::new();
+                for (name, term) in &check.with {
+                    with.insert(name.clone(), term.bind(&bindings).ok()?);
+                }
+                Watching::Check {
+                    running: (definition.start)(&context(ground, &with)),
+                    with,
+                }
+            }
+        })
+    }
+
+    /// Shows it one entry.
+    pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground) {
+        let mut found = Vec::new();
+        match &mut self.rule {
+            Watching::Off => {}
+            Watching::Check { running, with } => {
+                if running.observe(entry, &context(ground, with), &mut found) {
+                    self.judged += 1;
+                }
+            }
+            Watching::Pattern { topic, when, pattern, forbidden } => {
+                // What was stored before the run is not this run's evidence.
+                let stale = matches!(entry.event(), Event::Message { retain: true, .. });
+                if subject != Some(topic.as_str()) || stale {
+                    return;
+                }
+                let Some(message) = entry.subject() else { return };
+                if when.as_ref().is_some_and(|when| !when.matches(&message, None)) {
+                    return;
+                }
+                self.judged += 1;
+                if pattern.matches(&message, None) == *forbidden {
+                    found.push(CheckFinding {
+                        requirement: None,
+                        verdict: None,
+                        seq: entry.seq(),
+                        message: miss(pattern, &message, *forbidden),
+                    });
+                }
+            }
+        }
+        self.keep(found, ground);
+    }
+
+    /// The run has ended.
+    pub fn finish(&mut self, end: Moment, ground: &Ground) {
+        let mut found = Vec::new();
+        if let Watching::Check { running, with } = &mut self.rule {
+            running.finish(end, &context(ground, with), &mut found);
+        }
+        self.keep(found, ground);
+    }
+
+    fn keep(&mut self, found: Vec<CheckFinding>, ground: &Ground) {
+        for finding in found {
+            let id = finding.requirement.as_ref().or_else(|| self.monitor.checks.first().map(|binding| &binding.requirement));
+            let Some(id) = id else { continue };
+            let Some((requirement, mood)) = mood(&ground.catalogue, &ground.pack, id.as_str()) else { continue };
+            let verdict = finding.verdict.unwrap_or_else(|| mood.broken());
+            if verdict == Verdict::Pass {
+                continue;
+            }
+            let known = self.findings.iter_mut().find(|known| known.requirement == id.as_str() && known.verdict == verdict);
+            if let Some(known) = known {
+                known.count += 1;
+                if known.first.len() < FIRST {
+                    known.first.push(finding.seq);
+                }
+            } else if self.findings.len() < DIFFERENT {
+                self.findings.push(MonitorFinding {
+                    requirement: id.as_str().to_owned(),
+                    verdict,
+                    count: 1,
+                    first: vec![finding.seq],
+                    message: finding.message,
+                    interpretation: requirement.interpretation.clone(),
+                });
+            }
+        }
+    }
+
+    /// What it has to say.
+    pub fn result(&self) -> MonitorResult {
+        let mut verdict: Accumulated = self.findings.iter().map(|finding| finding.verdict).collect();
+        if self.judged > 0 {
+            verdict.add(Verdict::Pass);
+        }
+        MonitorResult {
+            id: self.monitor.id.clone(),
+            title: self.monitor.title.clone(),
+            verdict: verdict.get(),
+            judged: self.judged,
+            findings: self.findings.clone(),
+        }
+    }
+
+    /// What it says about each requirement it is bound to, or found something about.
+    pub fn decisions(&self) -> Vec<(String, Verdict)> {
+        let mut all: Vec<(String, Verdict)> = self.findings.iter().map(|f| (f.requirement.clone(), f.verdict)).collect();
+        if self.judged > 0 {
+            for binding in &self.monitor.checks {
+                all.push((binding.requirement.as_str().to_owned(), Verdict::Pass));
+            }
+        }
+        all
+    }
+
+    /// The monitor.
+    pub fn monitor(&self) -> &Arc<Monitor> {
+        &self.monitor
+    }
+}
+
+fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String {
+    if forbidden {
+        return format!("matches {}, which must not come", pattern.describe());
+    }
+    match pattern.examine(message, None).misses.first() {
+        Some(miss) => format!("{} is {}, expected {}", shown_path(&miss.path), miss.found, miss.expected),
+        None => format!("does not match {}", pattern.describe()),
+    }
+}
+
+fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>) -> CheckContext<'a> {
+    CheckContext {
+        pack: &ground.pack,
+        topics: &ground.topics,
+        identity: (&ground.identity.0, &ground.identity.1),
+        with,
+        bindings: &ground.bindings,
+    }
+}

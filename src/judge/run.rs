@@ -1,0 +1,365 @@
+//! A whole run, judged from its journal.
+//!
+//! [`RunJudge`] is shown every entry in order, live by the engine or again from a file, and gives the
+//! result at any time. Nothing but the journal and the suites enters it, so judging a journal again gives
+//! the same result, byte for byte.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::decide::mood;
+use super::monitor::MonitorJudge;
+use super::test::{Ground, TestJudge};
+use super::timeline::Timeline;
+use crate::clock::Stamp;
+use crate::journal::Entry;
+use crate::journal::event::{Event, Gate, Plan, RunHeader};
+use crate::pack::{Catalogue, Decided, Packs, Role};
+use crate::report::result::{
+    Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult,
+};
+use crate::suite::Suites;
+use crate::suite::model::Test;
+use crate::verdict::{Accumulated, Verdict};
+
+/// Format of `result.json`.
+pub const RESULT_FORMAT: &str = "vda5050-tck.result/1";
+
+/// The rules a run is judged by.
+#[derive(Clone)]
+pub struct Rules {
+    /// All protocol versions.
+    pub packs: Arc<Packs>,
+    /// The requirements.
+    pub catalogue: Arc<Catalogue>,
+    /// Tests and monitors.
+    pub suites: Arc<Suites>,
+    /// SHA-256 over suites, schemas and requirements.
+    pub sha256: String,
+}
+
+/// Why a journal cannot be judged.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum JudgeError {
+    /// It does not begin with `RunBegun`.
+    #[error("the journal does not begin with the record of a run")]
+    NoHeader,
+    /// It was made for a protocol version this program does not have.
+    #[error("the journal is about protocol version {0}, which this program does not have")]
+    Version(String),
+    /// It names a test the suites do not have.
+    #[error("the journal names the test `{0}`, which the suites do not have")]
+    UnknownTest(String),
+}
+
+/// A run being judged.
+pub struct RunJudge {
+    rules: Rules,
+    header: RunHeader,
+    role: Role,
+    ground: Ground,
+    begun: Stamp,
+    last: Stamp,
+    timeline: Timeline,
+    monitors: Vec<MonitorJudge>,
+    current: Option<TestJudge>,
+    done: Vec<TestResult>,
+    plan: Plan,
+    end: Option<(bool, Option<String>)>,
+}
+
+impl RunJudge {
+    /// Begins with the first entry of a journal.
+    pub fn begin(rules: &Rules, first: &Entry) -> Result<Self, JudgeError> {
+        let Event::RunBegun { header } = first.event() else {
+            return Err(JudgeError::NoHeader);
+        };
+        let header = (**header).clone();
+        let pack = rules.packs.get(&header.protocol).ok_or_else(|| JudgeError::Version(header.protocol.clone()))?;
+        let role = if header.role == Role::Agv.word() { Role::Agv } else { Role::MasterControl };
+        let ground = Ground {
+            pack: Arc::clone(pack),
+            catalogue: Arc::clone(&rules.catalogue),
+            topics: header.topics.clone(),
+            identity: (header.manufacturer.clone(), header.serial_number.clone()),
+            bindings: header.bindings.clone(),
+        };
+        let tap = header.vantage == "tap";
+        let monitors = rules.suites.monitors.iter().filter(|monitor| monitor.device.is_none_or(|device| device == role));
+        let monitors = monitors.filter_map(|monitor| MonitorJudge::start(monitor, &ground, tap)).collect();
+        Ok(Self {
+            rules: rules.clone(),
+            timeline: Timeline::new(&header.topics),
+            header,
+            role,
+            ground,
+            begun: first.at(),
+            last: first.at(),
+            monitors,
+            current: None,
+            done: Vec::new(),
+            plan: Plan::default(),
+            end: None,
+        })
+    }
+
+    /// Shows it the next entry.
+    pub fn observe(&mut self, entry: &Arc<Entry>) -> Result<(), JudgeError> {
+        self.last = entry.at();
+        let subject = self.timeline.add(entry);
+        for monitor in &mut self.monitors {
+            monitor.observe(entry, subject.as_deref(), &self.ground);
+        }
+        match entry.event() {
+            Event::Planned { plan } => self.plan = (**plan).clone(),
+            Event::TestBegun { test, bindings } => {
+                self.break_off("the run went on without ending this test");
+                let found = self.test(test).ok_or_else(|| JudgeError::UnknownTest(test.clone()))?;
+                self.current = Some(TestJudge::begin(&found, &self.ground, entry, bindings));
+            }
+            Event::RunEnded { partial, reason } => {
+                self.break_off(reason.as_deref().unwrap_or("the run ended before the test did"));
+                self.end = Some((*partial, reason.clone()));
+                for monitor in &mut self.monitors {
+                    monitor.finish(entry.at().moment, &self.ground);
+                }
+            }
+            _ => {}
+        }
+        if let Some(current) = &mut self.current {
+            current.observe(entry, subject.as_deref(), &self.timeline, &self.ground);
+        }
+        if matches!(entry.event(), Event::TestEnded { .. })
+            && let Some(current) = self.current.take()
+        {
+            self.done.push(current.result().clone());
+        }
+        Ok(())
+    }
+
+    /// The journal is at its end without `RunEnded`, as after a crash.
+    pub fn break_off_run(&mut self, why: &str) {
+        if self.end.is_none() {
+            self.break_off(why);
+            self.end = Some((true, Some(why.to_owned())));
+            for monitor in &mut self.monitors {
+                monitor.finish(self.last.moment, &self.ground);
+            }
+        }
+    }
+
+    fn break_off(&mut self, why: &str) {
+        if let Some(current) = self.current.take() {
+            self.done.push(current.break_off(self.last.moment, why, &self.ground));
+        }
+    }
+
+    fn test(&self, id: &str) -> Option<Arc<Test>> {
+        self.rules.suites.tests.iter().find(|test| test.id == id && test.device == self.role).cloned()
+    }
+
+    /// The test that is running.
+    pub fn current(&self) -> Option<&TestJudge> {
+        self.current.as_ref()
+    }
+
+    /// The tests that have ended.
+    pub fn done(&self) -> &[TestResult] {
+        &self.done
+    }
+
+    /// Everything by subject.
+    pub fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// What does not change during the run.
+    pub fn ground(&self) -> &Ground {
+        &self.ground
+    }
+
+    /// The result as it stands.
+    pub fn result(&self) -> RunResult {
+        let mut tests = self.done.clone();
+        tests.extend(self.set_aside());
+        let monitors: Vec<_> = self.monitors.iter().map(MonitorJudge::result).collect();
+        let all = tests.iter().filter_map(|test| test.verdict).chain(monitors.iter().filter_map(|monitor| monitor.verdict));
+        let verdict: Accumulated = all.collect();
+        let (partial, reason) = match &self.end {
+            Some((partial, reason)) => (*partial, reason.clone()),
+            None => (true, Some("the run has not ended yet".to_owned())),
+        };
+        let header = &self.header;
+        RunResult {
+            format: RESULT_FORMAT.to_owned(),
+            tool: header.tool.clone(),
+            run: header.run.clone(),
+            started: format!("{:.3}", self.begun.utc),
+            seconds: self.last.moment.since(self.begun.moment).as_secs_f64(),
+            role: header.role.clone(),
+            protocol: header.protocol.clone(),
+            partial,
+            partial_reason: reason.filter(|_| partial),
+            verdict: verdict.get(),
+            device: DeviceIdentity {
+                manufacturer: header.manufacturer.clone(),
+                serial_number: header.serial_number.clone(),
+                series_name: self.plan.series_name.clone(),
+            },
+            vantage: header.vantage.clone(),
+            suites_sha256: header.suites.clone(),
+            suites_modified: header.modified,
+            journal: "journal.jsonl".to_owned(),
+            requirements: self.requirements(&tests),
+            tests,
+            monitors,
+            capabilities: self
+                .plan
+                .capabilities
+                .iter()
+                .map(|capability| Capability {
+                    name: capability.name.clone(),
+                    value: capability.value.clone(),
+                    source: capability.source.clone(),
+                })
+                .collect(),
+            limits: self.plan.limits.clone(),
+            deviations: self.plan.deviations.clone(),
+            settings: header.settings.clone(),
+        }
+    }
+
+    /// The planned tests that did not run, with the reason.
+    fn set_aside(&self) -> Vec<TestResult> {
+        let mut all = Vec::new();
+        for planned in &self.plan.tests {
+            if self.done.iter().any(|done| done.id == planned.test) {
+                continue;
+            }
+            let Some(test) = self.test(&planned.test) else { continue };
+            let mut result = TestResult {
+                id: test.id.clone(),
+                title: test.title.clone(),
+                verdict: None,
+                not_applicable: None,
+                seconds: 0.0,
+                reason: None,
+                maturity: "watchlist".to_owned(),
+                journal: None,
+                decisions: Vec::new(),
+                steps: Vec::new(),
+            };
+            if test.maturity == crate::suite::model::Maturity::Reviewed {
+                "reviewed".clone_into(&mut result.maturity);
+            }
+            let why = match &planned.gate {
+                Gate::NotApplicable(why) => {
+                    result.not_applicable = Some(why.clone());
+                    all.push(result);
+                    continue;
+                }
+                Gate::Unobservable(why) => why.clone(),
+                Gate::Runs if self.end.is_some() => "the run ended before this test".to_owned(),
+                Gate::Runs => continue,
+            };
+            result.verdict = Some(Verdict::Inconclusive);
+            for step in &test.steps {
+                for (requirement, clause) in step.clauses() {
+                    if mood(&self.ground.catalogue, &self.ground.pack, requirement.as_str()).is_some() {
+                        result.decisions.push(undecided(requirement.as_str(), clause, step.verb_span.place(), &why));
+                    }
+                }
+            }
+            result.reason = Some(why);
+            all.push(result);
+        }
+        all
+    }
+
+    fn requirements(&self, tests: &[TestResult]) -> Vec<RequirementResult> {
+        let mut decided: BTreeMap<&str, (Accumulated, Vec<String>)> = BTreeMap::new();
+        for test in tests {
+            for decision in &test.decisions {
+                let (verdict, by) = decided.entry(decision.requirement.as_str()).or_default();
+                verdict.add(decision.verdict);
+                if !by.contains(&test.id) {
+                    by.push(test.id.clone());
+                }
+            }
+        }
+        let monitored: Vec<(String, Vec<(String, Verdict)>)> =
+            self.monitors.iter().map(|monitor| (monitor.monitor().id.clone(), monitor.decisions())).collect();
+        for (id, decisions) in &monitored {
+            for (requirement, verdict) in decisions {
+                let (all, by) = decided.entry(requirement.as_str()).or_default();
+                all.add(*verdict);
+                if !by.contains(id) {
+                    by.push(id.clone());
+                }
+            }
+        }
+        let mut all = Vec::new();
+        for requirement in self.rules.catalogue.all() {
+            if !requirement.role.concerns(self.role) || requirement.in_version(&self.ground.pack).is_none() {
+                continue;
+            }
+            let id = requirement.id.as_str();
+            let (verdict, decided_by) = decided.remove(id).unwrap_or_default();
+            let not_decided = match verdict.get() {
+                Some(_) => None,
+                None => Some(self.why_not(id, &requirement.decided, tests)),
+            };
+            all.push(RequirementResult {
+                id: id.to_owned(),
+                verdict: verdict.get(),
+                decided_by,
+                not_decided,
+            });
+        }
+        all
+    }
+
+    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult]) -> String {
+        if let Decided::NotTestable { reason } = decided {
+            return format!("not testable: {reason}");
+        }
+        let deciding = |test: &&Arc<Test>| test.device == self.role && test.requirements().iter().any(|other| other.as_str() == id);
+        let with_test: Vec<&Arc<Test>> = self.rules.suites.tests.iter().filter(deciding).collect();
+        if with_test.is_empty() {
+            let monitored = self.monitors.iter().any(|m| m.monitor().checks.iter().any(|b| b.requirement.as_str() == id));
+            return if monitored { "nothing came that could have been judged".to_owned() } else { "no test".to_owned() };
+        }
+        let reason = with_test.iter().find_map(|test| {
+            let result = tests.iter().find(|result| result.id == test.id)?;
+            result.not_applicable.clone()
+        });
+        reason.map_or_else(|| "not selected".to_owned(), |why| format!("not applicable: {why}"))
+    }
+}
+
+fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
+    Decision {
+        requirement: requirement.to_owned(),
+        verdict: Verdict::Inconclusive,
+        clause,
+        place,
+        witness: None,
+        message: why.to_owned(),
+        expected: None,
+        nearest: None,
+        waited: None,
+        explanation: None,
+        interpretation: None,
+    }
+}
+
+/// Judges a whole journal.
+pub fn judge(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunResult, JudgeError> {
+    let first = entries.first().ok_or(JudgeError::NoHeader)?;
+    let mut run = RunJudge::begin(rules, first)?;
+    for entry in entries {
+        run.observe(entry)?;
+    }
+    run.break_off_run("the journal breaks off here");
+    Ok(run.result())
+}

@@ -1,0 +1,236 @@
+//! `always`: every message matches, for a while or until another one comes.
+
+use std::sync::Arc;
+
+use super::{
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit, seconds,
+    shown_path,
+};
+use crate::clock::Moment;
+use crate::journal::Entry;
+use crate::judge::limit::Limit;
+use crate::judge::window::{CheckWindow, Scene};
+use crate::suite::model::{Always, Extent, From, Step, Until};
+
+pub(crate) struct Holding {
+    verb: Always,
+    position: Position,
+    selector: Selector,
+    check: Option<CheckWindow>,
+    until: Option<Goal>,
+    ends: Moment,
+    seen: u64,
+    violated: Option<Violation>,
+}
+
+struct Goal {
+    until: Until,
+    selector: Selector,
+    limit: Limit,
+    nearest: Option<Near>,
+    reached: Option<(u64, Moment)>,
+    seen: u64,
+}
+
+struct Violation {
+    seq: u64,
+    message: String,
+    near: Option<Near>,
+}
+
+impl Holding {
+    pub(super) fn begin(verb: &Always, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+        let mut selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
+        let check = selector.check.take().map(|check| CheckWindow::start(&check, scene)).transpose()?;
+        let (until, ends) = match &verb.extent {
+            Extent::During(time) => (None, position.begun + limit(time, scene)?.hard),
+            Extent::Until(until) => {
+                let limit = limit(&until.within, scene)?;
+                let goal = Goal {
+                    selector: Selector::bind(&until.selection, &until.topic, &until.at, position, scene)?,
+                    until: (**until).clone(),
+                    limit,
+                    nearest: None,
+                    reached: None,
+                    seen: 0,
+                };
+                (Some(goal), position.base + limit.hard)
+            }
+        };
+        let mut this = Self {
+            verb: verb.clone(),
+            position,
+            selector,
+            check,
+            until,
+            ends,
+            seen: 0,
+            violated: None,
+        };
+        let from = position.start(verb.from, From::Mark);
+        let mut past = backlog(scene.timeline, &verb.topic, from);
+        if let Some(goal) = this.until.as_ref().filter(|goal| goal.until.topic != this.verb.topic) {
+            past.extend(backlog(scene.timeline, &goal.until.topic, from));
+            past.sort_by_key(|entry| entry.seq());
+        }
+        for entry in past {
+            let subject = scene.timeline.subject_of(&entry);
+            this.observe(&entry, subject.as_deref(), scene);
+        }
+        Ok(this)
+    }
+
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
+        if self.decided() || entry.at().moment > self.ends {
+            return;
+        }
+        if subject == Some(self.verb.topic.as_str()) {
+            self.seen += 1;
+            self.judge(entry, scene);
+        }
+        if self.violated.is_some() {
+            return;
+        }
+        if let Some(goal) = self.until.as_mut().filter(|goal| subject == Some(goal.until.topic.as_str())) {
+            goal.seen += 1;
+            if goal.selector.takes(entry, scene) {
+                goal.reached = Some((entry.seq(), entry.at().moment));
+            } else {
+                keep_nearest(&mut goal.nearest, goal.selector.closeness(entry));
+            }
+        }
+    }
+
+    fn judge(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>) {
+        if let Some(found) = self.check.as_mut().and_then(|check| check.observe(entry, scene)) {
+            self.violated = Some(Violation {
+                seq: entry.seq(),
+                message: format!("#{}: {found}", entry.seq()),
+                near: None,
+            });
+        } else if !self.selector.takes(entry, scene) {
+            let near = self.selector.closeness(entry);
+            let message = match near.as_ref().and_then(|near| near.miss.as_ref()) {
+                Some(miss) => {
+                    format!("#{}: {} is {}, expected {}", entry.seq(), shown_path(&miss.path), miss.found, miss.expected)
+                }
+                None => format!("#{} does not match", entry.seq()),
+            };
+            self.violated = Some(Violation {
+                seq: entry.seq(),
+                message,
+                near,
+            });
+        }
+    }
+
+    fn decided(&self) -> bool {
+        self.violated.is_some() || self.until.as_ref().is_some_and(|goal| goal.reached.is_some())
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        if self.decided() {
+            Progress::Decided
+        } else {
+            Progress::Pending(self.ends)
+        }
+    }
+
+    pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
+        if let Some(found) = self.check.as_mut().and_then(|check| check.finish(at, scene)) {
+            self.violated.get_or_insert(Violation {
+                seq: 0,
+                message: found,
+                near: None,
+            });
+        }
+        let mut clauses = Vec::new();
+        let (holds, message, witness) = self.held(cut_short);
+        let mut reached = if holds == Holds::Yes { Ok(()) } else { Err(message.clone()) };
+        let span = self.violated.as_ref().and_then(|violation| violation.near.as_ref()?.span.clone());
+        let span = span.unwrap_or_else(|| self.selector.span.clone());
+        for mut clause in bound_clauses(&self.verb.checks, "checks", &span, &holds, witness, &message) {
+            clause.expected = self.selector.expected();
+            clause.nearest = self.violated.as_ref().and_then(|violation| violation.near.as_ref()?.miss.clone());
+            if let Some(miss) = &clause.nearest {
+                clause.label = format!("{} is {}", shown_path(&miss.path), miss.found);
+            }
+            clauses.push(clause);
+        }
+        let mut took = witness;
+        if let Some(goal) = self.until {
+            let (goal_clauses, goal_reached, goal_took) = goal.end(at, cut_short, self.position, self.violated.is_some());
+            clauses.extend(goal_clauses);
+            took = took.or(goal_took);
+            reached = reached.and(goal_reached);
+        }
+        StepOutcome {
+            reached: Some(reached),
+            took,
+            clauses,
+            saves: Vec::new(),
+            seen: self.seen,
+        }
+    }
+
+    fn held(&self, cut_short: Option<&str>) -> (Holds, String, Option<u64>) {
+        if let Some(violation) = &self.violated {
+            return (Holds::No, violation.message.clone(), Some(violation.seq).filter(|seq| *seq > 0));
+        }
+        if let Some(why) = cut_short {
+            return (Holds::Unseen(why.to_owned()), why.to_owned(), None);
+        }
+        match self.seen {
+            0 => {
+                let why = format!("no {} message came that could have been judged", self.verb.topic);
+                (Holds::Unseen(why.clone()), why, None)
+            }
+            n => (Holds::Yes, format!("all {n} {} messages match", self.verb.topic), None),
+        }
+    }
+}
+
+impl Goal {
+    fn end(
+        self,
+        at: Moment,
+        cut_short: Option<&str>,
+        position: Position,
+        violated: bool,
+    ) -> (Vec<Clause>, Result<(), String>, Option<u64>) {
+        let waited = at.since(position.base);
+        let (holds, message, witness) = match (self.reached, cut_short) {
+            (Some((seq, moment)), _) => {
+                let took = moment.since(position.base);
+                let holds = if took > self.limit.soft { Holds::Late } else { Holds::Yes };
+                (holds, format!("#{seq} came after {}", seconds(took)), Some(seq))
+            }
+            (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
+            (None, None) if violated => {
+                let why = "what had to hold until then was broken before";
+                (Holds::Unseen(why.to_owned()), why.to_owned(), None)
+            }
+            (None, None) => {
+                let message = format!(
+                    "{} {} messages came within {}, and none matches",
+                    self.seen,
+                    self.until.topic,
+                    seconds(waited)
+                );
+                (Holds::No, message, None)
+            }
+        };
+        let span = self.nearest.as_ref().and_then(|near| near.span.clone()).unwrap_or_else(|| self.selector.span.clone());
+        let nearest = self.nearest.and_then(|near| near.miss).filter(|_| holds == Holds::No);
+        let mut clauses = bound_clauses(&self.until.checks, "until", &span, &holds, witness, &message);
+        for clause in &mut clauses {
+            clause.expected = self.selector.expected();
+            clause.nearest.clone_from(&nearest);
+            if let Some(miss) = &nearest {
+                clause.label = format!("closest: {} is {}", shown_path(&miss.path), miss.found);
+            }
+        }
+        let reached = if witness.is_some() { Ok(()) } else { Err(message) };
+        (clauses, reached, witness)
+    }
+}

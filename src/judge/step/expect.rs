@@ -1,0 +1,180 @@
+//! `expect`: a matching message arrives in time, and shows what it must.
+
+use std::sync::Arc;
+
+use super::{
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, assertion_clause, backlog, bound_clauses, keep_nearest,
+    limit, seconds,
+};
+use crate::clock::Moment;
+use crate::journal::Entry;
+use crate::judge::limit::Limit;
+use crate::judge::window::Scene;
+use crate::suite::model::{Expect, From, Step};
+
+pub(crate) struct Expecting {
+    verb: Expect,
+    position: Position,
+    selector: Selector,
+    limit: Limit,
+    deadline: Moment,
+    nearest: Option<Near>,
+    seen: u64,
+    late: Option<u64>,
+    taken: Option<StepOutcome>,
+}
+
+impl Expecting {
+    pub(super) fn begin(verb: &Expect, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+        let limit = limit(&verb.within, scene)?;
+        let mut this = Self {
+            selector: Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?,
+            deadline: position.base + limit.hard,
+            verb: verb.clone(),
+            position,
+            limit,
+            nearest: None,
+            seen: 0,
+            late: None,
+            taken: None,
+        };
+        if verb.from == From::Latest {
+            // What is already known counts, however old it is; after that only what is new.
+            this.deadline = position.begun + limit.hard;
+            if let Some(entry) = scene.timeline.of(&verb.topic).last().cloned() {
+                this.look_at(&entry, scene, true);
+            }
+        } else {
+            for entry in backlog(scene.timeline, &verb.topic, position.start(verb.from, From::Here)) {
+                this.look_at(&entry, scene, false);
+            }
+        }
+        Ok(this)
+    }
+
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
+        if subject == Some(self.verb.topic.as_str()) {
+            self.look_at(entry, scene, false);
+        }
+    }
+
+    fn look_at(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>, whenever: bool) {
+        if self.taken.is_some() {
+            return;
+        }
+        self.seen += 1;
+        if !self.selector.takes(entry, scene) {
+            keep_nearest(&mut self.nearest, self.selector.closeness(entry));
+            return;
+        }
+        let at = entry.at().moment;
+        if at > self.deadline && !whenever {
+            self.late.get_or_insert(entry.seq());
+            return;
+        }
+        self.take(entry, at, whenever, scene);
+    }
+
+    fn take(&mut self, entry: &Arc<Entry>, at: Moment, whenever: bool, scene: &Scene<'_>) {
+        let took = at.since(self.position.base);
+        let late = took > self.limit.soft && !whenever;
+        let (holds, message) = if late {
+            let message = format!(
+                "#{} came after {}, which is later than {}",
+                entry.seq(),
+                seconds(took),
+                seconds(self.limit.soft)
+            );
+            (Holds::Late, message)
+        } else {
+            (Holds::Yes, format!("#{} came after {}", entry.seq(), seconds(took)))
+        };
+        let mut clauses = bound_clauses(&self.verb.checks, "checks", &self.selector.span, &holds, Some(entry.seq()), &message);
+        for clause in &mut clauses {
+            clause.expected = self.selector.expected();
+        }
+        let judged = [("assert", &self.verb.assert), ("prefer", &self.verb.prefer)];
+        for (word, assertions) in judged {
+            clauses.extend(
+                assertions
+                    .iter()
+                    .map(|assertion| assertion_clause(assertion, word, entry, &self.verb.topic, self.position, scene)),
+            );
+        }
+        let message = entry.subject();
+        let saves = self.verb.save.iter().filter_map(|(name, path)| {
+            let value = path.of(message.as_deref()?)?;
+            Some((name.clone(), value.clone()))
+        });
+        self.taken = Some(StepOutcome {
+            reached: Some(Ok(())),
+            took: Some(entry.seq()),
+            saves: saves.collect(),
+            clauses,
+            seen: self.seen,
+        });
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        match self.taken {
+            Some(_) => Progress::Decided,
+            None => Progress::Pending(self.deadline),
+        }
+    }
+
+    pub(super) fn end(self, at: Moment, cut_short: Option<&str>) -> StepOutcome {
+        if let Some(taken) = self.taken {
+            return taken;
+        }
+        let waited = at.since(self.position.base);
+        let (holds, message) = match cut_short {
+            Some(why) => (Holds::Unseen(why.to_owned()), why.to_owned()),
+            None => (Holds::No, self.missed(waited)),
+        };
+        let span = self.nearest.as_ref().and_then(|near| near.span.clone()).unwrap_or_else(|| self.selector.span.clone());
+        let nearest = self.nearest.and_then(|near| near.miss);
+        let label = nearest.as_ref().map_or_else(
+            || "no such message".to_owned(),
+            |miss| format!("closest: {} is {}", super::shown_path(&miss.path), miss.found),
+        );
+        let mut clauses = bound_clauses(&self.verb.checks, "checks", &span, &holds, None, &message);
+        for clause in &mut clauses {
+            clause.label.clone_from(&label);
+            clause.nearest.clone_from(&nearest);
+            clause.expected = self.selector.expected();
+        }
+        let unseen = "the message it judges did not come";
+        for (word, assertions) in [("assert", &self.verb.assert), ("prefer", &self.verb.prefer)] {
+            clauses.extend(assertions.iter().map(|assertion| Clause {
+                requirement: assertion.requirement.clone(),
+                word,
+                span: assertion.span.clone(),
+                label: String::new(),
+                holds: Holds::Unseen(unseen.to_owned()),
+                witness: None,
+                message: unseen.to_owned(),
+                expected: None,
+                nearest: None,
+            }));
+        }
+        StepOutcome {
+            reached: Some(Err(message)),
+            took: None,
+            clauses,
+            saves: Vec::new(),
+            seen: self.seen,
+        }
+    }
+
+    fn missed(&self, waited: std::time::Duration) -> String {
+        let topic = &self.verb.topic;
+        if let Some(late) = self.late {
+            return format!("the {topic} message came too late, in #{late}");
+        }
+        match self.seen {
+            0 => format!("no {topic} message came within {}", seconds(waited)),
+            1 => format!("1 {topic} message came within {}, and it does not match", seconds(waited)),
+            n => format!("{n} {topic} messages came within {}, and none matches", seconds(waited)),
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! `never`: no matching message arrives, and the observer was alive to see it.
+
+use std::sync::Arc;
+
+use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, limit, seconds};
+use crate::clock::Moment;
+use crate::journal::Entry;
+use crate::journal::event::Event;
+use crate::judge::window::{CheckWindow, Scene};
+use crate::suite::model::{From, Never, Step};
+
+pub(crate) struct Forbidding {
+    verb: Never,
+    position: Position,
+    selector: Selector,
+    check: Option<CheckWindow>,
+    ends: Moment,
+    probe_until: Moment,
+    seen: u64,
+    violated: Option<(u64, String)>,
+    alive: bool,
+}
+
+impl Forbidding {
+    pub(super) fn begin(verb: &Never, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+        let during = limit(&verb.during, scene)?.hard;
+        let ends = position.begun + during;
+        let patience = scene.bindings.get("time.broker").and_then(|value| value.as_u64()).unwrap_or(5_000);
+        let mut selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
+        let check = selector.check.take().map(|check| CheckWindow::start(&check, scene)).transpose()?;
+        let mut this = Self {
+            verb: verb.clone(),
+            position,
+            selector,
+            check,
+            ends,
+            probe_until: ends + std::time::Duration::from_millis(patience),
+            seen: 0,
+            violated: None,
+            alive: false,
+        };
+        for entry in backlog(scene.timeline, &verb.topic, position.start(verb.from, From::Mark)) {
+            this.look_at(&entry, scene);
+        }
+        Ok(this)
+    }
+
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
+        if matches!(entry.event(), Event::ProbeReceived { .. }) && entry.at().moment >= self.ends {
+            self.alive = true;
+        }
+        if subject == Some(self.verb.topic.as_str()) && !self.alive {
+            self.look_at(entry, scene);
+        }
+    }
+
+    fn look_at(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>) {
+        if self.violated.is_some() {
+            return;
+        }
+        self.seen += 1;
+        if let Some(check) = &mut self.check {
+            if let Some(found) = check.observe(entry, scene) {
+                self.violated = Some((entry.seq(), found));
+            }
+        } else if self.selector.takes(entry, scene) {
+            self.violated = Some((entry.seq(), format!("#{} is what must not come", entry.seq())));
+        }
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        if self.violated.is_some() || self.alive {
+            Progress::Decided
+        } else {
+            Progress::NeedsProbe(self.ends)
+        }
+    }
+
+    /// How long the proof that the observer is alive may take.
+    pub(in crate::judge) fn probe_until(&self) -> Moment {
+        self.probe_until
+    }
+
+    pub(super) fn end(self, at: Moment, cut_short: Option<&str>, _scene: &Scene<'_>) -> StepOutcome {
+        let (holds, message, witness) = match (self.violated, cut_short) {
+            (Some((seq, message)), _) => (Holds::No, message, Some(seq)),
+            (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
+            (None, None) if self.alive => {
+                let message = format!("nothing of the kind came for {}", seconds(at.since(self.position.begun)));
+                (Holds::Yes, message, None)
+            }
+            (None, None) => {
+                let why = "the harness could not prove that it was listening: its own probe did not come back";
+                (Holds::Unseen(why.to_owned()), why.to_owned(), None)
+            }
+        };
+        let mut clauses = bound_clauses(&self.verb.checks, "checks", &self.selector.span, &holds, witness, &message);
+        for clause in &mut clauses {
+            clause.label = witness.map_or_else(String::new, |seq| format!("#{seq} matches this"));
+            clause.expected = self.selector.expected().map(|pattern| format!("no message with {pattern}"));
+        }
+        StepOutcome {
+            reached: Some(if holds == Holds::Yes { Ok(()) } else { Err(message) }),
+            took: witness,
+            clauses,
+            saves: Vec::new(),
+            seen: self.seen,
+        }
+    }
+}

@@ -1,0 +1,370 @@
+//! One test, judged from the journal.
+//!
+//! A [`TestJudge`] is shown every entry from `TestBegun` to `TestEnded`. It keeps mark, cursor and
+//! variables, lets an evaluator decide each step, and turns the clauses into decisions. The engine asks it
+//! what to wait for; nothing the engine does can change a decision except by what ends up in the journal.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
+use super::decide::decide;
+use super::step::{Evaluator, Position, Progress, StepOutcome};
+use super::timeline::Timeline;
+use super::window::Scene;
+use crate::clock::Moment;
+use crate::journal::Entry;
+use crate::journal::event::{Event, StepEnd};
+use crate::pack::{Catalogue, Pack};
+use crate::pattern::Bindings;
+use crate::report::result::{StepResult, TestResult, Waited};
+use crate::suite::model::{Maturity, Section, Step, Test, Verb};
+use crate::verdict::{Accumulated, Verdict};
+
+/// What does not change during a run.
+pub struct Ground {
+    /// The protocol version.
+    pub pack: Arc<Pack>,
+    /// The requirements.
+    pub catalogue: Arc<Catalogue>,
+    /// Full topic by topic name.
+    pub topics: BTreeMap<String, String>,
+    /// Manufacturer and serial number.
+    pub identity: (String, String),
+    /// `time`, `device`.
+    pub bindings: Map<String, Value>,
+}
+
+/// A test being judged.
+pub struct TestJudge {
+    test: Arc<Test>,
+    bindings: Bindings,
+    entries: Vec<Arc<Entry>>,
+    begun: (u64, Moment),
+    mark: u64,
+    cursor: u64,
+    base: Moment,
+    running: Option<Running>,
+    preamble: Result<(), String>,
+    body: Result<(), String>,
+    trouble: Option<String>,
+    verdict: Accumulated,
+    result: TestResult,
+    ended: bool,
+}
+
+struct Running {
+    section: Section,
+    step: Step,
+    evaluator: Evaluator,
+    begun: (u64, Moment),
+    base: Moment,
+}
+
+impl TestJudge {
+    /// Begins a test with its `TestBegun` entry.
+    pub fn begin(test: &Arc<Test>, ground: &Ground, entry: &Entry, own: &Value) -> Self {
+        let mut bindings = ground.bindings.clone();
+        bindings.insert("vda".to_owned(), ground.pack.vocabulary().clone());
+        if let Some(own) = own.as_object() {
+            bindings.extend(own.clone());
+        }
+        let maturity = match test.maturity {
+            Maturity::Watchlist => "watchlist",
+            Maturity::Reviewed => "reviewed",
+        };
+        let (seq, moment) = (entry.seq(), entry.at().moment);
+        Self {
+            test: Arc::clone(test),
+            bindings: Bindings::new(bindings),
+            entries: Vec::new(),
+            begun: (seq, moment),
+            mark: seq,
+            cursor: seq,
+            base: moment,
+            running: None,
+            preamble: Ok(()),
+            body: Ok(()),
+            trouble: None,
+            verdict: Accumulated::default(),
+            result: TestResult {
+                id: test.id.clone(),
+                title: test.title.clone(),
+                verdict: None,
+                not_applicable: None,
+                seconds: 0.0,
+                reason: None,
+                maturity: maturity.to_owned(),
+                journal: Some((seq, seq)),
+                decisions: Vec::new(),
+                steps: Vec::new(),
+            },
+            ended: false,
+        }
+    }
+
+    /// The test.
+    pub fn test(&self) -> &Arc<Test> {
+        &self.test
+    }
+
+    /// The variables as they stand.
+    pub fn bindings(&self) -> &Bindings {
+        &self.bindings
+    }
+
+    /// What the running step is waiting for.
+    pub fn progress(&self) -> Progress {
+        self.running.as_ref().map_or(Progress::Decided, |running| running.evaluator.progress())
+    }
+
+    /// Until when the running `never` may wait for its probe.
+    pub fn probe_until(&self) -> Option<Moment> {
+        match &self.running.as_ref()?.evaluator {
+            Evaluator::Never(step) => Some(step.probe_until()),
+            _ => None,
+        }
+    }
+
+    /// Whether another step of this section still makes sense.
+    pub fn goes_on(&self, section: Section) -> bool {
+        match section {
+            Section::Given => self.preamble.is_ok() && self.trouble.is_none(),
+            Section::Steps => self.preamble.is_ok() && self.body.is_ok() && self.trouble.is_none(),
+            Section::Finally => true,
+        }
+    }
+
+    /// Whether the postamble brought the device back; the text says what did not work.
+    pub fn left_behind(&self) -> Option<&str> {
+        let failed = self.result.steps.iter().find(|step| step.path.starts_with("finally") && step.outcome == "failed");
+        failed.map(|step| step.path.as_str())
+    }
+
+    /// Shows it one entry. The timeline already holds it.
+    pub fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, timeline: &Timeline, ground: &Ground) {
+        self.entries.push(Arc::clone(entry));
+        if let Some(span) = &mut self.result.journal {
+            span.1 = entry.seq();
+        }
+        match entry.event() {
+            Event::StepBegun { path } => self.step_begun(path, entry, timeline, ground),
+            Event::StepEnded { end, .. } => self.step_ended(entry, end, timeline, ground),
+            Event::Mark { .. } => {
+                self.mark = entry.seq();
+                self.cursor = entry.seq();
+                self.base = entry.at().moment;
+            }
+            Event::Bound { name, value } => self.bindings.set(name, value.clone()),
+            Event::TestEnded { .. } => self.finish(entry.at().moment, ground),
+            _ => {
+                if let Some(mut running) = self.running.take() {
+                    running.evaluator.observe(entry, subject, &self.scene(timeline, ground));
+                    self.running = Some(running);
+                }
+            }
+        }
+    }
+
+    fn scene<'a>(&'a self, timeline: &'a Timeline, ground: &'a Ground) -> Scene<'a> {
+        Scene {
+            pack: &ground.pack,
+            topics: &ground.topics,
+            identity: (&ground.identity.0, &ground.identity.1),
+            run_bindings: &ground.bindings,
+            bindings: &self.bindings,
+            timeline,
+            entries: &self.entries,
+        }
+    }
+
+    fn step_begun(&mut self, path: &str, entry: &Entry, timeline: &Timeline, ground: &Ground) {
+        let found = self.test.sections().into_iter().find_map(|(section, steps)| {
+            let step = steps.iter().find(|step| step.path == path)?;
+            Some((section, step.clone()))
+        });
+        let Some((section, step)) = found else {
+            self.trouble = Some(format!("the journal names a step {path} that the test does not have"));
+            return;
+        };
+        let begun = (entry.seq(), entry.at().moment);
+        let position = Position {
+            test: self.begun.0,
+            mark: self.mark,
+            cursor: self.cursor,
+            base: self.base,
+            begun: begun.1,
+        };
+        let evaluator = Evaluator::begin(&step, position, &self.scene(timeline, ground));
+        self.running = Some(Running {
+            section,
+            step,
+            evaluator,
+            begun,
+            base: self.base,
+        });
+    }
+
+    fn step_ended(&mut self, entry: &Entry, end: &StepEnd, timeline: &Timeline, ground: &Ground) {
+        let Some(Running { section, step, evaluator, begun, base }) = self.running.take() else { return };
+        let cut_short = match end {
+            StepEnd::Decided | StepEnd::Deadline => None,
+            StepEnd::Interrupted => Some("the run was interrupted".to_owned()),
+            StepEnd::Broken(why) => Some(why.clone()),
+        };
+        let at = entry.at().moment;
+        let outcome = evaluator.end(at, cut_short.as_deref(), &self.scene(timeline, ground));
+        self.record_step(&step, &outcome, end, begun, entry);
+        if let StepEnd::Broken(why) = end {
+            self.broken(section, &step, why);
+        }
+        for (name, value) in &outcome.saves {
+            self.bindings.set(name, value.clone());
+        }
+        if let Some(took) = outcome.took.filter(|took| *took >= self.cursor) {
+            self.cursor = took;
+            if let Some(taken) = self.entries.iter().find(|entry| entry.seq() == took) {
+                self.base = self.base.max(taken.at().moment);
+            }
+        }
+        if matches!(step.verb, Verb::Send(_) | Verb::Link(_) | Verb::Operator(_)) {
+            // A stimulus that takes time (a person, a hook) must not eat the time of the reaction.
+            self.base = at;
+        }
+        if let Some(Err(why)) = &outcome.reached {
+            let place = format!("{} ({})", step.title.clone().unwrap_or_else(|| step.path.clone()), step.span.place());
+            match section {
+                Section::Given => self.preamble = Err(format!("the precondition was not reached: {place}: {why}")),
+                Section::Steps => self.body = Err(format!("{place}: {why}")),
+                Section::Finally => {}
+            }
+        }
+        if section == Section::Steps {
+            let waited = Waited {
+                seconds: at.since(base).as_secs_f64(),
+                since: self.mark,
+                messages: outcome.seen,
+            };
+            for clause in outcome.clauses {
+                let waited = (clause.witness.is_none()).then(|| waited.clone());
+                self.push(decide(clause, &step.path, waited, &ground.catalogue, &ground.pack));
+            }
+        }
+    }
+
+    fn broken(&mut self, section: Section, step: &Step, why: &str) {
+        if section != Section::Finally {
+            self.trouble.get_or_insert_with(|| format!("{}: {why}", step.path));
+        }
+    }
+
+    fn record_step(&mut self, step: &Step, outcome: &StepOutcome, end: &StepEnd, begun: (u64, Moment), entry: &Entry) {
+        let word = match (end, &outcome.reached) {
+            (StepEnd::Broken(_), _) => "broken",
+            (StepEnd::Interrupted, _) => "interrupted",
+            (_, Some(Err(_))) => "failed",
+            _ => "done",
+        };
+        self.result.steps.push(StepResult {
+            path: step.path.clone(),
+            verb: step.verb_span.text().to_owned(),
+            title: step.title.clone(),
+            place: step.span.place(),
+            outcome: word.to_owned(),
+            journal: Some((begun.0, entry.seq())),
+            took: outcome.took,
+            seconds: entry.at().moment.since(begun.1).as_secs_f64(),
+        });
+    }
+
+    fn push(&mut self, decision: Option<crate::report::result::Decision>) {
+        if let Some(decision) = decision {
+            self.verdict.add(decision.verdict);
+            self.result.decisions.push(decision);
+        }
+    }
+
+    /// Clauses that were never reached are inconclusive, and a test that decided nothing is an error.
+    fn finish(&mut self, at: Moment, ground: &Ground) {
+        if std::mem::replace(&mut self.ended, true) {
+            return;
+        }
+        self.result.seconds = at.since(self.begun.1).as_secs_f64();
+        let why = match (&self.trouble, &self.preamble, &self.body) {
+            (Some(trouble), _, _) => trouble.clone(),
+            (None, Err(why), _) => why.clone(),
+            (None, Ok(()), Err(why)) => format!("an earlier step failed: {why}"),
+            (None, Ok(()), Ok(())) => "the test ended before this was judged".to_owned(),
+        };
+        let run: Vec<String> = self.result.steps.iter().map(|step| step.path.clone()).collect();
+        let test = Arc::clone(&self.test);
+        for step in test.steps.iter().filter(|step| !run.contains(&step.path)) {
+            if step.spec.as_ref().is_some_and(|spec| !spec.contains(ground.pack.version)) {
+                continue;
+            }
+            self.result.steps.push(StepResult {
+                path: step.path.clone(),
+                verb: step.verb_span.text().to_owned(),
+                title: step.title.clone(),
+                place: step.span.place(),
+                outcome: "not run".to_owned(),
+                journal: None,
+                took: None,
+                seconds: 0.0,
+            });
+            for (requirement, clause) in step.clauses() {
+                if super::decide::mood(&ground.catalogue, &ground.pack, requirement.as_str()).is_none() {
+                    continue;
+                }
+                let decision = crate::report::result::Decision {
+                    requirement: requirement.as_str().to_owned(),
+                    verdict: Verdict::Inconclusive,
+                    clause,
+                    place: step.verb_span.place(),
+                    witness: None,
+                    message: why.clone(),
+                    expected: None,
+                    nearest: None,
+                    waited: None,
+                    explanation: None,
+                    interpretation: None,
+                };
+                self.push(Some(decision));
+            }
+        }
+        if self.trouble.is_some() || self.result.decisions.is_empty() {
+            self.verdict.add(Verdict::Error);
+        }
+        self.result.verdict = self.verdict.get();
+        self.result.reason = self.reason(&why);
+    }
+
+    fn reason(&self, why: &str) -> Option<String> {
+        let verdict = self.verdict.get()?;
+        if verdict == Verdict::Pass {
+            return None;
+        }
+        let decisive = self.result.decisions.iter().find(|decision| decision.verdict == verdict);
+        Some(match decisive {
+            Some(decision) if verdict != Verdict::Inconclusive => format!("{}: {}", decision.requirement, decision.message),
+            _ => why.to_owned(),
+        })
+    }
+
+    /// The result so far; complete after `TestEnded`.
+    pub fn result(&self) -> &TestResult {
+        &self.result
+    }
+
+    /// Ends the test where the journal breaks off, and gives its result.
+    pub fn break_off(mut self, at: Moment, why: &str, ground: &Ground) -> TestResult {
+        if !self.ended {
+            if self.preamble.is_ok() && self.body.is_ok() {
+                self.body = Err(why.to_owned());
+            }
+            self.finish(at, ground);
+        }
+        self.result
+    }
+}
