@@ -81,3 +81,15 @@ pub struct Check {
     /// Starts it.
     pub start: fn(&CheckContext<'_>) -> Box<dyn Running>,
 }
+
+/// All named checks.
+#[must_use]
+pub fn registry() -> &'static [Check] {
+    &[]
+}
+
+/// The check of a name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Check> {
+    registry().iter().find(|check| check.name == name)
+}

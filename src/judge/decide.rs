@@ -46,7 +46,11 @@ pub(super) fn decide(
         nearest: clause.nearest,
         waited: waited.filter(|_| broken),
         explanation,
-        interpretation: if broken { requirement.interpretation.clone() } else { None },
+        interpretation: if broken {
+            requirement.interpretation.clone()
+        } else {
+            None
+        },
     })
 }
 
@@ -63,12 +67,21 @@ fn explain(clause: &Clause, waited: Option<&Waited>) -> String {
             1 => "1 message came".to_owned(),
             n => format!("{n} messages came"),
         };
-        note("waited", format!("{:.1} s since #{}; {messages}", waited.seconds, waited.since));
+        note(
+            "waited",
+            format!("{:.1} s since #{}; {messages}", waited.seconds, waited.since),
+        );
     }
     if let Some(miss) = &clause.nearest {
         note(
             "closest",
-            format!("#{}: {} is {}, expected {}", miss.seq, super::step::shown_path(&miss.path), miss.found, miss.expected),
+            format!(
+                "#{}: {} is {}, expected {}",
+                miss.seq,
+                super::step::shown_path(&miss.path),
+                miss.found,
+                miss.expected
+            ),
         );
     } else {
         note("found", clause.message.clone());

@@ -22,7 +22,12 @@ impl Limit {
     /// Resolves a duration of a suite; `None` when a name has no value.
     #[must_use]
     pub fn resolve(time: &TimeTerm, bindings: &Bindings) -> Option<Self> {
-        let millis = |name: &str| bindings.get(name).and_then(|value| value.as_u64()).map(Duration::from_millis);
+        let millis = |name: &str| {
+            bindings
+                .get(name)
+                .and_then(|value| value.as_u64())
+                .map(Duration::from_millis)
+        };
         match name_of(&time.term) {
             Some("time.react") => {
                 let hard = millis("time.react")?;
@@ -34,7 +39,7 @@ impl Limit {
             Some("time.event") => {
                 let soft = millis("time.event")?;
                 Some(Self {
-                    hard: millis("time.eventLimit").map_or(soft, |limit| limit.max(soft)),
+                    hard: millis("time.eventWarning").map_or(soft, |limit| limit.max(soft)),
                     soft,
                 })
             }

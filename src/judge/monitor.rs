@@ -50,7 +50,10 @@ enum Watching {
 impl MonitorJudge {
     /// Puts a monitor on duty; `None` when it is not meant for this version.
     pub fn start(monitor: &Arc<Monitor>, ground: &Ground, tap: bool) -> Option<Self> {
-        let wanted = monitor.checks.iter().any(|binding| mood(&ground.catalogue, &ground.pack, binding.requirement.as_str()).is_some());
+        let wanted = monitor
+            .checks
+            .iter()
+            .any(|binding| mood(&ground.catalogue, &ground.pack, binding.requirement.as_str()).is_some());
         if !monitor.spec.contains(ground.pack.version) || !wanted {
             return None;
         }
@@ -70,7 +73,7 @@ impl MonitorJudge {
     fn watch(rule: &Rule, ground: &Ground) -> Option<Watching> {
         let mut bindings = ground.bindings.clone();
         bindings.insert("vda".to_owned(), ground.pack.vocabulary().clone());
-        let bindings = Bindings::new(bindings);
+        let bindings = Bindings::from(bindings);
         Some(match rule {
             Rule::Always { topic, when, pattern } => Watching::Pattern {
                 topic: topic.clone(),
@@ -108,7 +111,12 @@ impl MonitorJudge {
                     self.judged += 1;
                 }
             }
-            Watching::Pattern { topic, when, pattern, forbidden } => {
+            Watching::Pattern {
+                topic,
+                when,
+                pattern,
+                forbidden,
+            } => {
                 // What was stored before the run is not this run's evidence.
                 let stale = matches!(entry.event(), Event::Message { retain: true, .. });
                 if subject != Some(topic.as_str()) || stale {
@@ -143,14 +151,22 @@ impl MonitorJudge {
 
     fn keep(&mut self, found: Vec<CheckFinding>, ground: &Ground) {
         for finding in found {
-            let id = finding.requirement.as_ref().or_else(|| self.monitor.checks.first().map(|binding| &binding.requirement));
+            let id = finding
+                .requirement
+                .as_ref()
+                .or_else(|| self.monitor.checks.first().map(|binding| &binding.requirement));
             let Some(id) = id else { continue };
-            let Some((requirement, mood)) = mood(&ground.catalogue, &ground.pack, id.as_str()) else { continue };
+            let Some((requirement, mood)) = mood(&ground.catalogue, &ground.pack, id.as_str()) else {
+                continue;
+            };
             let verdict = finding.verdict.unwrap_or_else(|| mood.broken());
             if verdict == Verdict::Pass {
                 continue;
             }
-            let known = self.findings.iter_mut().find(|known| known.requirement == id.as_str() && known.verdict == verdict);
+            let known = self
+                .findings
+                .iter_mut()
+                .find(|known| known.requirement == id.as_str() && known.verdict == verdict);
             if let Some(known) = known {
                 known.count += 1;
                 if known.first.len() < FIRST {
@@ -186,7 +202,11 @@ impl MonitorJudge {
 
     /// What it says about each requirement it is bound to, or found something about.
     pub fn decisions(&self) -> Vec<(String, Verdict)> {
-        let mut all: Vec<(String, Verdict)> = self.findings.iter().map(|f| (f.requirement.clone(), f.verdict)).collect();
+        let mut all: Vec<(String, Verdict)> = self
+            .findings
+            .iter()
+            .map(|f| (f.requirement.clone(), f.verdict))
+            .collect();
         if self.judged > 0 {
             for binding in &self.monitor.checks {
                 all.push((binding.requirement.as_str().to_owned(), Verdict::Pass));
@@ -206,7 +226,12 @@ fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String
         return format!("matches {}, which must not come", pattern.describe());
     }
     match pattern.examine(message, None).misses.first() {
-        Some(miss) => format!("{} is {}, expected {}", shown_path(&miss.path), miss.found, miss.expected),
+        Some(miss) => format!(
+            "{} is {}, expected {}",
+            shown_path(&miss.path),
+            miss.found,
+            miss.expected
+        ),
         None => format!("does not match {}", pattern.describe()),
     }
 }

@@ -15,9 +15,7 @@ use crate::clock::Stamp;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, RunHeader};
 use crate::pack::{Catalogue, Decided, Packs, Role};
-use crate::report::result::{
-    Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult,
-};
+use crate::report::result::{Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult};
 use crate::suite::Suites;
 use crate::suite::model::Test;
 use crate::verdict::{Accumulated, Verdict};
@@ -75,8 +73,15 @@ impl RunJudge {
             return Err(JudgeError::NoHeader);
         };
         let header = (**header).clone();
-        let pack = rules.packs.get(&header.protocol).ok_or_else(|| JudgeError::Version(header.protocol.clone()))?;
-        let role = if header.role == Role::Agv.word() { Role::Agv } else { Role::MasterControl };
+        let pack = rules
+            .packs
+            .get(&header.protocol)
+            .ok_or_else(|| JudgeError::Version(header.protocol.clone()))?;
+        let role = if header.role == Role::Agv.word() {
+            Role::Agv
+        } else {
+            Role::MasterControl
+        };
         let ground = Ground {
             pack: Arc::clone(pack),
             catalogue: Arc::clone(&rules.catalogue),
@@ -85,8 +90,14 @@ impl RunJudge {
             bindings: header.bindings.clone(),
         };
         let tap = header.vantage == "tap";
-        let monitors = rules.suites.monitors.iter().filter(|monitor| monitor.device.is_none_or(|device| device == role));
-        let monitors = monitors.filter_map(|monitor| MonitorJudge::start(monitor, &ground, tap)).collect();
+        let monitors = rules
+            .suites
+            .monitors
+            .iter()
+            .filter(|monitor| monitor.device.is_none_or(|device| device == role));
+        let monitors = monitors
+            .filter_map(|monitor| MonitorJudge::start(monitor, &ground, tap))
+            .collect();
         Ok(Self {
             rules: rules.clone(),
             timeline: Timeline::new(&header.topics),
@@ -155,7 +166,12 @@ impl RunJudge {
     }
 
     fn test(&self, id: &str) -> Option<Arc<Test>> {
-        self.rules.suites.tests.iter().find(|test| test.id == id && test.device == self.role).cloned()
+        self.rules
+            .suites
+            .tests
+            .iter()
+            .find(|test| test.id == id && test.device == self.role)
+            .cloned()
     }
 
     /// The test that is running.
@@ -183,7 +199,10 @@ impl RunJudge {
         let mut tests = self.done.clone();
         tests.extend(self.set_aside());
         let monitors: Vec<_> = self.monitors.iter().map(MonitorJudge::result).collect();
-        let all = tests.iter().filter_map(|test| test.verdict).chain(monitors.iter().filter_map(|monitor| monitor.verdict));
+        let all = tests
+            .iter()
+            .filter_map(|test| test.verdict)
+            .chain(monitors.iter().filter_map(|monitor| monitor.verdict));
         let verdict: Accumulated = all.collect();
         let (partial, reason) = match &self.end {
             Some((partial, reason)) => (*partial, reason.clone()),
@@ -266,7 +285,9 @@ impl RunJudge {
             for step in &test.steps {
                 for (requirement, clause) in step.clauses() {
                     if mood(&self.ground.catalogue, &self.ground.pack, requirement.as_str()).is_some() {
-                        result.decisions.push(undecided(requirement.as_str(), clause, step.verb_span.place(), &why));
+                        result
+                            .decisions
+                            .push(undecided(requirement.as_str(), clause, step.verb_span.place(), &why));
                     }
                 }
             }
@@ -287,8 +308,11 @@ impl RunJudge {
                 }
             }
         }
-        let monitored: Vec<(String, Vec<(String, Verdict)>)> =
-            self.monitors.iter().map(|monitor| (monitor.monitor().id.clone(), monitor.decisions())).collect();
+        let monitored: Vec<(String, Vec<(String, Verdict)>)> = self
+            .monitors
+            .iter()
+            .map(|monitor| (monitor.monitor().id.clone(), monitor.decisions()))
+            .collect();
         for (id, decisions) in &monitored {
             for (requirement, verdict) in decisions {
                 let (all, by) = decided.entry(requirement.as_str()).or_default();
@@ -323,11 +347,20 @@ impl RunJudge {
         if let Decided::NotTestable { reason } = decided {
             return format!("not testable: {reason}");
         }
-        let deciding = |test: &&Arc<Test>| test.device == self.role && test.requirements().iter().any(|other| other.as_str() == id);
+        let deciding = |test: &&Arc<Test>| {
+            test.device == self.role && test.requirements().iter().any(|other| other.as_str() == id)
+        };
         let with_test: Vec<&Arc<Test>> = self.rules.suites.tests.iter().filter(deciding).collect();
         if with_test.is_empty() {
-            let monitored = self.monitors.iter().any(|m| m.monitor().checks.iter().any(|b| b.requirement.as_str() == id));
-            return if monitored { "nothing came that could have been judged".to_owned() } else { "no test".to_owned() };
+            let monitored = self
+                .monitors
+                .iter()
+                .any(|m| m.monitor().checks.iter().any(|b| b.requirement.as_str() == id));
+            return if monitored {
+                "nothing came that could have been judged".to_owned()
+            } else {
+                "no test".to_owned()
+            };
         }
         let reason = with_test.iter().find_map(|test| {
             let result = tests.iter().find(|result| result.id == test.id)?;

@@ -77,7 +77,7 @@ impl TestJudge {
         let (seq, moment) = (entry.seq(), entry.at().moment);
         Self {
             test: Arc::clone(test),
-            bindings: Bindings::new(bindings),
+            bindings: Bindings::from(bindings),
             entries: Vec::new(),
             begun: (seq, moment),
             mark: seq,
@@ -116,7 +116,9 @@ impl TestJudge {
 
     /// What the running step is waiting for.
     pub fn progress(&self) -> Progress {
-        self.running.as_ref().map_or(Progress::Decided, |running| running.evaluator.progress())
+        self.running
+            .as_ref()
+            .map_or(Progress::Decided, |running| running.evaluator.progress())
     }
 
     /// Until when the running `never` may wait for its probe.
@@ -138,7 +140,11 @@ impl TestJudge {
 
     /// Whether the postamble brought the device back; the text says what did not work.
     pub fn left_behind(&self) -> Option<&str> {
-        let failed = self.result.steps.iter().find(|step| step.path.starts_with("finally") && step.outcome == "failed");
+        let failed = self
+            .result
+            .steps
+            .iter()
+            .find(|step| step.path.starts_with("finally") && step.outcome == "failed");
         failed.map(|step| step.path.as_str())
     }
 
@@ -207,7 +213,16 @@ impl TestJudge {
     }
 
     fn step_ended(&mut self, entry: &Entry, end: &StepEnd, timeline: &Timeline, ground: &Ground) {
-        let Some(Running { section, step, evaluator, begun, base }) = self.running.take() else { return };
+        let Some(Running {
+            section,
+            step,
+            evaluator,
+            begun,
+            base,
+        }) = self.running.take()
+        else {
+            return;
+        };
         let cut_short = match end {
             StepEnd::Decided | StepEnd::Deadline => None,
             StepEnd::Interrupted => Some("the run was interrupted".to_owned()),
@@ -233,7 +248,11 @@ impl TestJudge {
             self.base = at;
         }
         if let Some(Err(why)) = &outcome.reached {
-            let place = format!("{} ({})", step.title.clone().unwrap_or_else(|| step.path.clone()), step.span.place());
+            let place = format!(
+                "{} ({})",
+                step.title.clone().unwrap_or_else(|| step.path.clone()),
+                step.span.place()
+            );
             match section {
                 Section::Given => self.preamble = Err(format!("the precondition was not reached: {place}: {why}")),
                 Section::Steps => self.body = Err(format!("{place}: {why}")),
@@ -300,7 +319,11 @@ impl TestJudge {
         let run: Vec<String> = self.result.steps.iter().map(|step| step.path.clone()).collect();
         let test = Arc::clone(&self.test);
         for step in test.steps.iter().filter(|step| !run.contains(&step.path)) {
-            if step.spec.as_ref().is_some_and(|spec| !spec.contains(ground.pack.version)) {
+            if step
+                .spec
+                .as_ref()
+                .is_some_and(|spec| !spec.contains(ground.pack.version))
+            {
                 continue;
             }
             self.result.steps.push(StepResult {
@@ -345,9 +368,15 @@ impl TestJudge {
         if verdict == Verdict::Pass {
             return None;
         }
-        let decisive = self.result.decisions.iter().find(|decision| decision.verdict == verdict);
+        let decisive = self
+            .result
+            .decisions
+            .iter()
+            .find(|decision| decision.verdict == verdict);
         Some(match decisive {
-            Some(decision) if verdict != Verdict::Inconclusive => format!("{}: {}", decision.requirement, decision.message),
+            Some(decision) if verdict != Verdict::Inconclusive => {
+                format!("{}: {}", decision.requirement, decision.message)
+            }
             _ => why.to_owned(),
         })
     }

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::clock::Stamp;
-use crate::journal::event::{Direction, Event, Packet};
 use crate::journal::Entry;
+use crate::journal::event::{Direction, Event, Packet};
 
 /// The index.
 #[derive(Debug, Default)]
@@ -34,7 +34,10 @@ impl Timeline {
     pub fn add(&mut self, entry: &Arc<Entry>) -> Option<String> {
         self.last = Some(entry.at());
         let subject = self.subject_of(entry)?;
-        self.subjects.entry(subject.clone()).or_default().push(Arc::clone(entry));
+        self.subjects
+            .entry(subject.clone())
+            .or_default()
+            .push(Arc::clone(entry));
         Some(subject)
     }
 

@@ -45,7 +45,9 @@ impl CheckWindow {
         let definition = checks::find(&check.name).ok_or_else(|| format!("there is no check {}", check.name))?;
         let mut with = Map::new();
         for (name, term) in &check.with {
-            let value = term.bind(scene.bindings).map_err(|unbound| super::step::unbound_text(&unbound))?;
+            let value = term
+                .bind(scene.bindings)
+                .map_err(|unbound| super::step::unbound_text(&unbound))?;
             with.insert(name.clone(), value);
         }
         let running = (definition.start)(&context(scene, &with));
@@ -60,7 +62,10 @@ impl CheckWindow {
     /// Shows it one entry; returns what it found there.
     pub(super) fn observe(&mut self, entry: &Entry, scene: &Scene<'_>) -> Option<String> {
         let before = self.findings.len();
-        if self.running.observe(entry, &context(scene, &self.with), &mut self.findings) {
+        if self
+            .running
+            .observe(entry, &context(scene, &self.with), &mut self.findings)
+        {
             self.judged += 1;
         }
         self.findings.get(before).map(|finding| finding.message.clone())
@@ -71,13 +76,17 @@ impl CheckWindow {
         for entry in scene.entries.iter().take_while(|entry| entry.seq() <= seq) {
             self.observe(entry, scene);
         }
-        self.findings.iter().find(|finding| finding.seq == seq).map(|finding| finding.message.clone())
+        self.findings
+            .iter()
+            .find(|finding| finding.seq == seq)
+            .map(|finding| finding.message.clone())
     }
 
     /// The window has ended; returns what was found by that.
     pub(super) fn finish(&mut self, end: crate::clock::Moment, scene: &Scene<'_>) -> Option<String> {
         let before = self.findings.len();
-        self.running.finish(end, &context(scene, &self.with), &mut self.findings);
+        self.running
+            .finish(end, &context(scene, &self.with), &mut self.findings);
         self.findings.get(before).map(|finding| finding.message.clone())
     }
 }

@@ -101,4 +101,11 @@ pub trait Link {
 
     /// Offers a file; returns its address as the device must use it.
     async fn serve(&mut self, offer: Offer) -> Result<String, LinkError>;
+
+    /// Gives a command to a simulated device that lives on this link; `false` when there is none or it
+    /// does not know the command.
+    fn command(&mut self, name: &str, parameters: serde_json::Value) -> bool {
+        let _ = (name, parameters);
+        false
+    }
 }

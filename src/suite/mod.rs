@@ -5,3 +5,12 @@
 //! requirement, variable, state and check name. Running a test is left to the engine, judging it to the judge.
 
 pub mod model;
+
+/// All tests and monitors.
+#[derive(Debug, Default)]
+pub struct Suites {
+    /// Tests, by id.
+    pub tests: Vec<std::sync::Arc<model::Test>>,
+    /// Monitors, by id.
+    pub monitors: Vec<std::sync::Arc<model::Monitor>>,
+}

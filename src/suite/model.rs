@@ -259,6 +259,8 @@ pub struct SendAction {
     pub name: Option<String>,
     /// Parameters.
     pub with: Vec<(String, Term)>,
+    /// A mapping of parameters that comes from a variable, laid under `with`.
+    pub with_all: Option<Term>,
     /// blockingType; `HARD` unless said.
     pub blocking: Option<Term>,
     /// Where it is written.
@@ -524,6 +526,22 @@ pub struct Operator {
     pub with: Vec<(String, Term)>,
     /// How long it may take.
     pub within: Option<TimeTerm>,
+}
+
+impl ServeBehaviour {
+    /// The word used in suites and journals.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Well => "well",
+            Self::NotFound => "not-found",
+            Self::Stall => "stall",
+            Self::Cut => "cut",
+            Self::WrongBytes => "wrong-bytes",
+            Self::Slow => "slow",
+            Self::Unreachable => "unreachable",
+        }
+    }
 }
 
 /// A path into a message: member names and array indices.

@@ -71,7 +71,9 @@ impl Track {
     }
 
     fn done(&self) -> bool {
-        self.places.iter().any(|at| self.walk.stations[at + 1..].iter().all(|station| station.optional))
+        self.places
+            .iter()
+            .any(|at| self.walk.stations[at + 1..].iter().all(|station| station.optional))
     }
 }
 
@@ -113,7 +115,9 @@ impl Walking {
             return;
         }
         self.seen += 1;
-        let Some(status) = entry.json().and_then(|state| status_of(state, &self.id)) else { return };
+        let Some(status) = entry.json().and_then(|state| status_of(state, &self.id)) else {
+            return;
+        };
         if self.walked.last().is_some_and(|last| last == status) {
             return;
         }
@@ -148,7 +152,10 @@ impl Walking {
             self.walked.join(" -> ")
         };
         let waited = seconds(at.since(self.position.base));
-        let arrived = self.last.as_ref().map(|entry| entry.at().moment.since(self.position.base));
+        let arrived = self
+            .last
+            .as_ref()
+            .map(|entry| entry.at().moment.since(self.position.base));
         let (holds, message) = if self.through.done() {
             match arrived.filter(|took| *took > self.limit.soft) {
                 Some(took) => (Holds::Late, format!("walked {walked}, after {}", seconds(took))),
@@ -161,7 +168,10 @@ impl Walking {
         } else if let Some(why) = cut_short {
             (Holds::Unseen(why.to_owned()), why.to_owned())
         } else if self.walked.is_empty() {
-            let message = format!("the action never showed up in actionStates ({} states within {waited})", self.seen);
+            let message = format!(
+                "the action never showed up in actionStates ({} states within {waited})",
+                self.seen
+            );
             (Holds::No, message)
         } else {
             (Holds::No, format!("walked {walked} and no further within {waited}"))
@@ -189,7 +199,9 @@ impl Walking {
 
 fn status_of<'a>(state: &'a Value, id: &str) -> Option<&'a str> {
     let all = state.get("actionStates")?.as_array()?;
-    let one = all.iter().find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))?;
+    let one = all
+        .iter()
+        .find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))?;
     Some(one.get("actionStatus").and_then(Value::as_str).unwrap_or("no status"))
 }
 
@@ -201,7 +213,11 @@ mod tests {
     fn walk(text: &str) -> Walk {
         let station = |part: &str| Station {
             optional: part.ends_with('?'),
-            statuses: part.trim_end_matches('?').split('|').map(|one| one.trim().to_owned()).collect(),
+            statuses: part
+                .trim_end_matches('?')
+                .split('|')
+                .map(|one| one.trim().to_owned())
+                .collect(),
         };
         Walk {
             stations: text.split("->").map(|part| station(part.trim())).collect(),

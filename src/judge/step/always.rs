@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit, seconds,
-    shown_path,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit,
+    seconds, shown_path,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -41,7 +41,11 @@ struct Violation {
 impl Holding {
     pub(super) fn begin(verb: &Always, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
         let mut selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
-        let check = selector.check.take().map(|check| CheckWindow::start(&check, scene)).transpose()?;
+        let check = selector
+            .check
+            .take()
+            .map(|check| CheckWindow::start(&check, scene))
+            .transpose()?;
         let (until, ends) = match &verb.extent {
             Extent::During(time) => (None, position.begun + limit(time, scene)?.hard),
             Extent::Until(until) => {
@@ -91,7 +95,11 @@ impl Holding {
         if self.violated.is_some() {
             return;
         }
-        if let Some(goal) = self.until.as_mut().filter(|goal| subject == Some(goal.until.topic.as_str())) {
+        if let Some(goal) = self
+            .until
+            .as_mut()
+            .filter(|goal| subject == Some(goal.until.topic.as_str()))
+        {
             goal.seen += 1;
             if goal.selector.takes(entry, scene) {
                 goal.reached = Some((entry.seq(), entry.at().moment));
@@ -112,7 +120,13 @@ impl Holding {
             let near = self.selector.closeness(entry);
             let message = match near.as_ref().and_then(|near| near.miss.as_ref()) {
                 Some(miss) => {
-                    format!("#{}: {} is {}, expected {}", entry.seq(), shown_path(&miss.path), miss.found, miss.expected)
+                    format!(
+                        "#{}: {} is {}, expected {}",
+                        entry.seq(),
+                        shown_path(&miss.path),
+                        miss.found,
+                        miss.expected
+                    )
                 }
                 None => format!("#{} does not match", entry.seq()),
             };
@@ -146,12 +160,22 @@ impl Holding {
         }
         let mut clauses = Vec::new();
         let (holds, message, witness) = self.held(cut_short);
-        let mut reached = if holds == Holds::Yes { Ok(()) } else { Err(message.clone()) };
-        let span = self.violated.as_ref().and_then(|violation| violation.near.as_ref()?.span.clone());
+        let mut reached = if holds == Holds::Yes {
+            Ok(())
+        } else {
+            Err(message.clone())
+        };
+        let span = self
+            .violated
+            .as_ref()
+            .and_then(|violation| violation.near.as_ref()?.span.clone());
         let span = span.unwrap_or_else(|| self.selector.span.clone());
         for mut clause in bound_clauses(&self.verb.checks, "checks", &span, &holds, witness, &message) {
             clause.expected = self.selector.expected();
-            clause.nearest = self.violated.as_ref().and_then(|violation| violation.near.as_ref()?.miss.clone());
+            clause.nearest = self
+                .violated
+                .as_ref()
+                .and_then(|violation| violation.near.as_ref()?.miss.clone());
             if let Some(miss) = &clause.nearest {
                 clause.label = format!("{} is {}", shown_path(&miss.path), miss.found);
             }
@@ -159,7 +183,8 @@ impl Holding {
         }
         let mut took = witness;
         if let Some(goal) = self.until {
-            let (goal_clauses, goal_reached, goal_took) = goal.end(at, cut_short, self.position, self.violated.is_some());
+            let (goal_clauses, goal_reached, goal_took) =
+                goal.end(at, cut_short, self.position, self.violated.is_some());
             clauses.extend(goal_clauses);
             took = took.or(goal_took);
             reached = reached.and(goal_reached);
@@ -175,7 +200,11 @@ impl Holding {
 
     fn held(&self, cut_short: Option<&str>) -> (Holds, String, Option<u64>) {
         if let Some(violation) = &self.violated {
-            return (Holds::No, violation.message.clone(), Some(violation.seq).filter(|seq| *seq > 0));
+            return (
+                Holds::No,
+                violation.message.clone(),
+                Some(violation.seq).filter(|seq| *seq > 0),
+            );
         }
         if let Some(why) = cut_short {
             return (Holds::Unseen(why.to_owned()), why.to_owned(), None);
@@ -202,7 +231,11 @@ impl Goal {
         let (holds, message, witness) = match (self.reached, cut_short) {
             (Some((seq, moment)), _) => {
                 let took = moment.since(position.base);
-                let holds = if took > self.limit.soft { Holds::Late } else { Holds::Yes };
+                let holds = if took > self.limit.soft {
+                    Holds::Late
+                } else {
+                    Holds::Yes
+                };
                 (holds, format!("#{seq} came after {}", seconds(took)), Some(seq))
             }
             (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
@@ -220,7 +253,11 @@ impl Goal {
                 (Holds::No, message, None)
             }
         };
-        let span = self.nearest.as_ref().and_then(|near| near.span.clone()).unwrap_or_else(|| self.selector.span.clone());
+        let span = self
+            .nearest
+            .as_ref()
+            .and_then(|near| near.span.clone())
+            .unwrap_or_else(|| self.selector.span.clone());
         let nearest = self.nearest.and_then(|near| near.miss).filter(|_| holds == Holds::No);
         let mut clauses = bound_clauses(&self.until.checks, "until", &span, &holds, witness, &message);
         for clause in &mut clauses {

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, assertion_clause, backlog, bound_clauses, keep_nearest,
-    limit, seconds,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, assertion_clause, backlog, bound_clauses,
+    keep_nearest, limit, seconds,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -89,7 +89,14 @@ impl Expecting {
         } else {
             (Holds::Yes, format!("#{} came after {}", entry.seq(), seconds(took)))
         };
-        let mut clauses = bound_clauses(&self.verb.checks, "checks", &self.selector.span, &holds, Some(entry.seq()), &message);
+        let mut clauses = bound_clauses(
+            &self.verb.checks,
+            "checks",
+            &self.selector.span,
+            &holds,
+            Some(entry.seq()),
+            &message,
+        );
         for clause in &mut clauses {
             clause.expected = self.selector.expected();
         }
@@ -131,7 +138,11 @@ impl Expecting {
             Some(why) => (Holds::Unseen(why.to_owned()), why.to_owned()),
             None => (Holds::No, self.missed(waited)),
         };
-        let span = self.nearest.as_ref().and_then(|near| near.span.clone()).unwrap_or_else(|| self.selector.span.clone());
+        let span = self
+            .nearest
+            .as_ref()
+            .and_then(|near| near.span.clone())
+            .unwrap_or_else(|| self.selector.span.clone());
         let nearest = self.nearest.and_then(|near| near.miss);
         let label = nearest.as_ref().map_or_else(
             || "no such message".to_owned(),
@@ -173,7 +184,10 @@ impl Expecting {
         }
         match self.seen {
             0 => format!("no {topic} message came within {}", seconds(waited)),
-            1 => format!("1 {topic} message came within {}, and it does not match", seconds(waited)),
+            1 => format!(
+                "1 {topic} message came within {}, and it does not match",
+                seconds(waited)
+            ),
             n => format!("{n} {topic} messages came within {}, and none matches", seconds(waited)),
         }
     }

@@ -273,7 +273,11 @@ impl Selector {
         let miss = examination.misses.into_iter().next();
         Some(Near {
             seq: entry.seq(),
-            share: if total == 0 { 0.0 } else { agreeing as f64 / total as f64 },
+            share: if total == 0 {
+                0.0
+            } else {
+                agreeing as f64 / total as f64
+            },
             span: miss.as_ref().map(|miss| miss.span.clone()),
             miss: miss.map(|miss| NearestMiss {
                 seq: entry.seq(),
@@ -302,7 +306,10 @@ pub(super) fn keep_nearest(best: &mut Option<Near>, candidate: Option<Near>) {
 }
 
 pub(super) fn bind_pattern(pattern: Option<&Pattern>, scene: &Scene<'_>) -> Result<Option<Bound>, String> {
-    pattern.map(|pattern| pattern.bind(scene.bindings)).transpose().map_err(|unbound| unbound_text(&unbound))
+    pattern
+        .map(|pattern| pattern.bind(scene.bindings))
+        .transpose()
+        .map_err(|unbound| unbound_text(&unbound))
 }
 
 pub(super) fn unbound_text(unbound: &Unbound) -> String {
@@ -378,12 +385,20 @@ pub(super) fn assertion_clause(
             }
             if let Some(miss) = &near.miss {
                 clause.label = format!("{} is {}", shown_path(&miss.path), miss.found);
-                clause.message = format!("#{}: {} is {}, expected {}", miss.seq, shown_path(&miss.path), miss.found, miss.expected);
+                clause.message = format!(
+                    "#{}: {} is {}, expected {}",
+                    miss.seq,
+                    shown_path(&miss.path),
+                    miss.found,
+                    miss.expected
+                );
             }
             clause.nearest = near.miss;
         }
         None => {
-            let found = selector.check_holds(entry, scene).unwrap_or_else(|| "does not hold".to_owned());
+            let found = selector
+                .check_holds(entry, scene)
+                .unwrap_or_else(|| "does not hold".to_owned());
             clause.label.clone_from(&found);
             clause.message = format!("#{}: {found}", entry.seq());
         }

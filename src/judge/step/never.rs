@@ -25,9 +25,17 @@ impl Forbidding {
     pub(super) fn begin(verb: &Never, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
         let during = limit(&verb.during, scene)?.hard;
         let ends = position.begun + during;
-        let patience = scene.bindings.get("time.broker").and_then(|value| value.as_u64()).unwrap_or(5_000);
+        let patience = scene
+            .bindings
+            .get("time.broker")
+            .and_then(|value| value.as_u64())
+            .unwrap_or(5_000);
         let mut selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
-        let check = selector.check.take().map(|check| CheckWindow::start(&check, scene)).transpose()?;
+        let check = selector
+            .check
+            .take()
+            .map(|check| CheckWindow::start(&check, scene))
+            .transpose()?;
         let mut this = Self {
             verb: verb.clone(),
             position,
@@ -86,7 +94,10 @@ impl Forbidding {
             (Some((seq, message)), _) => (Holds::No, message, Some(seq)),
             (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
             (None, None) if self.alive => {
-                let message = format!("nothing of the kind came for {}", seconds(at.since(self.position.begun)));
+                let message = format!(
+                    "nothing of the kind came for {}",
+                    seconds(at.since(self.position.begun))
+                );
                 (Holds::Yes, message, None)
             }
             (None, None) => {
@@ -94,10 +105,20 @@ impl Forbidding {
                 (Holds::Unseen(why.to_owned()), why.to_owned(), None)
             }
         };
-        let mut clauses = bound_clauses(&self.verb.checks, "checks", &self.selector.span, &holds, witness, &message);
+        let mut clauses = bound_clauses(
+            &self.verb.checks,
+            "checks",
+            &self.selector.span,
+            &holds,
+            witness,
+            &message,
+        );
         for clause in &mut clauses {
             clause.label = witness.map_or_else(String::new, |seq| format!("#{seq} matches this"));
-            clause.expected = self.selector.expected().map(|pattern| format!("no message with {pattern}"));
+            clause.expected = self
+                .selector
+                .expected()
+                .map(|pattern| format!("no message with {pattern}"));
         }
         StepOutcome {
             reached: Some(if holds == Holds::Yes { Ok(()) } else { Err(message) }),

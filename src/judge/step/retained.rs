@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, assertion_clause, bound_clauses, keep_nearest, limit,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, assertion_clause, bound_clauses, keep_nearest,
+    limit,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -53,7 +54,9 @@ impl Fetching {
                     self.taken = Some(entry.seq());
                     let judged = self.verb.assert.iter();
                     self.asserted = judged
-                        .map(|assertion| assertion_clause(assertion, "assert", entry, &self.verb.topic, self.position, scene))
+                        .map(|assertion| {
+                            assertion_clause(assertion, "assert", entry, &self.verb.topic, self.position, scene)
+                        })
                         .collect();
                 } else {
                     self.unflagged = Some(entry.seq());
@@ -75,7 +78,11 @@ impl Fetching {
     pub(super) fn end(self, _at: Moment, cut_short: Option<&str>) -> StepOutcome {
         let topic = &self.verb.topic;
         let (holds, message, witness) = match (self.taken, cut_short) {
-            (Some(seq), _) => (Holds::Yes, format!("a fresh subscriber received #{seq} with RETAIN set"), Some(seq)),
+            (Some(seq), _) => (
+                Holds::Yes,
+                format!("a fresh subscriber received #{seq} with RETAIN set"),
+                Some(seq),
+            ),
             (None, _) if self.ended => match (self.unflagged, self.seen) {
                 (Some(seq), _) => (Holds::No, format!("#{seq} came without RETAIN"), Some(seq)),
                 (None, 0) => (Holds::No, format!("the broker has no retained {topic} message"), None),
@@ -88,7 +95,14 @@ impl Fetching {
             }
         };
         let nearest = self.nearest.and_then(|near| near.miss).filter(|_| holds == Holds::No);
-        let mut clauses = bound_clauses(&self.verb.checks, "checks", &self.selector.span, &holds, witness, &message);
+        let mut clauses = bound_clauses(
+            &self.verb.checks,
+            "checks",
+            &self.selector.span,
+            &holds,
+            witness,
+            &message,
+        );
         for clause in &mut clauses {
             clause.label.clone_from(&message);
             clause.nearest.clone_from(&nearest);

@@ -1,0 +1,272 @@
+//! Makes the messages of the harness: header, order, instant actions, and what breaks them.
+//!
+//! Types are for what we send; what is sent wrong on purpose is made right first and then patched.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value, json};
+
+use super::route::{RouteBuilder, SentOrders};
+use crate::clock::Stamp;
+use crate::judge::Ground;
+use crate::link::Outgoing;
+use crate::pattern::{Bindings, Unbound};
+use crate::suite::model::{Patch, Raw, Send, SendAction};
+
+/// Why a message cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ComposeError {
+    /// A variable has no value.
+    #[error("{0}")]
+    Unbound(String),
+    /// The course has no such node or edge.
+    #[error("the course has no {0}")]
+    Course(String),
+    /// The patch does not fit the message.
+    #[error("the patch does not fit: {0}")]
+    Patch(String),
+    /// There is no such topic.
+    #[error("there is no topic {0}")]
+    Topic(String),
+}
+
+impl From<Unbound> for ComposeError {
+    fn from(unbound: Unbound) -> Self {
+        Self::Unbound(unbound.to_string())
+    }
+}
+
+/// A finished message and the actionIds in it, by the names given with `as`.
+#[derive(Debug)]
+pub struct Composed {
+    /// The message.
+    pub message: Outgoing,
+    /// Name and actionId.
+    pub actions: Vec<(String, String)>,
+}
+
+/// Makes messages; counts headerId per topic and actionIds per run.
+#[derive(Debug)]
+pub struct Composer {
+    run: String,
+    header_ids: BTreeMap<String, u32>,
+    action_count: u64,
+    orders: SentOrders,
+}
+
+impl Composer {
+    /// `run` makes ids unique over runs.
+    pub fn new(run: impl Into<String>) -> Self {
+        Self {
+            run: run.into(),
+            header_ids: BTreeMap::new(),
+            action_count: 0,
+            orders: SentOrders::default(),
+        }
+    }
+
+    /// Forgets the orders of the test before.
+    pub fn begin_test(&mut self) {
+        self.orders = SentOrders::default();
+    }
+
+    /// A fresh actionId.
+    pub fn action_id(&mut self) -> String {
+        self.action_count += 1;
+        format!("{}-action-{}", self.run, self.action_count)
+    }
+
+    /// Makes the message of a `send` step.
+    pub fn compose(
+        &mut self,
+        send: &Send,
+        bindings: &Bindings,
+        ground: &Ground,
+        now: Stamp,
+    ) -> Result<Composed, ComposeError> {
+        let topic = ground
+            .topics
+            .get(&send.topic)
+            .cloned()
+            .ok_or_else(|| ComposeError::Topic(send.topic.clone()))?;
+        let rule = ground.pack.topic(&send.topic);
+        let qos = send.qos.unwrap_or_else(|| rule.map_or(0, |rule| rule.qos));
+        let mut actions = Vec::new();
+        let payload = if let Some(raw) = &send.raw {
+            match raw {
+                Raw::Bytes(bytes) => bytes.clone(),
+                Raw::Text(term) => match term.bind(bindings)? {
+                    Value::String(text) => text.into_bytes(),
+                    other => other.to_string().into_bytes(),
+                },
+            }
+        } else {
+            let message = self.message(send, bindings, ground, now, &mut actions)?;
+            message.to_string().into_bytes()
+        };
+        Ok(Composed {
+            message: Outgoing {
+                topic,
+                payload: payload.into(),
+                qos,
+                retain: send.retain,
+            },
+            actions,
+        })
+    }
+
+    /// A message with nothing but its header and these members, for the harness's own use.
+    pub fn plain(
+        &mut self,
+        topic: &str,
+        members: Value,
+        ground: &Ground,
+        now: Stamp,
+    ) -> Result<Outgoing, ComposeError> {
+        let full = ground
+            .topics
+            .get(topic)
+            .cloned()
+            .ok_or_else(|| ComposeError::Topic(topic.to_owned()))?;
+        let mut message = self.header(topic, ground, now);
+        if let Value::Object(members) = members {
+            message.extend(members);
+        }
+        Ok(Outgoing {
+            topic: full,
+            payload: Value::Object(message).to_string().into_bytes().into(),
+            qos: ground.pack.topic(topic).map_or(0, |rule| rule.qos),
+            retain: false,
+        })
+    }
+
+    fn message(
+        &mut self,
+        send: &Send,
+        bindings: &Bindings,
+        ground: &Ground,
+        now: Stamp,
+        actions: &mut Vec<(String, String)>,
+    ) -> Result<Value, ComposeError> {
+        let mut message = self.header(&send.topic, ground, now);
+        let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
+        if !send.actions.is_empty() {
+            let list = self.actions(&send.actions, bindings, actions)?;
+            message.insert("actions".to_owned(), Value::Array(list));
+        }
+        if let Some(route) = &send.route {
+            let said = payload
+                .as_ref()
+                .and_then(|payload| payload.get("orderId"))
+                .and_then(Value::as_str);
+            let own = bindings.get("run.order").and_then(Value::as_str);
+            let order = said.or(own).unwrap_or_default().to_owned();
+            message.insert("orderId".to_owned(), json!(order));
+            message.insert("orderUpdateId".to_owned(), json!(0));
+            let mut placed = BTreeMap::new();
+            for (at, (place, list)) in route.actions.iter().enumerate() {
+                placed.insert(at, (place.clone(), self.actions(list, bindings, actions)?));
+            }
+            let builder = RouteBuilder {
+                course: bindings.get("course"),
+                route,
+                actions: placed.into_values().collect(),
+            };
+            let (nodes, edges) = builder.build(&order, &mut self.orders)?;
+            message.insert("nodes".to_owned(), nodes);
+            message.insert("edges".to_owned(), edges);
+        }
+        let mut message = Value::Object(message);
+        if let Some(payload) = payload {
+            json_patch::merge(&mut message, &payload);
+        }
+        match &send.patch {
+            None => {}
+            Some(Patch::Merge(term)) => json_patch::merge(&mut message, &term.bind(bindings)?),
+            Some(Patch::Operations(term)) => {
+                let operations: json_patch::Patch = serde_json::from_value(term.bind(bindings)?)
+                    .map_err(|error| ComposeError::Patch(error.to_string()))?;
+                json_patch::patch(&mut message, &operations).map_err(|error| ComposeError::Patch(error.to_string()))?;
+            }
+        }
+        Ok(message)
+    }
+
+    fn actions(
+        &mut self,
+        list: &[SendAction],
+        bindings: &Bindings,
+        named: &mut Vec<(String, String)>,
+    ) -> Result<Vec<Value>, ComposeError> {
+        let mut all = Vec::new();
+        for action in list {
+            let known = action
+                .name
+                .as_ref()
+                .and_then(|name| bindings.get(&format!("{name}.id"))?.as_str().map(str::to_owned));
+            let fresh = known.is_none();
+            let id = known.unwrap_or_else(|| self.action_id());
+            let mut parameters = Vec::new();
+            if let Some(term) = &action.with_all
+                && let Value::Object(members) = term.bind(bindings)?
+            {
+                parameters.extend(
+                    members
+                        .into_iter()
+                        .map(|(key, value)| json!({ "key": key, "value": value })),
+                );
+            }
+            for (key, term) in &action.with {
+                parameters.push(json!({ "key": key, "value": term.bind(bindings)? }));
+            }
+            let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
+            all.push(json!({
+                "actionType": action.action.bind(bindings)?,
+                "actionId": id,
+                "blockingType": blocking.unwrap_or_else(|| json!("HARD")),
+                "actionParameters": parameters,
+            }));
+            if let (Some(name), true) = (&action.name, fresh) {
+                named.push((name.clone(), id));
+            }
+        }
+        Ok(all)
+    }
+
+    fn header(&mut self, topic: &str, ground: &Ground, now: Stamp) -> Map<String, Value> {
+        let id = self.header_ids.entry(topic.to_owned()).or_default();
+        let header = json!({
+            "headerId": *id,
+            "timestamp": timestamp(now),
+            "version": ground.pack.version.to_string(),
+            "manufacturer": ground.identity.0,
+            "serialNumber": ground.identity.1,
+        });
+        *id = id.wrapping_add(1);
+        match header {
+            Value::Object(members) => members,
+            _ => Map::new(),
+        }
+    }
+}
+
+/// ISO 8601 in UTC with two fraction digits (HDR-03).
+fn timestamp(now: Stamp) -> String {
+    format!("{:.2}", now.utc)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::Moment;
+
+    #[test]
+    fn the_timestamp_has_two_fraction_digits_and_a_z() {
+        let utc = "2026-11-21T09:16:24.129Z".parse().expect("timestamp");
+        let stamp = Stamp {
+            moment: Moment::START,
+            utc,
+        };
+        assert_eq!(timestamp(stamp), "2026-11-21T09:16:24.12Z");
+    }
+}

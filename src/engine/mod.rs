@@ -1,0 +1,414 @@
+//! Performs the steps of a test over a link.
+//!
+//! The engine sends, moves the mark, and waits for exactly as long as the judge says it makes sense. It
+//! decides nothing: every occurrence and everything it does itself goes into the journal, and the verdict
+//! comes from there. The only async logic of a test is here.
+
+mod compose;
+mod operator;
+mod recorder;
+mod route;
+
+use std::sync::Arc;
+
+use serde_json::{Map, Value, json};
+
+pub use compose::{ComposeError, Composer};
+pub use operator::{HookOutcome, Operator};
+pub use recorder::{RecordError, Recorder};
+
+use crate::clock::Moment;
+use crate::journal::event::{Event, Occurrence, Payload, Source, StepEnd};
+use crate::judge::{JudgeError, Progress};
+use crate::link::{Link, LinkError, Offer, Outgoing};
+use crate::pattern::Bindings;
+use crate::suite::model::{Section, Step, Test, Verb};
+
+/// The map file that is served when a test names none.
+const BUILT_IN_MAP: &[u8] = b"vda5050-tck built-in map\nresolution 0.05\norigin 0 0 0\n";
+
+/// Why a run cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    /// The link broke.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The journal cannot be written or judged.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+impl From<JudgeError> for EngineError {
+    fn from(error: JudgeError) -> Self {
+        Self::Record(RecordError::Judge(error))
+    }
+}
+
+/// Tells what is being waited for; the terminal shows it.
+pub trait Watcher {
+    /// A step has begun to wait.
+    fn waiting(&mut self, step: &Step);
+}
+
+/// Performs tests.
+pub struct Engine<L, O> {
+    /// The bench.
+    pub link: L,
+    /// Hooks and people.
+    pub operator: O,
+    /// Journal and judge.
+    pub recorder: Recorder,
+    /// Makes messages.
+    pub composer: Composer,
+    interrupt: tokio::sync::watch::Receiver<bool>,
+}
+
+impl<L: Link, O: Operator> Engine<L, O> {
+    /// An engine that stops at the next step when `interrupt` turns true.
+    pub fn new(
+        link: L,
+        operator: O,
+        recorder: Recorder,
+        composer: Composer,
+        interrupt: tokio::sync::watch::Receiver<bool>,
+    ) -> Self {
+        Self {
+            link,
+            operator,
+            recorder,
+            composer,
+            interrupt,
+        }
+    }
+
+    /// Whether the user has asked to stop.
+    pub fn interrupted(&self) -> bool {
+        *self.interrupt.borrow()
+    }
+
+    /// Records something the harness itself did or found.
+    pub fn note(&mut self, event: Event) -> Result<u64, EngineError> {
+        let occurrence = Occurrence::harness(self.link.now(), event);
+        Ok(self.recorder.record(occurrence)?.seq())
+    }
+
+    /// Records everything that has already happened.
+    pub async fn drain(&mut self) -> Result<(), EngineError> {
+        let now = self.link.now().moment;
+        while let Some(occurrence) = self.link.next(now).await? {
+            self.recorder.record(occurrence)?;
+        }
+        Ok(())
+    }
+
+    /// Records what happens until `done` says so, or until `until`. Returns whether `done` said so.
+    pub async fn watch(&mut self, until: Moment, mut done: impl FnMut(&Recorder) -> bool) -> Result<bool, EngineError> {
+        loop {
+            if done(&self.recorder) {
+                return Ok(true);
+            }
+            if self.interrupted() {
+                return Ok(false);
+            }
+            let happened = tokio::select! {
+                biased;
+                happened = self.link.next(until) => happened?,
+                _ = self.interrupt.changed() => continue,
+            };
+            match happened {
+                Some(occurrence) => {
+                    self.recorder.record(occurrence)?;
+                }
+                None => return Ok(done(&self.recorder)),
+            }
+        }
+    }
+
+    /// Runs one test. `own` are the variables of this test: `course`, `run`.
+    pub async fn run_test(
+        &mut self,
+        test: &Arc<Test>,
+        own: Map<String, Value>,
+        watcher: &mut dyn Watcher,
+    ) -> Result<(), EngineError> {
+        self.drain().await?;
+        self.composer.begin_test();
+        self.note(Event::TestBegun {
+            test: test.id.clone(),
+            bindings: Value::Object(own),
+        })?;
+        let outcome = self.sections(test, watcher).await;
+        self.note(Event::TestEnded { test: test.id.clone() })?;
+        outcome
+    }
+
+    async fn sections(&mut self, test: &Arc<Test>, watcher: &mut dyn Watcher) -> Result<(), EngineError> {
+        let version = self.recorder.judge().ground().pack.version;
+        let mut outcome = Ok(());
+        for (section, steps) in test.sections() {
+            for step in steps {
+                if step.spec.as_ref().is_some_and(|spec| !spec.contains(version)) {
+                    continue;
+                }
+                let goes_on = self
+                    .recorder
+                    .judge()
+                    .current()
+                    .is_some_and(|judge| judge.goes_on(section));
+                let stop = section != Section::Finally && self.interrupted();
+                if !goes_on || stop || (outcome.is_err() && section != Section::Finally) {
+                    break;
+                }
+                watcher.waiting(step);
+                if let Err(error) = self.step(step, section).await {
+                    // The postamble is still tried: a device must not be left driving.
+                    outcome = outcome.and(Err(error));
+                    break;
+                }
+            }
+        }
+        outcome
+    }
+
+    async fn step(&mut self, step: &Step, section: Section) -> Result<(), EngineError> {
+        self.drain().await?;
+        self.note(Event::StepBegun {
+            path: step.path.clone(),
+        })?;
+        let done = self.perform(step, section).await;
+        let end = match &done {
+            Ok(end) => end.clone(),
+            Err(error) => StepEnd::Broken(error.to_string()),
+        };
+        if let Err(error) = &done {
+            self.note(Event::Trouble {
+                text: error.to_string(),
+            })?;
+        }
+        self.note(Event::StepEnded {
+            path: step.path.clone(),
+            end,
+        })?;
+        done.map(|_| ())
+    }
+
+    async fn perform(&mut self, step: &Step, section: Section) -> Result<StepEnd, EngineError> {
+        match &step.verb {
+            Verb::Send(send) => {
+                let version = self.recorder.judge().ground();
+                let composed = match self.recorder.judge().current() {
+                    Some(test) => self.composer.compose(send, test.bindings(), version, self.link.now()),
+                    None => return Ok(StepEnd::Broken("no test is running".to_owned())),
+                };
+                let composed = match composed {
+                    Ok(composed) => composed,
+                    Err(error) => return Ok(StepEnd::Broken(error.to_string())),
+                };
+                let mark = self.mark(step)?;
+                for (name, id) in composed.actions {
+                    self.bind(&name, json!({ "id": id, "sent": mark }))?;
+                }
+                self.publish(composed.message).await?;
+                Ok(StepEnd::Decided)
+            }
+            Verb::Link(link) => {
+                self.mark(step)?;
+                self.note(Event::Fault {
+                    fault: link.fault.clone(),
+                })?;
+                self.link.fault(link.fault.clone()).await?;
+                Ok(StepEnd::Decided)
+            }
+            Verb::Serve(serve) => self.serve(serve).await,
+            Verb::Operator(operator) => {
+                self.mark(step)?;
+                self.operate(operator).await
+            }
+            Verb::Vehicle(_) => Ok(StepEnd::Broken(
+                "`vehicle` needs a master control under test".to_owned(),
+            )),
+            Verb::Retained(retained) => {
+                let topic = self.recorder.judge().ground().topics.get(&retained.topic).cloned();
+                let Some(topic) = topic else {
+                    return Ok(StepEnd::Broken(format!("there is no topic {}", retained.topic)));
+                };
+                self.link.fresh_subscriber(&topic).await?;
+                self.wait(section).await
+            }
+            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) => self.wait(section).await,
+        }
+    }
+
+    fn mark(&mut self, step: &Step) -> Result<u64, EngineError> {
+        self.note(Event::Mark {
+            path: step.path.clone(),
+        })
+    }
+
+    fn bind(&mut self, name: &str, value: Value) -> Result<(), EngineError> {
+        self.note(Event::Bound {
+            name: name.to_owned(),
+            value,
+        })?;
+        Ok(())
+    }
+
+    /// Publishes a message of the harness, journal first.
+    pub async fn publish(&mut self, message: Outgoing) -> Result<(), EngineError> {
+        self.note(Event::Sent {
+            topic: message.topic.clone(),
+            qos: message.qos,
+            retain: message.retain,
+            payload: Payload::keep(message.payload.clone()),
+        })?;
+        self.link.publish(message).await?;
+        Ok(())
+    }
+
+    /// Waits for what the judge says, and no longer.
+    async fn wait(&mut self, section: Section) -> Result<StepEnd, EngineError> {
+        let mut probed = false;
+        loop {
+            let Some(test) = self.recorder.judge().current() else {
+                return Ok(StepEnd::Broken("no test is running".to_owned()));
+            };
+            let until = match test.progress() {
+                Progress::Decided => return Ok(StepEnd::Decided),
+                Progress::Pending(until) => until,
+                Progress::NeedsProbe(ends) if !probed => ends,
+                Progress::NeedsProbe(ends) => test.probe_until().unwrap_or(ends),
+            };
+            let probing = matches!(test.progress(), Progress::NeedsProbe(_)) && !probed;
+            // The postamble runs even when the user has asked to stop: a device must not be left driving.
+            if section != Section::Finally && self.interrupted() {
+                return Ok(StepEnd::Interrupted);
+            }
+            let happened = tokio::select! {
+                biased;
+                happened = self.link.next(until) => happened?,
+                changed = self.interrupt.changed(), if section != Section::Finally => {
+                    if changed.is_err() {
+                        return Ok(StepEnd::Interrupted);
+                    }
+                    continue;
+                }
+            };
+            match happened {
+                Some(occurrence) => {
+                    self.recorder.record(occurrence)?;
+                }
+                None if probing => {
+                    probed = true;
+                    let probe = self.link.probe().await?;
+                    self.note(Event::ProbeSent { probe })?;
+                }
+                None => return Ok(StepEnd::Deadline),
+            }
+        }
+    }
+
+    async fn serve(&mut self, serve: &crate::suite::model::Serve) -> Result<StepEnd, EngineError> {
+        let bindings = self
+            .recorder
+            .judge()
+            .current()
+            .map(|test| test.bindings().clone())
+            .unwrap_or_default();
+        let body = match map_file(serve, &bindings) {
+            Ok(body) => body,
+            Err(why) => return Ok(StepEnd::Broken(why)),
+        };
+        let sha256 = sha256(&body);
+        let offer = Offer {
+            name: serve.name.clone(),
+            body,
+            behaviour: serve.behaviour,
+        };
+        let url = self.link.serve(offer).await?;
+        self.note(Event::Served {
+            name: serve.name.clone(),
+            url: url.clone(),
+            behaviour: serve.behaviour.word().to_owned(),
+        })?;
+        self.bind(
+            &format!("serve.{}", serve.name),
+            json!({ "url": url, "sha256": sha256 }),
+        )?;
+        Ok(StepEnd::Decided)
+    }
+
+    async fn operate(&mut self, operator: &crate::suite::model::Operator) -> Result<StepEnd, EngineError> {
+        let mut parameters = Map::new();
+        if let Some(test) = self.recorder.judge().current() {
+            for (name, term) in &operator.with {
+                match term.bind(test.bindings()) {
+                    Ok(value) => parameters.insert(name.clone(), value),
+                    Err(unbound) => return Ok(StepEnd::Broken(unbound.to_string())),
+                };
+            }
+        }
+        let outcome = self.hook(&operator.hook, parameters).await?;
+        Ok(match outcome {
+            HookOutcome::Done(_) => StepEnd::Decided,
+            HookOutcome::Failed(why) => StepEnd::Broken(format!("hook `{}` failed: {why}", operator.hook)),
+            HookOutcome::Missing => StepEnd::Broken(format!("the profile has no hook `{}`", operator.hook)),
+        })
+    }
+
+    /// Runs a hook of the profile while everything that happens goes on being recorded.
+    pub async fn hook(&mut self, name: &str, parameters: Map<String, Value>) -> Result<HookOutcome, EngineError> {
+        let far = Moment::from_micros(u64::MAX);
+        let outcome = if self.operator.runs_on_the_link() {
+            operator::on_link(&mut self.link, name, &parameters)
+        } else {
+            let running = self.operator.run(name, parameters);
+            tokio::pin!(running);
+            loop {
+                tokio::select! {
+                    outcome = &mut running => break outcome,
+                    happened = self.link.next(far) => {
+                        if let Some(occurrence) = happened? {
+                            self.recorder.record(occurrence)?;
+                        }
+                    }
+                }
+            }
+        };
+        let (ok, detail) = match &outcome {
+            HookOutcome::Done(detail) => (true, detail.clone()),
+            HookOutcome::Failed(detail) => (false, detail.clone()),
+            HookOutcome::Missing => (false, "no such hook".to_owned()),
+        };
+        let occurrence = Occurrence {
+            at: self.link.now(),
+            source: Source::Operator,
+            direction: None,
+            event: Event::Hook {
+                hook: name.to_owned(),
+                ok,
+                detail,
+            },
+        };
+        self.recorder.record(occurrence)?;
+        Ok(outcome)
+    }
+}
+
+fn map_file(serve: &crate::suite::model::Serve, bindings: &Bindings) -> Result<bytes::Bytes, String> {
+    let Some(term) = &serve.file else {
+        // Every offer is a file of its own, so that two versions of a map differ.
+        let mut body = BUILT_IN_MAP.to_vec();
+        body.extend_from_slice(serve.name.as_bytes());
+        return Ok(body.into());
+    };
+    let path = term.bind(bindings).map_err(|unbound| unbound.to_string())?;
+    let path = path.as_str().ok_or("a file name is a text")?;
+    std::fs::read(path)
+        .map(Into::into)
+        .map_err(|error| format!("cannot read the map file {path}: {error}"))
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    use sha2::Digest as _;
+    crate::journal::event::hex(&sha2::Sha256::digest(bytes))
+}

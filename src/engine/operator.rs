@@ -1,0 +1,40 @@
+//! Hooks of the profile, as the engine sees them.
+
+use serde_json::{Map, Value};
+
+use crate::link::Link;
+
+/// What became of a hook.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HookOutcome {
+    /// It was done; the text is what it said.
+    Done(String),
+    /// It was tried and did not work.
+    Failed(String),
+    /// There is no such hook, and nobody to ask.
+    Missing,
+}
+
+/// Runs hooks: a command, an HTTP request, a prompt to a person, or a command to a reference device.
+#[expect(async_fn_in_trait, reason = "the engine runs on one thread and needs no Send bound")]
+pub trait Operator {
+    /// Names of the hooks that can be run.
+    fn hooks(&self) -> Vec<String>;
+
+    /// Runs one and waits for its end.
+    async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome;
+
+    /// Whether hooks are commands to a device that lives on the link, as in virtual time.
+    fn runs_on_the_link(&self) -> bool {
+        false
+    }
+}
+
+/// Gives the command to the device on the link.
+pub(super) fn on_link<L: Link>(link: &mut L, hook: &str, parameters: &Map<String, Value>) -> HookOutcome {
+    if link.command(hook, Value::Object(parameters.clone())) {
+        HookOutcome::Done("done by the simulated device".to_owned())
+    } else {
+        HookOutcome::Missing
+    }
+}

@@ -1,0 +1,73 @@
+//! Journal, file and judge as one: what is recorded is judged.
+
+use std::sync::Arc;
+
+use crate::journal::event::Occurrence;
+use crate::journal::file::JournalWriter;
+use crate::journal::{Entry, Journal};
+use crate::judge::{JudgeError, Rules, RunJudge};
+
+/// Why something could not be recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be written.
+    #[error("cannot write the journal: {0}")]
+    Write(#[from] std::io::Error),
+    /// The judge refuses the journal.
+    #[error(transparent)]
+    Judge(#[from] JudgeError),
+}
+
+/// Records and judges.
+pub struct Recorder {
+    journal: Journal,
+    writer: Option<JournalWriter>,
+    judge: RunJudge,
+}
+
+impl Recorder {
+    /// Begins with `RunBegun`.
+    pub fn begin(rules: &Rules, mut writer: Option<JournalWriter>, first: Occurrence) -> Result<Self, RecordError> {
+        let mut journal = Journal::new();
+        let entry = journal.append(first);
+        if let Some(writer) = &mut writer {
+            writer.write(&entry.record)?;
+        }
+        let mut judge = RunJudge::begin(rules, &entry)?;
+        judge.observe(&entry)?;
+        Ok(Self { journal, writer, judge })
+    }
+
+    /// Records one occurrence: file first, then the judge.
+    pub fn record(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
+        let entry = self.journal.append(occurrence);
+        if let Some(writer) = &mut self.writer {
+            writer.write(&entry.record)?;
+        }
+        self.judge.observe(&entry)?;
+        Ok(entry)
+    }
+
+    /// The judge of this run.
+    pub fn judge(&self) -> &RunJudge {
+        &self.judge
+    }
+
+    /// The judge of this run, to break it off.
+    pub fn judge_mut(&mut self) -> &mut RunJudge {
+        &mut self.judge
+    }
+
+    /// The records so far.
+    pub fn journal(&self) -> &Journal {
+        &self.journal
+    }
+
+    /// Makes sure the file is on the disk.
+    pub fn sync(&self) -> Result<(), RecordError> {
+        self.writer
+            .as_ref()
+            .map_or(Ok(()), JournalWriter::sync)
+            .map_err(RecordError::Write)
+    }
+}

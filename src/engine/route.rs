@@ -1,0 +1,135 @@
+//! From course names to the nodes and edges of an order, with sequenceIds that run on through updates.
+
+use serde_json::{Value, json};
+
+use super::compose::ComposeError;
+use crate::suite::model::{Route, RoutePlace};
+
+/// The ways sent in this test, latest last.
+#[derive(Debug, Default)]
+pub(super) struct SentOrders(Vec<(String, Vec<Visited>)>);
+
+/// One node of an order that was sent.
+#[derive(Clone, Debug)]
+struct Visited {
+    name: String,
+    sequence_id: u32,
+    released: bool,
+}
+
+impl SentOrders {
+    /// The sequenceId an update that begins at `name` continues with: that of the last base node of this
+    /// name in the latest message of the order, then in older ones; 0 for a new order.
+    fn continues_at(&self, order: &str, name: &str) -> u32 {
+        let ways = self.0.iter().rev().filter(|(id, _)| id == order);
+        let mut found =
+            ways.filter_map(|(_, nodes)| nodes.iter().rev().find(|node| node.released && node.name == name));
+        found.next().map_or(0, |node| node.sequence_id)
+    }
+}
+
+/// Builds nodes and edges.
+pub(super) struct RouteBuilder<'a> {
+    /// The variable `course`.
+    pub(super) course: Option<&'a Value>,
+    /// The way.
+    pub(super) route: &'a Route,
+    /// Finished actions by place.
+    pub(super) actions: Vec<(RoutePlace, Vec<Value>)>,
+}
+
+impl RouteBuilder<'_> {
+    /// The arrays `nodes` and `edges`.
+    pub(super) fn build(self, order: &str, sent: &mut SentOrders) -> Result<(Value, Value), ComposeError> {
+        let route = self.route;
+        let names: Vec<(&str, bool)> = route
+            .base
+            .iter()
+            .map(|name| (name.as_str(), true))
+            .chain(route.horizon.iter().map(|name| (name.as_str(), false)))
+            .collect();
+        let first = names.first().map_or(0, |(name, _)| sent.continues_at(order, name));
+        let first = route.from.unwrap_or(first);
+        let mut nodes = Vec::new();
+        let mut edges = Vec::new();
+        let mut visited = Vec::new();
+        let mut used = vec![false; self.actions.len()];
+        for (at, (name, released)) in names.iter().enumerate() {
+            let sequence_id = first.saturating_add(u32::try_from(at).unwrap_or(u32::MAX).saturating_mul(2));
+            if at > 0 {
+                let before = names[at - 1].0;
+                let actions = self.take(&RoutePlace::Edge(before.to_owned(), (*name).to_owned()), &mut used);
+                edges.push(self.edge(before, name, sequence_id.saturating_sub(1), *released, actions)?);
+            }
+            let actions = self.take(&RoutePlace::Node((*name).to_owned()), &mut used);
+            nodes.push(self.node(name, sequence_id, *released, actions)?);
+            visited.push(Visited {
+                name: (*name).to_owned(),
+                sequence_id,
+                released: *released,
+            });
+        }
+        sent.0.push((order.to_owned(), visited));
+        Ok((Value::Array(nodes), Value::Array(edges)))
+    }
+
+    fn take(&self, place: &RoutePlace, used: &mut [bool]) -> Vec<Value> {
+        for (at, (other, actions)) in self.actions.iter().enumerate() {
+            if other == place && !used[at] {
+                used[at] = true;
+                return actions.clone();
+            }
+        }
+        Vec::new()
+    }
+
+    fn member(&self, group: &str, name: &str) -> Option<&Value> {
+        self.course?.get(group)?.get(name)
+    }
+
+    fn node(&self, name: &str, sequence_id: u32, released: bool, actions: Vec<Value>) -> Result<Value, ComposeError> {
+        let place = self
+            .member("nodes", name)
+            .ok_or_else(|| ComposeError::Course(format!("node `{name}`")))?;
+        let mut node = json!({
+            "nodeId": place.get("id"),
+            "sequenceId": sequence_id,
+            "released": released,
+            "actions": actions,
+        });
+        if let Some(position) = place.get("position") {
+            node["nodePosition"] = position.clone();
+        }
+        Ok(node)
+    }
+
+    fn edge(
+        &self,
+        from: &str,
+        to: &str,
+        sequence_id: u32,
+        released: bool,
+        actions: Vec<Value>,
+    ) -> Result<Value, ComposeError> {
+        let missing = || ComposeError::Course(format!("edge `{from}-{to}`"));
+        let edge = self.member("edges", &format!("{from}-{to}")).ok_or_else(missing)?;
+        let end = |name: &str| {
+            self.member("nodes", name)
+                .and_then(|node| node.get("id"))
+                .cloned()
+                .unwrap_or_default()
+        };
+        let mut built = json!({
+            "edgeId": edge.get("id"),
+            "sequenceId": sequence_id,
+            "released": released,
+            "startNodeId": end(from),
+            "endNodeId": end(to),
+            "actions": actions,
+        });
+        if let (Some(Value::Object(more)), Value::Object(built)) = (edge.get("members"), &mut built) {
+            built.extend(more.clone());
+        }
+        Ok(built)
+    }
+}

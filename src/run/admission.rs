@@ -1,0 +1,92 @@
+//! Before the first test: the device is there, and has said what it can do.
+
+use std::time::Duration;
+
+use serde_json::json;
+
+use super::between::Presence;
+use super::session::Session;
+use crate::engine::{EngineError, Operator, Recorder};
+use crate::journal::event::Event;
+use crate::link::Link;
+
+impl<L: Link, O: Operator> Session<'_, L, O> {
+    /// Waits for the device, its first state and its factsheet. `Err` says why it cannot be judged.
+    pub(super) async fn admit(&mut self) -> Result<Result<(), String>, EngineError> {
+        let vantage = self.setup.capabilities.vantage;
+        let patience = self.time("connect");
+        let until = self.engine.link.now().moment + patience;
+        let there = |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
+        if !self.engine.watch(until, there).await? {
+            return Ok(Err(format!("no device connected within {} s", patience.as_secs())));
+        }
+        let begun = self.engine.recorder.journal().entries().len() as u64;
+        let has_state = |recorder: &Recorder| recorder.judge().timeline().of("state").iter().any(|entry| !is_stale(entry));
+        let until = self.engine.link.now().moment + self.time("statePeriod");
+        if !self.engine.watch(until, has_state).await? {
+            let why = format!(
+                "the device connected (see #{begun}) but sent no state within {} s",
+                self.time("statePeriod").as_secs()
+            );
+            return Ok(Err(why));
+        }
+        self.factsheet().await?;
+        Ok(Ok(()))
+    }
+
+    async fn factsheet(&mut self) -> Result<(), EngineError> {
+        let has_sheet = |recorder: &Recorder| recorder.judge().timeline().of("factsheet").iter().any(|entry| entry.json().is_some());
+        let until = self.engine.link.now().moment + self.time("settle");
+        let mut found = self.engine.watch(until, has_sheet).await?;
+        let ground = self.engine.recorder.judge().ground();
+        if let Some(request) = ground.pack.word("action.factsheetRequest").map(str::to_owned).filter(|_| !found) {
+            self.instant_action(&request).await?;
+            let until = self.engine.link.now().moment + self.time("react");
+            found = self.engine.watch(until, has_sheet).await?;
+        }
+        if !found {
+            self.setup
+                .limits
+                .push("The device published no factsheet, so what it can do is only known from the profile.".to_owned());
+            return Ok(());
+        }
+        let sheet = self.engine.recorder.judge().timeline().of("factsheet").iter().rev().find_map(|entry| entry.json().cloned());
+        if let Some(sheet) = sheet {
+            self.engine.note(Event::Bound {
+                name: "device.factsheet".to_owned(),
+                value: sheet.clone(),
+            })?;
+            self.setup.capabilities.factsheet = Some(sheet);
+        }
+        Ok(())
+    }
+
+    /// Sends one instant action outside any test.
+    pub(super) async fn instant_action(&mut self, action_type: &str) -> Result<(), EngineError> {
+        let id = self.engine.composer.action_id();
+        let members = json!({ "actions": [{
+            "actionType": action_type, "actionId": id, "blockingType": "HARD", "actionParameters": [],
+        }] });
+        let now = self.engine.link.now();
+        let message = self.engine.composer.plain("instantActions", members, self.engine.recorder.judge().ground(), now);
+        match message {
+            Ok(message) => self.engine.publish(message).await,
+            Err(error) => {
+                self.engine.note(Event::Trouble { text: error.to_string() })?;
+                Ok(())
+            }
+        }
+    }
+
+    /// A time limit of the profile.
+    pub(super) fn time(&self, name: &str) -> Duration {
+        let times = self.engine.recorder.judge().ground().bindings.get("time");
+        let millis = times.and_then(|times| times.get(name)).and_then(serde_json::Value::as_u64);
+        Duration::from_millis(millis.unwrap_or(31_000))
+    }
+}
+
+/// Stored by the broker before the run began.
+pub(super) fn is_stale(entry: &crate::journal::Entry) -> bool {
+    matches!(entry.event(), Event::Message { retain: true, .. })
+}

@@ -1,0 +1,85 @@
+//! The variables of one test: the course from where the vehicle stands, and fresh ids.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Map, Value, json};
+
+use crate::course::{Layout, Standing};
+use crate::journal::event::{Event, Packet};
+use crate::judge::RunJudge;
+use crate::suite::model::Test;
+
+/// Margin on one and a half keep-alives for the last will, in milliseconds.
+const WILL_MARGIN: u64 = 3_000;
+
+/// Where the vehicle stands, as its last state says.
+pub(super) fn standing(judge: &RunJudge, layout: &Layout) -> Option<Standing> {
+    let state = judge.timeline().of("state").iter().rev().find_map(|entry| entry.json())?;
+    let node = state.get("lastNodeId").and_then(Value::as_str).filter(|id| !id.is_empty());
+    if let Some(node) = node.filter(|id| layout.node(id).is_some()) {
+        return Some(Standing::Node(node.to_owned()));
+    }
+    let position = state.get("agvPosition")?;
+    let number = |name: &str| position.get(name).and_then(Value::as_f64);
+    Some(Standing::Pose {
+        map_id: position.get("mapId")?.as_str()?.to_owned(),
+        x: number("x")?,
+        y: number("y")?,
+    })
+}
+
+/// The course of a test; `Err` says why there is none.
+pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) -> Result<Option<Value>, String> {
+    if test.course.nodes.is_empty() {
+        return Ok(None);
+    }
+    let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
+    let standing = standing(judge, layout).ok_or("the vehicle does not say where it stands")?;
+    let course = layout.assign(&test.course, &standing).map_err(|error| error.to_string())?;
+    Ok(Some(course.bindings()))
+}
+
+/// The variables only this test has.
+pub(super) fn own_bindings(test: &Test, course: Option<Value>, judge: &RunJudge, run: &str, number: usize) -> Map<String, Value> {
+    let mut own = Map::new();
+    own.extend(course.map(|course| ("course".to_owned(), course)));
+    let ids = fresh_names(test).into_iter().map(|name| {
+        let id = format!("{run}-{number}-{name}");
+        (name, Value::from(id))
+    });
+    own.insert("run".to_owned(), Value::Object(ids.collect()));
+    if let Some(will) = will(judge) {
+        own.insert("time".to_owned(), json!({ "will": will }));
+    }
+    own
+}
+
+/// One and a half keep-alives of the device's own CONNECT, and a margin.
+fn will(judge: &RunJudge) -> Option<u64> {
+    let entry = judge.timeline().of("mqtt/connect").last()?;
+    match entry.event() {
+        Event::Packet {
+            packet: Packet::Connect { keep_alive, .. },
+            ..
+        } if *keep_alive > 0 => Some(u64::from(*keep_alive) * 1_500 + WILL_MARGIN),
+        _ => None,
+    }
+}
+
+/// Every NAME of `${run.NAME}` in the files of a test.
+fn fresh_names(test: &Test) -> BTreeSet<String> {
+    let mut names = BTreeSet::from(["order".to_owned()]);
+    let steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
+    let mut texts: Vec<&str> = steps.map(|step| step.span.source.text.as_str()).collect();
+    texts.push(&test.source.text);
+    texts.dedup();
+    for text in texts {
+        for rest in text.split("${run.").skip(1) {
+            let name: String = rest.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
+            if !name.is_empty() {
+                names.insert(name);
+            }
+        }
+    }
+    names
+}

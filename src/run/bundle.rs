@@ -1,0 +1,81 @@
+//! The result bundle: one folder per run.
+//!
+//! `journal.jsonl` is written through while the run goes on, `result.json` after every test, everything
+//! else at the end. A run that breaks leaves what it has, marked as partial.
+
+use std::path::{Path, PathBuf};
+
+use crate::journal::file::JournalWriter;
+
+/// Why a bundle cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum BundleError {
+    /// A file or folder cannot be written.
+    #[error("cannot write {}: {reason}", path.display())]
+    Write {
+        /// Which.
+        path: PathBuf,
+        /// What the system said.
+        reason: std::io::Error,
+    },
+}
+
+/// A folder for the evidence of one run.
+#[derive(Debug)]
+pub struct Bundle {
+    folder: PathBuf,
+}
+
+impl Bundle {
+    /// Makes `reports/<manufacturer>-<serial>/<utc>-<id>/`.
+    pub fn create(reports: &Path, manufacturer: &str, serial_number: &str, utc: jiff::Timestamp, run: &str) -> Result<Self, BundleError> {
+        let device = safe(&format!("{manufacturer}-{serial_number}"));
+        let begun = utc.strftime("%Y%m%dT%H%M%SZ").to_string();
+        let folder = reports.join(device).join(format!("{begun}-{}", safe(run)));
+        std::fs::create_dir_all(&folder).map_err(|reason| BundleError::Write {
+            path: folder.clone(),
+            reason,
+        })?;
+        Ok(Self { folder })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Opens `journal.jsonl`.
+    pub fn journal(&self) -> Result<JournalWriter, BundleError> {
+        let path = self.folder.join("journal.jsonl");
+        JournalWriter::create(&path).map_err(|reason| BundleError::Write { path, reason })
+    }
+
+    /// Writes one file whole, so that nobody ever sees half of it.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<(), BundleError> {
+        let path = self.folder.join(name);
+        let draft = self.folder.join(format!(".{name}.draft"));
+        let written = std::fs::write(&draft, content).and_then(|()| std::fs::rename(&draft, &path));
+        written.map_err(|reason| BundleError::Write { path, reason })
+    }
+}
+
+/// A name of a device as part of a path: whatever it holds, it stays one folder.
+fn safe(name: &str) -> String {
+    let kept = name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '_' });
+    let kept: String = kept.take(100).collect();
+    if kept.is_empty() { "device".to_owned() } else { kept }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hostile_name_stays_one_folder() {
+        let root = tempfile::tempdir().expect("folder");
+        let bundle = Bundle::create(root.path(), "../../x", "/etc\0", jiff::Timestamp::UNIX_EPOCH, "r").expect("bundle");
+        assert!(bundle.folder().starts_with(root.path()));
+        assert_eq!(bundle.folder().components().count(), root.path().components().count() + 2);
+    }
+}
