@@ -1,0 +1,3 @@
+//! Runs: joins devices, benches and the engine.
+
+pub mod device_peer;
