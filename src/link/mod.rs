@@ -4,6 +4,8 @@
 //! server), `memory` an in-process bus with MQTT's retain, will and QoS rules in virtual time. A link
 //! reports everything as journal occurrences and judges nothing.
 
+pub mod memory;
+
 use crate::clock::{Moment, Stamp};
 use crate::journal::event::{LinkFault, Occurrence};
 use crate::suite::model::ServeBehaviour;

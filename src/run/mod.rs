@@ -8,6 +8,7 @@ mod between;
 mod bindings;
 mod bundle;
 pub mod capabilities;
+pub mod device_peer;
 mod session;
 
 pub use bundle::{Bundle, BundleError};
