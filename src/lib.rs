@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 pub mod checks;
+pub mod cli;
 pub mod clock;
 pub mod course;
 pub mod diagnostic;
@@ -18,4 +19,5 @@ pub mod profile;
 pub mod reference;
 pub mod report;
 pub mod suite;
+pub mod ui;
 pub mod verdict;

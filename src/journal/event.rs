@@ -539,16 +539,7 @@ pub struct RunHeader {
     pub command: Vec<String>,
 }
 
-/// One effective setting and where it came from.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Setting {
-    /// Name, such as `time.react`.
-    pub name: String,
-    /// Value as text.
-    pub value: String,
-    /// `flag`, `environment`, a file name, or `default`.
-    pub origin: String,
-}
+pub use crate::profile::Setting;
 
 /// What the harness does to the link.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
