@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 pub mod checks;
+pub mod cli;
 pub mod clock;
 pub mod course;
 pub mod diagnostic;
@@ -23,5 +24,6 @@ pub mod report;
 pub mod run;
 pub mod suite;
 pub mod tap;
+pub mod ui;
 pub mod verdict;
 pub mod yaml;

@@ -544,6 +544,7 @@ pub struct RunHeader {
     pub command: Vec<String>,
 }
 
+<<<<<<< HEAD
 /// What a run is going to do, and why it leaves things out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
@@ -605,6 +606,9 @@ pub struct Setting {
     /// `flag`, `environment`, a file name, or `default`.
     pub origin: String,
 }
+=======
+pub use crate::profile::Setting;
+>>>>>>> profile
 
 /// What the harness does to the link.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,2 +1,285 @@
 //! What must be known about one device and site (PIXIT): `device.toml`, its defaults, and where each
 //! effective value came from.
+//!
+//! [`load`] lays flags over environment, profile, project file, user file and defaults, and hands back one
+//! [`Effective`] profile, or every mistake in any of them. Whether the protocol version, the requirements of
+//! the deviations and the files named exist is left to those who use them: [`Effective::complain`] gives
+//! them the caret.
+
+mod claim;
+mod effective;
+mod hooks;
+mod key;
+mod layer;
+mod read;
+#[cfg(test)]
+mod tests;
+mod time;
+mod value;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+pub use claim::Claim;
+pub use effective::Effective;
+pub use hooks::{HOOKS, Hook, HookAction, HookInfo, fill, find as find_hook, placeholders};
+pub use key::{COMMON_PLACEHOLDERS, KEYS, Key, Kind, PASSWORD_VARIABLE, STATEMENTS, Statement};
+pub use layer::{Surroundings, check, load};
+pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
+
+use crate::diagnostic::Span;
+use crate::pack::{RequirementId, Role};
+
+/// Every setting with its default, and a comment on each.
+pub const DEFAULT_TOML: &str = include_str!("default.toml");
+
+/// The JSON schema of profiles, for editors.
+pub const SCHEMA: &str = include_str!("../../schemas/profile.schema.json");
+
+/// One effective setting and where it came from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Setting {
+    /// Name, such as `time.react`.
+    pub name: String,
+    /// Value as text.
+    pub value: String,
+    /// `flag`, `environment`, a file name, or `default`.
+    pub origin: String,
+}
+
+/// One device and site.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    /// `[device]`.
+    pub device: Device,
+    /// `[bench]`.
+    pub bench: Bench,
+    /// `[motion]`.
+    pub motion: Motion,
+    /// `[layout]`.
+    pub layout: Layout,
+    /// `[time]`.
+    pub time: TimeLimits,
+    /// `[maps]`: files the device can read.
+    pub maps: Vec<PathBuf>,
+    /// `[deviations]`, in the order of the file.
+    pub deviations: Vec<Deviation>,
+    /// `[hooks]` by name; all are for the role of the device.
+    pub hooks: BTreeMap<String, Hook>,
+}
+
+/// `[device]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Device {
+    /// Which side is tested.
+    pub role: Role,
+    /// Manufacturer in topics and headers.
+    pub manufacturer: Option<String>,
+    /// Serial number in topics and headers.
+    pub serial_number: Option<String>,
+    /// Version the device is judged by; a version by its form, not necessarily a known one.
+    pub protocol: Option<String>,
+    /// How its topics begin, with `{majorVersion}`, `{manufacturer}` and `{serialNumber}`.
+    pub topic_template: Option<String>,
+    /// Program and arguments that start the device itself, with [`COMMON_PLACEHOLDERS`].
+    pub command: Option<Vec<String>>,
+    /// What the vehicle is like; a name of [`STATEMENTS`] that is missing is not known.
+    pub statements: BTreeMap<String, bool>,
+    /// What it can do, beside its factsheet or against it.
+    pub claims: Vec<Claim>,
+}
+
+impl Device {
+    /// Whether the vehicle is like that; `None` when the profile does not say.
+    #[must_use]
+    pub fn states(&self, statement: &str) -> Option<bool> {
+        self.statements.get(statement).copied()
+    }
+}
+
+/// `[bench]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bench {
+    /// Where the device connects, as `host:port`.
+    pub listen: String,
+    /// Whether the device connects through the tap.
+    pub tap: bool,
+    /// A broker other than the built-in one, as `mqtt://…` or `mqtts://…`.
+    pub broker: Option<String>,
+    /// Where map files are served, as `host:port`.
+    pub maps_listen: String,
+    /// Host name in the links to map files; that of `maps_listen` when absent.
+    pub maps_host: Option<String>,
+    /// Certificate the tap shows the device (PEM).
+    pub tls_cert: Option<PathBuf>,
+    /// Its key (PEM).
+    pub tls_key: Option<PathBuf>,
+    /// Whom to trust at the broker (PEM).
+    pub tls_ca: Option<PathBuf>,
+    /// User name at the broker.
+    pub username: Option<String>,
+    /// Where the password is.
+    pub password: PasswordSource,
+}
+
+/// Where a password is found; the password itself is never part of a profile.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PasswordSource {
+    /// In [`PASSWORD_VARIABLE`], if that is set.
+    Usual,
+    /// In this environment variable, which has to be set.
+    Environment(String),
+    /// In this file, which holds nothing else.
+    File(PathBuf),
+}
+
+/// A password. It has no `Debug` or `Display` that shows it.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Password(String);
+
+impl Password {
+    /// The password, for the CONNECT packet and nothing else.
+    #[must_use]
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+}
+
+impl std::fmt::Debug for Password {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Password(…)")
+    }
+}
+
+/// Why a password could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum PasswordError {
+    /// `password-env` names a variable that is not set.
+    #[error("the environment variable {0} that should hold the password is not set")]
+    NotSet(String),
+    /// `password-file` cannot be read.
+    #[error("the password file {file} cannot be read: {reason}")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// What the system said.
+        reason: std::io::Error,
+    },
+}
+
+impl PasswordSource {
+    /// The password, if there is one.
+    ///
+    /// # Errors
+    /// When the profile says where it is and it is not there.
+    pub fn password(&self, surroundings: &Surroundings) -> Result<Option<Password>, PasswordError> {
+        let variable = |name: &str| surroundings.environment.get(name).cloned().map(Password);
+        match self {
+            Self::Usual => Ok(variable(PASSWORD_VARIABLE)),
+            Self::Environment(name) => match variable(name) {
+                Some(password) => Ok(Some(password)),
+                None => Err(PasswordError::NotSet(name.clone())),
+            },
+            Self::File(file) => match std::fs::read_to_string(file) {
+                Ok(text) => Ok(Some(Password(text.trim_end_matches(['\r', '\n']).to_owned()))),
+                Err(reason) => Err(PasswordError::Unreadable {
+                    file: file.display().to_string(),
+                    reason,
+                }),
+            },
+        }
+    }
+}
+
+/// `[motion]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// Whether the vehicle may drive.
+    pub allowed: bool,
+    /// Speed cap in m/s.
+    pub max_speed: Option<f64>,
+}
+
+/// `[layout]`.
+#[derive(Clone, Debug, Default)]
+pub struct Layout {
+    /// Where nodes and edges come from.
+    pub source: LayoutSource,
+    /// The only nodes the vehicle may use; all of them when absent.
+    pub allow_list: Option<Vec<String>>,
+}
+
+/// Where nodes and edges come from.
+#[derive(Clone, Debug, Default)]
+pub enum LayoutSource {
+    /// The profile says nothing.
+    #[default]
+    None,
+    /// A LIF file.
+    Lif {
+        /// The file.
+        file: PathBuf,
+        /// vehicleTypeId in it.
+        vehicle_type: Option<String>,
+    },
+    /// A short list in the profile.
+    List(LayoutList),
+}
+
+/// `layout.nodes` and `layout.edges`. Ids are unique, and edges join nodes of the list.
+#[derive(Clone, Debug)]
+pub struct LayoutList {
+    /// Nodes.
+    pub nodes: Vec<LayoutNode>,
+    /// Edges, one-way.
+    pub edges: Vec<LayoutEdge>,
+    /// Where it begins.
+    pub span: Span,
+}
+
+/// One element of `layout.nodes`.
+#[derive(Clone, Debug)]
+pub struct LayoutNode {
+    /// nodeId.
+    pub id: String,
+    /// mapId.
+    pub map_id: String,
+    /// Metres.
+    pub x: f64,
+    /// Metres.
+    pub y: f64,
+    /// Radians, from -π to π.
+    pub theta: Option<f64>,
+    /// Metres.
+    pub deviation_xy: Option<f64>,
+    /// Radians.
+    pub deviation_theta: Option<f64>,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// One element of `layout.edges`.
+#[derive(Clone, Debug)]
+pub struct LayoutEdge {
+    /// edgeId.
+    pub id: String,
+    /// Id of the node it begins at.
+    pub start: String,
+    /// Id of the node it ends at.
+    pub end: String,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// A declared deviation: the verdict stays, the report shows the reason.
+#[derive(Clone, Debug)]
+pub struct Deviation {
+    /// The requirement; an id by its form, not necessarily a known one.
+    pub requirement: RequirementId,
+    /// Why.
+    pub reason: String,
+    /// Where it is written.
+    pub span: Span,
+}

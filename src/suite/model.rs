@@ -115,14 +115,7 @@ pub enum Need {
     Limit(String),
 }
 
-/// What a test asks of the course.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct CourseNeed {
-    /// Names of nodes, in order of first use. `a` is where the vehicle stands.
-    pub nodes: Vec<String>,
-    /// Pairs of names that must be joined by an edge.
-    pub edges: Vec<(String, String)>,
-}
+pub use crate::course::CourseNeed;
 
 /// One step.
 #[derive(Clone, Debug)]

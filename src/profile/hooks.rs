@@ -1,0 +1,263 @@
+//! Hooks: what a person or a machine does to the device when a test asks for it.
+//!
+//! [`HOOKS`] is the one set of names; a [`Hook`] is what a profile says about one of them. Running it is
+//! left to the engine. Values put into a hook may come from the device, so nothing here goes through a shell.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
+use serde_json::Value;
+
+use crate::diagnostic::Span;
+use crate::pack::Role;
+
+/// A hook a test may ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HookInfo {
+    /// Name, as in `[hooks.NAME]` and `operator: NAME`.
+    pub name: &'static str,
+    /// Which side it is for.
+    pub role: Role,
+    /// Names of the parameters a test hands over.
+    pub parameters: &'static [&'static str],
+    /// What has been done when it is finished.
+    pub doc: &'static str,
+}
+
+const fn agv(name: &'static str, parameters: &'static [&'static str], doc: &'static str) -> HookInfo {
+    HookInfo {
+        name,
+        role: Role::Agv,
+        parameters,
+        doc,
+    }
+}
+
+const fn master_control(name: &'static str, parameters: &'static [&'static str], doc: &'static str) -> HookInfo {
+    HookInfo {
+        name,
+        role: Role::MasterControl,
+        parameters,
+        doc,
+    }
+}
+
+/// Every hook there is, by role.
+pub const HOOKS: &[HookInfo] = &[
+    agv("power-cycle", &[], "The vehicle was switched off hard and on again."),
+    agv("shutdown", &[], "The vehicle was shut down, or its communication ended, in good order."),
+    agv("start", &[], "The vehicle was started after a shutdown."),
+    agv("set-mode", &["mode"], "The operating mode was switched at the vehicle."),
+    agv("drive-manually", &[], "The vehicle was driven by hand for a short way."),
+    agv("move-to", &["nodeId"], "The vehicle was brought to a node and knows where it is."),
+    agv("push-out", &[], "The vehicle was moved off the way it had been given."),
+    agv("emergency-stop", &[], "An emergency stop was pressed."),
+    agv("release-emergency-stop", &[], "The emergency stop was released and acknowledged."),
+    agv("enter-field", &[], "Somebody or something entered the protective field."),
+    agv("leave-field", &[], "The protective field was left."),
+    agv("place-obstacle", &["edgeId"], "An obstacle was put on an edge."),
+    agv("remove-obstacle", &["edgeId"], "The obstacle was taken away."),
+    agv("trigger", &["actionId"], "The trigger that a waiting vehicle waits for was given."),
+    agv("place-load", &["loadType"], "A load was put on the vehicle or where it picks next."),
+    agv("remove-load", &["loadType"], "The load was taken off the vehicle or from where it picks next."),
+    agv("press-pause", &[], "The pause button at the vehicle was pressed."),
+    agv("release-pause", &[], "The pause at the vehicle was ended."),
+    agv("block-pause", &[], "A pause or its end by a message was made impossible, such as by a switch."),
+    agv("unblock-pause", &[], "A pause and its end by a message were made possible again."),
+    agv("enable-map", &["mapId", "mapVersion"], "A map version was enabled at the vehicle."),
+    agv("provoke-error", &["errorLevel"], "A real fault of the vehicle was brought about."),
+    agv("clear-error", &[], "The fault was cleared."),
+    agv("confirm", &["question"], "Somebody looked, and says yes to the question."),
+    master_control("dispatch", &["from", "to", "loadType", "action"], "A transport was ordered."),
+    master_control("reroute", &["to"], "The running transport was given another destination."),
+    master_control("cancel", &[], "The running transport was called off."),
+    master_control("pause", &[], "The vehicle was told to pause."),
+    master_control("resume", &[], "The vehicle was told to go on."),
+    master_control("instant-action", &["action"], "An instant action was sent to the vehicle."),
+    master_control("request-factsheet", &[], "The factsheet of the vehicle was asked for."),
+    master_control("request-state", &[], "The state of the vehicle was asked for."),
+    master_control(
+        "init-position",
+        &["nodeId", "x", "y", "theta", "mapId"],
+        "The vehicle was told where it stands.",
+    ),
+    master_control(
+        "download-map",
+        &["mapId", "mapVersion", "mapDownloadLink"],
+        "The roll-out of a map version to the vehicle was begun.",
+    ),
+    master_control("enable-map", &["mapId", "mapVersion"], "A map version was enabled on the vehicle."),
+    master_control("delete-map", &["mapId", "mapVersion"], "A map version was deleted from the vehicle."),
+    master_control("block-edge", &["from", "to"], "A way was closed for the vehicle in the layout."),
+    master_control("unblock-edge", &["from", "to"], "The way was opened again."),
+    master_control("configure", &["what"], "The master control was set up for what comes next."),
+    master_control("start", &[], "The master control was started."),
+    master_control("shutdown", &[], "The master control was shut down."),
+    master_control("confirm", &["question"], "Somebody looked, and says yes to the question."),
+];
+
+/// The hook of that name for that side.
+#[must_use]
+pub fn find(name: &str, role: Role) -> Option<&'static HookInfo> {
+    HOOKS.iter().find(|hook| hook.name == name && hook.role == role)
+}
+
+/// What a profile does when a test asks for a hook.
+#[derive(Clone, Debug)]
+pub struct Hook {
+    /// Its name.
+    pub name: String,
+    /// How it is done.
+    pub action: HookAction,
+    /// How long it may take.
+    pub timeout: Duration,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// How a hook is done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HookAction {
+    /// A program and its arguments; no shell.
+    Run(Vec<String>),
+    /// An HTTP request; any 2xx answer is success.
+    Http {
+        /// Method in capitals.
+        method: String,
+        /// Address.
+        url: String,
+        /// Body, if there is one.
+        body: Option<String>,
+    },
+    /// A text for a person.
+    Prompt(String),
+}
+
+impl HookAction {
+    /// A program or request that needs nobody.
+    #[must_use]
+    pub fn is_unattended(&self) -> bool {
+        !matches!(self, Self::Prompt(_))
+    }
+
+    /// How long it may take unless said.
+    #[must_use]
+    pub fn default_timeout(&self) -> Duration {
+        Duration::from_secs(if self.is_unattended() { 60 } else { 600 })
+    }
+
+    /// The action with values for its placeholders. A value stays one argument, one part of an address, one
+    /// part of a JSON text, whatever stands in it.
+    #[must_use]
+    pub fn filled(&self, values: &BTreeMap<String, String>) -> Self {
+        let verbatim = |value: &str| value.to_owned();
+        match self {
+            Self::Run(arguments) => Self::Run(arguments.iter().map(|text| fill(text, values, verbatim)).collect()),
+            Self::Prompt(text) => Self::Prompt(fill(text, values, verbatim)),
+            Self::Http { method, url, body } => Self::Http {
+                method: method.clone(),
+                url: fill(url, values, |value| utf8_percent_encode(value, NON_ALPHANUMERIC).to_string()),
+                body: body.as_ref().map(|body| {
+                    let json = body.trim_start().starts_with(['{', '[']);
+                    fill(body, values, if json { inside_json } else { verbatim })
+                }),
+            },
+        }
+    }
+
+    /// Every text that may hold placeholders.
+    #[must_use]
+    pub fn texts(&self) -> Vec<&str> {
+        match self {
+            Self::Run(arguments) => arguments.iter().map(String::as_str).collect(),
+            Self::Prompt(text) => vec![text],
+            Self::Http { url, body, .. } => [Some(url), body.as_ref()].into_iter().flatten().map(String::as_str).collect(),
+        }
+    }
+}
+
+fn inside_json(value: &str) -> String {
+    let quoted = Value::from(value).to_string();
+    quoted.get(1..quoted.len() - 1).unwrap_or_default().to_owned()
+}
+
+/// The placeholders of a text with their byte ranges: `{name}`, but not `${name}`.
+#[must_use]
+pub fn placeholders(text: &str) -> Vec<(std::ops::Range<usize>, &str)> {
+    let mut found = Vec::new();
+    let mut at = 0;
+    while let Some(open) = text[at..].find('{').map(|offset| at + offset) {
+        at = open + 1;
+        let name_length = text[at..]
+            .find(|c: char| !c.is_ascii_alphanumeric() && c != '-')
+            .unwrap_or(text.len() - at);
+        let close = at + name_length;
+        if name_length > 0 && text[close..].starts_with('}') && !text[..open].ends_with('$') {
+            found.push((open..close + 1, &text[at..close]));
+            at = close + 1;
+        }
+    }
+    found
+}
+
+/// Fills placeholders. One without a value becomes nothing: the test did not hand that parameter over, and
+/// that the name exists was checked when the profile was read.
+pub fn fill(text: &str, values: &BTreeMap<String, String>, write: impl Fn(&str) -> String) -> String {
+    let mut filled = String::with_capacity(text.len());
+    let mut done = 0;
+    for (range, name) in placeholders(text) {
+        filled.push_str(&text[done..range.start]);
+        filled.push_str(&values.get(name).map(|value| write(value)).unwrap_or_default());
+        done = range.end;
+    }
+    filled.push_str(&text[done..]);
+    filled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(pairs: &[(&str, &str)]) -> BTreeMap<String, String> {
+        pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect()
+    }
+
+    #[test]
+    fn names_are_unique_for_a_role_and_documented() {
+        for (at, hook) in HOOKS.iter().enumerate() {
+            assert!(HOOKS[at + 1..].iter().all(|other| (other.name, other.role) != (hook.name, hook.role)));
+            assert!(hook.doc.ends_with('.'), "{}", hook.name);
+        }
+    }
+
+    #[test]
+    fn a_value_of_the_device_stays_one_argument() {
+        let hook = HookAction::Run(vec!["./power".into(), "--serial={serial-number}".into()]);
+        let filled = hook.filled(&values(&[("serial-number", "x; rm -rf $HOME {mode}")]));
+        assert_eq!(
+            filled,
+            HookAction::Run(vec!["./power".into(), "--serial=x; rm -rf $HOME {mode}".into()])
+        );
+    }
+
+    #[test]
+    fn a_value_cannot_leave_its_place_in_an_address_or_in_json() {
+        let hook = HookAction::Http {
+            method: "POST".into(),
+            url: "http://bench/mode/{mode}".into(),
+            body: Some(r#"{"mode": "{mode}", "by": "${mode}"}"#.into()),
+        };
+        let HookAction::Http { url, body, .. } = hook.filled(&values(&[("mode", "a\"/?b")])) else {
+            panic!("still a request");
+        };
+        assert_eq!(url, "http://bench/mode/a%22%2F%3Fb");
+        assert_eq!(body.as_deref(), Some(r#"{"mode": "a\"/?b", "by": "${mode}"}"#));
+    }
+
+    #[test]
+    fn braces_of_json_and_shell_are_no_placeholders() {
+        let names: Vec<_> = placeholders(r#"{"a": {}} ${HOME} {x} {y z} {"#).into_iter().map(|(_, name)| name).collect();
+        assert_eq!(names, ["x"]);
+    }
+}

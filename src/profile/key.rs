@@ -1,0 +1,204 @@
+//! The settings that have one value each: their names and what a value may be. Everything else about them
+//! (unknown keys, environment variables, flags, merging, the list of effective values) follows from here.
+
+use super::time;
+
+/// One setting.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    /// Section and name, such as `bench.listen`.
+    pub path: &'static str,
+    /// What a value may be.
+    pub kind: Kind,
+}
+
+/// What a value may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Any text but none.
+    Text,
+    /// A level of an MQTT topic.
+    Level,
+    /// One of these words.
+    Word(&'static [&'static str]),
+    /// `true` or `false`.
+    Flag,
+    /// `5 s`.
+    Duration,
+    /// Metres per second.
+    Speed,
+    /// A file, relative to the file it is written in.
+    File,
+    /// Several files.
+    Files,
+    /// `host:port`.
+    Address,
+    /// `mqtt://host:port` or `mqtts://host:port`.
+    Broker,
+    /// A topic prefix with placeholders.
+    Template,
+    /// A version, such as `1.2`; whether it is known is for the caller to say.
+    Version,
+    /// A program and its arguments, as a list or as one line.
+    Command,
+    /// Statements about capabilities.
+    Claims,
+    /// Several names.
+    Names,
+}
+
+/// Placeholders of [`Kind::Template`].
+pub const TEMPLATE_PLACEHOLDERS: &[&str] = &["majorVersion", "manufacturer", "serialNumber"];
+
+/// Placeholders of `device.command`, also known to every hook.
+pub const COMMON_PLACEHOLDERS: &[&str] = &["broker-host", "broker-port", "manufacturer", "serial-number"];
+
+/// Something a vehicle is like that no message says; `needs: profile NAME` of a test asks for it.
+#[derive(Clone, Copy, Debug)]
+pub struct Statement {
+    /// Name, as in `[device]`.
+    pub name: &'static str,
+    /// What it means.
+    pub doc: &'static str,
+}
+
+/// Every statement there is.
+pub const STATEMENTS: &[Statement] = &[
+    Statement {
+        name: "stops-between-nodes",
+        doc: "The vehicle can stop, and end a cancelled order, between two nodes.",
+    },
+    Statement {
+        name: "node-bound",
+        doc: "The vehicle can stop on nodes only and drives on to the next one.",
+    },
+    Statement {
+        name: "interruptible-actions",
+        doc: "The vehicle has an action that can be interrupted while it is running.",
+    },
+    Statement {
+        name: "uninterruptible-actions",
+        doc: "The vehicle has an action that cannot be interrupted while it is running.",
+    },
+    Statement {
+        name: "line-guided",
+        doc: "The vehicle follows a physical or virtual line and may have no coordinates.",
+    },
+    Statement {
+        name: "free-navigation",
+        doc: "The vehicle plans its own way between two nodes.",
+    },
+    Statement {
+        name: "carries-load",
+        doc: "The vehicle carries loads, and one may be put on it during the run.",
+    },
+    Statement {
+        name: "charges",
+        doc: "The vehicle can charge on the course.",
+    },
+];
+
+const fn key(path: &'static str, kind: Kind) -> Key {
+    Key { path, kind }
+}
+
+/// Every setting there is, in the order of the sections.
+pub const KEYS: &[Key] = &[
+    key("device.role", Kind::Word(&["agv", "master-control"])),
+    key("device.manufacturer", Kind::Level),
+    key("device.serial-number", Kind::Level),
+    key("device.protocol", Kind::Version),
+    key("device.topic-template", Kind::Template),
+    key("device.command", Kind::Command),
+    key("device.stops-between-nodes", Kind::Flag),
+    key("device.node-bound", Kind::Flag),
+    key("device.interruptible-actions", Kind::Flag),
+    key("device.uninterruptible-actions", Kind::Flag),
+    key("device.line-guided", Kind::Flag),
+    key("device.free-navigation", Kind::Flag),
+    key("device.carries-load", Kind::Flag),
+    key("device.charges", Kind::Flag),
+    key("device.claims", Kind::Claims),
+    key("bench.listen", Kind::Address),
+    key("bench.tap", Kind::Flag),
+    key("bench.broker", Kind::Broker),
+    key("bench.maps-listen", Kind::Address),
+    key("bench.maps-host", Kind::Text),
+    key("bench.tls-cert", Kind::File),
+    key("bench.tls-key", Kind::File),
+    key("bench.tls-ca", Kind::File),
+    key("bench.username", Kind::Text),
+    key("bench.password-env", Kind::Text),
+    key("bench.password-file", Kind::File),
+    key("motion.allowed", Kind::Flag),
+    key("motion.max-speed", Kind::Speed),
+    key("layout.lif", Kind::File),
+    key("layout.vehicle-type", Kind::Text),
+    key("layout.allow-list", Kind::Names),
+    key("time.react", Kind::Duration),
+    key("time.slow", Kind::Duration),
+    key("time.event", Kind::Duration),
+    key("time.event-warning", Kind::Duration),
+    key("time.state-period", Kind::Duration),
+    key("time.drive", Kind::Duration),
+    key("time.download", Kind::Duration),
+    key("time.connect", Kind::Duration),
+    key("time.reconnect", Kind::Duration),
+    key("time.will", Kind::Duration),
+    key("time.quiet", Kind::Duration),
+    key("time.settle", Kind::Duration),
+    key("time.broker", Kind::Duration),
+    key("maps.files", Kind::Files),
+];
+
+/// The environment variable that holds a password unless `password-env` names another.
+pub const PASSWORD_VARIABLE: &str = "VDA5050_TCK_PASSWORD";
+
+impl Key {
+    /// The key at a path.
+    #[must_use]
+    pub fn find(path: &str) -> Option<&'static Self> {
+        KEYS.iter().find(|key| key.path == path)
+    }
+
+    /// The environment variable that sets it.
+    #[must_use]
+    pub fn variable(&self) -> String {
+        format!("VDA5050_TCK_{}", self.path.replace(['.', '-'], "_").to_uppercase())
+    }
+}
+
+impl Kind {
+    /// What is allowed, for a hint.
+    #[must_use]
+    pub fn hint(self) -> String {
+        match self {
+            Self::Text => "a text, such as \"ACME\"".to_owned(),
+            Self::Level => "a text without `/`, `+` and `#`, because it is a level of a topic".to_owned(),
+            Self::Word(words) => format!(
+                "one of {}",
+                words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
+            ),
+            Self::Flag => "true or false".to_owned(),
+            Self::Duration => format!(
+                "a duration such as \"800 ms\", \"{}\" or \"2 min\"",
+                time::show(std::time::Duration::from_secs(5))
+            ),
+            Self::Speed => "a speed in m/s above 0, such as 0.5".to_owned(),
+            Self::File => "the path of a file, relative to this one".to_owned(),
+            Self::Files => "a list of files, such as [\"hall.map\"]".to_owned(),
+            Self::Address => "host and port, such as \"127.0.0.1:1883\"".to_owned(),
+            Self::Broker => "an address such as \"mqtt://host:1883\" or \"mqtts://host:8883\"".to_owned(),
+            Self::Template => format!(
+                "levels of a topic; the topic name is added as the last one. Placeholders: {}",
+                TEMPLATE_PLACEHOLDERS.iter().map(|name| format!("{{{name}}}")).collect::<Vec<_>>().join(" ")
+            ),
+            Self::Version => "a text such as \"1.2\" or \"1.2.3\"".to_owned(),
+            Self::Command => "a list such as [\"./agv\", \"--broker\", \"{broker-host}:{broker-port}\"]".to_owned(),
+            Self::Claims => "a list of texts such as \"action pick NODE\", \"no action drop\", \"optional PATH\", \
+                             \"limit NAME = 10\", or names of statements"
+                .to_owned(),
+            Self::Names => "a list of names, such as [\"n1\", \"n2\"]".to_owned(),
+        }
+    }
+}
