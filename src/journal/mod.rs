@@ -4,8 +4,12 @@
 //! them through as JSON Lines and reads them back. What the records *mean* is left to the judge.
 
 pub mod event;
+mod fault;
 pub mod file;
 pub mod json;
+mod packet;
+mod payload;
+mod plan;
 
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};

@@ -323,7 +323,7 @@ mod tests {
                 .all()
                 .filter(|requirement| requirement.in_version(oldest).is_some())
                 .count(),
-            297
+            299
         );
         let retained = catalogue.get("CONN-06").expect("retain");
         assert_eq!(retained.in_version(oldest).expect("older").mood, Mood::Should);

@@ -21,7 +21,14 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             return Ok(Err(format!("no device connected within {} s", patience.as_secs())));
         }
         let begun = self.engine.recorder.journal().entries().len() as u64;
-        let has_state = |recorder: &Recorder| recorder.judge().timeline().of("state").iter().any(|entry| !is_stale(entry));
+        let has_state = |recorder: &Recorder| {
+            recorder
+                .judge()
+                .timeline()
+                .of("state")
+                .iter()
+                .any(|entry| !is_stale(entry))
+        };
         let until = self.engine.link.now().moment + self.time("statePeriod");
         if !self.engine.watch(until, has_state).await? {
             let why = format!(
@@ -35,22 +42,42 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     }
 
     async fn factsheet(&mut self) -> Result<(), EngineError> {
-        let has_sheet = |recorder: &Recorder| recorder.judge().timeline().of("factsheet").iter().any(|entry| entry.json().is_some());
+        let has_sheet = |recorder: &Recorder| {
+            recorder
+                .judge()
+                .timeline()
+                .of("factsheet")
+                .iter()
+                .any(|entry| entry.json().is_some())
+        };
         let until = self.engine.link.now().moment + self.time("settle");
         let mut found = self.engine.watch(until, has_sheet).await?;
         let ground = self.engine.recorder.judge().ground();
-        if let Some(request) = ground.pack.word("action.factsheetRequest").map(str::to_owned).filter(|_| !found) {
+        if let Some(request) = ground
+            .pack
+            .word("action.factsheetRequest")
+            .map(str::to_owned)
+            .filter(|_| !found)
+        {
             self.instant_action(&request).await?;
             let until = self.engine.link.now().moment + self.time("react");
             found = self.engine.watch(until, has_sheet).await?;
         }
         if !found {
-            self.setup
-                .limits
-                .push("The device published no factsheet, so what it can do is only known from the profile.".to_owned());
+            self.setup.limits.push(
+                "The device published no factsheet, so what it can do is only known from the profile.".to_owned(),
+            );
             return Ok(());
         }
-        let sheet = self.engine.recorder.judge().timeline().of("factsheet").iter().rev().find_map(|entry| entry.json().cloned());
+        let sheet = self
+            .engine
+            .recorder
+            .judge()
+            .timeline()
+            .of("factsheet")
+            .iter()
+            .rev()
+            .find_map(|entry| entry.json().cloned());
         if let Some(sheet) = sheet {
             self.engine.note(Event::Bound {
                 name: "device.factsheet".to_owned(),
@@ -68,11 +95,16 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             "actionType": action_type, "actionId": id, "blockingType": "HARD", "actionParameters": [],
         }] });
         let now = self.engine.link.now();
-        let message = self.engine.composer.plain("instantActions", members, self.engine.recorder.judge().ground(), now);
+        let message = self
+            .engine
+            .composer
+            .plain("instantActions", members, self.engine.recorder.judge().ground(), now);
         match message {
             Ok(message) => self.engine.publish(message).await,
             Err(error) => {
-                self.engine.note(Event::Trouble { text: error.to_string() })?;
+                self.engine.note(Event::Trouble {
+                    text: error.to_string(),
+                })?;
                 Ok(())
             }
         }
@@ -81,7 +113,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     /// A time limit of the profile.
     pub(super) fn time(&self, name: &str) -> Duration {
         let times = self.engine.recorder.judge().ground().bindings.get("time");
-        let millis = times.and_then(|times| times.get(name)).and_then(serde_json::Value::as_u64);
+        let millis = times
+            .and_then(|times| times.get(name))
+            .and_then(serde_json::Value::as_u64);
         Duration::from_millis(millis.unwrap_or(31_000))
     }
 }

@@ -23,15 +23,29 @@ impl Presence {
                     Event::Packet { connection, .. } | Event::Closed { connection, .. } => Some(*connection),
                     _ => None,
                 };
-                let last = judge.timeline().of("mqtt/connect").last().and_then(|entry| connection(entry));
-                let closed = |number: u64| judge.timeline().of("mqtt/closed").iter().any(|entry| connection(entry) == Some(number));
+                let last = judge
+                    .timeline()
+                    .of("mqtt/connect")
+                    .last()
+                    .and_then(|entry| connection(entry));
+                let closed = |number: u64| {
+                    judge
+                        .timeline()
+                        .of("mqtt/closed")
+                        .iter()
+                        .any(|entry| connection(entry) == Some(number))
+                };
                 last.is_some_and(|number| !closed(number))
             }
             Vantage::Subscriber => {
                 let said = judge.timeline().of("connection").last();
                 let online = judge.ground().pack.word("connection.online");
                 let state = said.and_then(|entry| entry.json()?.get("connectionState")?.as_str());
-                let fresh = judge.timeline().of("state").last().is_some_and(|entry| !is_stale(entry));
+                let fresh = judge
+                    .timeline()
+                    .of("state")
+                    .last()
+                    .is_some_and(|entry| !is_stale(entry));
                 if said.is_some() { state == online } else { fresh }
             }
         };
@@ -72,17 +86,26 @@ pub(super) async fn settle_link<L: Link, O: Operator>(session: &mut Session<'_, 
 
 /// Waits for a device that is gone, with the help of the `power-cycle` hook if there is one. Gives the
 /// reason when it stays away.
-pub(super) async fn revive<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Result<Option<String>, EngineError> {
+pub(super) async fn revive<L: Link, O: Operator>(
+    session: &mut Session<'_, L, O>,
+) -> Result<Option<String>, EngineError> {
     let vantage = session.setup.capabilities.vantage;
     let there = move |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
     let has_hook = session.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
     // A device that comes back by itself is given the chance before it is switched off and on.
-    let first = if has_hook { session.time("settle") } else { session.time("reconnect") };
+    let first = if has_hook {
+        session.time("settle")
+    } else {
+        session.time("reconnect")
+    };
     let until = session.engine.link.now().moment + first;
     if session.engine.watch(until, there).await? {
         return Ok(None);
     }
-    let mut why = format!("the device is gone: it did not come back within {} s", session.time("reconnect").as_secs());
+    let mut why = format!(
+        "the device is gone: it did not come back within {} s",
+        session.time("reconnect").as_secs()
+    );
     if has_hook {
         let sent = last_sent(session.engine.recorder.judge(), &session.engine.recorder);
         session.engine.note(Event::Note {
@@ -104,7 +127,12 @@ pub(super) async fn revive<L: Link, O: Operator>(session: &mut Session<'_, L, O>
 }
 
 fn last_sent(_judge: &RunJudge, recorder: &Recorder) -> String {
-    let sent = recorder.journal().entries().iter().rev().find(|entry| matches!(entry.event(), Event::Sent { .. }));
+    let sent = recorder
+        .journal()
+        .entries()
+        .iter()
+        .rev()
+        .find(|entry| matches!(entry.event(), Event::Sent { .. }));
     sent.map_or_else(|| "none".to_owned(), |entry| format!("#{}", entry.seq()))
 }
 

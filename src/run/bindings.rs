@@ -14,8 +14,16 @@ const WILL_MARGIN: u64 = 3_000;
 
 /// Where the vehicle stands, as its last state says.
 pub(super) fn standing(judge: &RunJudge, layout: &Layout) -> Option<Standing> {
-    let state = judge.timeline().of("state").iter().rev().find_map(|entry| entry.json())?;
-    let node = state.get("lastNodeId").and_then(Value::as_str).filter(|id| !id.is_empty());
+    let state = judge
+        .timeline()
+        .of("state")
+        .iter()
+        .rev()
+        .find_map(|entry| entry.json())?;
+    let node = state
+        .get("lastNodeId")
+        .and_then(Value::as_str)
+        .filter(|id| !id.is_empty());
     if let Some(node) = node.filter(|id| layout.node(id).is_some()) {
         return Some(Standing::Node(node.to_owned()));
     }
@@ -35,12 +43,20 @@ pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) 
     }
     let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
     let standing = standing(judge, layout).ok_or("the vehicle does not say where it stands")?;
-    let course = layout.assign(&test.course, &standing).map_err(|error| error.to_string())?;
+    let course = layout
+        .assign(&test.course, &standing)
+        .map_err(|error| error.to_string())?;
     Ok(Some(course.bindings()))
 }
 
 /// The variables only this test has.
-pub(super) fn own_bindings(test: &Test, course: Option<Value>, judge: &RunJudge, run: &str, number: usize) -> Map<String, Value> {
+pub(super) fn own_bindings(
+    test: &Test,
+    course: Option<Value>,
+    judge: &RunJudge,
+    run: &str,
+    number: usize,
+) -> Map<String, Value> {
     let mut own = Map::new();
     own.extend(course.map(|course| ("course".to_owned(), course)));
     let ids = fresh_names(test).into_iter().map(|name| {
@@ -75,7 +91,10 @@ fn fresh_names(test: &Test) -> BTreeSet<String> {
     texts.dedup();
     for text in texts {
         for rest in text.split("${run.").skip(1) {
-            let name: String = rest.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
+            let name: String = rest
+                .chars()
+                .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
+                .collect();
             if !name.is_empty() {
                 names.insert(name);
             }

@@ -28,7 +28,13 @@ pub struct Bundle {
 
 impl Bundle {
     /// Makes `reports/<manufacturer>-<serial>/<utc>-<id>/`.
-    pub fn create(reports: &Path, manufacturer: &str, serial_number: &str, utc: jiff::Timestamp, run: &str) -> Result<Self, BundleError> {
+    pub fn create(
+        reports: &Path,
+        manufacturer: &str,
+        serial_number: &str,
+        utc: jiff::Timestamp,
+        run: &str,
+    ) -> Result<Self, BundleError> {
         let device = safe(&format!("{manufacturer}-{serial_number}"));
         let begun = utc.strftime("%Y%m%dT%H%M%SZ").to_string();
         let folder = reports.join(device).join(format!("{begun}-{}", safe(run)));
@@ -62,7 +68,13 @@ impl Bundle {
 
 /// A name of a device as part of a path: whatever it holds, it stays one folder.
 fn safe(name: &str) -> String {
-    let kept = name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '_' });
+    let kept = name.chars().map(|c| {
+        if c.is_ascii_alphanumeric() || "-_".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    });
     let kept: String = kept.take(100).collect();
     if kept.is_empty() { "device".to_owned() } else { kept }
 }
@@ -74,8 +86,12 @@ mod tests {
     #[test]
     fn a_hostile_name_stays_one_folder() {
         let root = tempfile::tempdir().expect("folder");
-        let bundle = Bundle::create(root.path(), "../../x", "/etc\0", jiff::Timestamp::UNIX_EPOCH, "r").expect("bundle");
+        let bundle =
+            Bundle::create(root.path(), "../../x", "/etc\0", jiff::Timestamp::UNIX_EPOCH, "r").expect("bundle");
         assert!(bundle.folder().starts_with(root.path()));
-        assert_eq!(bundle.folder().components().count(), root.path().components().count() + 2);
+        assert_eq!(
+            bundle.folder().components().count(),
+            root.path().components().count() + 2
+        );
     }
 }

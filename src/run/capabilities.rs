@@ -35,10 +35,14 @@ impl Capabilities {
     #[must_use]
     pub fn gate(&self, test: &Test) -> Gate {
         let mut open = None;
-        let hooks = test.sections().into_iter().flat_map(|(_, steps)| steps).filter_map(|step| match &step.verb {
-            Verb::Operator(operator) => Some(Need::Hook(operator.hook.clone())),
-            _ => None,
-        });
+        let hooks = test
+            .sections()
+            .into_iter()
+            .flat_map(|(_, steps)| steps)
+            .filter_map(|step| match &step.verb {
+                Verb::Operator(operator) => Some(Need::Hook(operator.hook.clone())),
+                _ => None,
+            });
         for need in test.needs.iter().cloned().chain(hooks) {
             match self.has(&need) {
                 Gate::Runs => {}
@@ -69,12 +73,18 @@ impl Capabilities {
                 Some(false) => Gate::NotApplicable(format!("the profile says that the device is not `{name}`")),
                 None => Gate::Unobservable(format!("the profile does not say whether the device is `{name}`")),
             },
-            Need::Action { name, scope } => self.declared(&action_name(name, scope.as_deref()), |sheet| has_action(sheet, name, scope.as_deref())),
-            Need::NoAction(name) => reverse(self.declared(&action_name(name, None), |sheet| has_action(sheet, name, None)), name),
+            Need::Action { name, scope } => self.declared(&action_name(name, scope.as_deref()), |sheet| {
+                has_action(sheet, name, scope.as_deref())
+            }),
+            Need::NoAction(name) => reverse(
+                self.declared(&action_name(name, None), |sheet| has_action(sheet, name, None)),
+                name,
+            ),
             Need::Optional(path) => self.declared(&format!("optional {path}"), |sheet| has_optional(sheet, path)),
-            Need::NoOptional(path) => {
-                reverse(self.declared(&format!("optional {path}"), |sheet| has_optional(sheet, path)), path)
-            }
+            Need::NoOptional(path) => reverse(
+                self.declared(&format!("optional {path}"), |sheet| has_optional(sheet, path)),
+                path,
+            ),
             Need::Limit(path) => self.declared(&format!("limit {path}"), |sheet| has_limit(sheet, path)),
         }
     }
@@ -98,15 +108,29 @@ impl Capabilities {
     #[must_use]
     pub fn list(&self) -> Vec<Capability> {
         let mut all = BTreeMap::new();
-        let entries = self.factsheet.iter().filter_map(|sheet| sheet.pointer("/protocolFeatures/agvActions")?.as_array());
+        let entries = self
+            .factsheet
+            .iter()
+            .filter_map(|sheet| sheet.pointer("/protocolFeatures/agvActions")?.as_array());
         for action in entries.flatten() {
             let name = action.get("actionType").and_then(Value::as_str).unwrap_or("?");
-            for scope in action.get("actionScopes").and_then(Value::as_array).into_iter().flatten() {
+            for scope in action
+                .get("actionScopes")
+                .and_then(Value::as_array)
+                .into_iter()
+                .flatten()
+            {
                 let scope = scope.as_str().unwrap_or("?");
-                all.insert(action_name(name, Some(scope)), ("yes".to_owned(), "factsheet".to_owned()));
+                all.insert(
+                    action_name(name, Some(scope)),
+                    ("yes".to_owned(), "factsheet".to_owned()),
+                );
             }
         }
-        let optional = self.factsheet.iter().filter_map(|sheet| sheet.pointer("/protocolFeatures/optionalParameters")?.as_array());
+        let optional = self
+            .factsheet
+            .iter()
+            .filter_map(|sheet| sheet.pointer("/protocolFeatures/optionalParameters")?.as_array());
         for parameter in optional.flatten() {
             let name = parameter.get("parameter").and_then(Value::as_str).unwrap_or("?");
             let support = parameter.get("support").and_then(Value::as_str).unwrap_or("?");
@@ -147,13 +171,19 @@ fn has_action(sheet: &Value, name: &str, scope: Option<&str>) -> bool {
 }
 
 fn has_optional(sheet: &Value, path: &str) -> bool {
-    let all = sheet.pointer("/protocolFeatures/optionalParameters").and_then(Value::as_array);
-    all.into_iter().flatten().any(|one| one.get("parameter").and_then(Value::as_str) == Some(path))
+    let all = sheet
+        .pointer("/protocolFeatures/optionalParameters")
+        .and_then(Value::as_array);
+    all.into_iter()
+        .flatten()
+        .any(|one| one.get("parameter").and_then(Value::as_str) == Some(path))
 }
 
 /// `maxArrayLens.order.nodes`: a group of `protocolLimits` and a member whose name has dots in it.
 fn has_limit(sheet: &Value, path: &str) -> bool {
-    let Some(limits) = sheet.get("protocolLimits") else { return false };
+    let Some(limits) = sheet.get("protocolLimits") else {
+        return false;
+    };
     let (group, member) = path.split_once('.').unwrap_or((path, ""));
     let value = limits.get(group).and_then(|group| group.get(member));
     value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0)
@@ -195,19 +225,40 @@ mod tests {
         let known = capabilities(Some(sheet()));
         assert_eq!(known.has(&action(Some("NODE"))), Gate::Runs);
         assert!(matches!(known.has(&action(Some("EDGE"))), Gate::NotApplicable(_)));
-        assert_eq!(known.has(&Need::Optional("order.edges.trajectory".to_owned())), Gate::Runs);
-        assert!(matches!(known.has(&Need::NoOptional("order.edges.trajectory".to_owned())), Gate::NotApplicable(_)));
-        assert_eq!(known.has(&Need::Limit("maxArrayLens.order.nodes".to_owned())), Gate::Runs);
-        assert!(matches!(known.has(&Need::Limit("maxArrayLens.order.edges".to_owned())), Gate::NotApplicable(_)));
+        assert_eq!(
+            known.has(&Need::Optional("order.edges.trajectory".to_owned())),
+            Gate::Runs
+        );
+        assert!(matches!(
+            known.has(&Need::NoOptional("order.edges.trajectory".to_owned())),
+            Gate::NotApplicable(_)
+        ));
+        assert_eq!(
+            known.has(&Need::Limit("maxArrayLens.order.nodes".to_owned())),
+            Gate::Runs
+        );
+        assert!(matches!(
+            known.has(&Need::Limit("maxArrayLens.order.edges".to_owned())),
+            Gate::NotApplicable(_)
+        ));
     }
 
     #[test]
     fn what_nobody_says_is_open_and_not_absent() {
         let unknown = capabilities(None);
         assert!(matches!(unknown.has(&action(None)), Gate::Unobservable(_)));
-        assert!(matches!(unknown.has(&Need::NoAction("pick".to_owned())), Gate::Unobservable(_)));
-        assert!(matches!(unknown.has(&Need::Profile("stops-between-nodes".to_owned())), Gate::Unobservable(_)));
-        assert!(matches!(unknown.has(&Need::Profile("node-bound".to_owned())), Gate::NotApplicable(_)));
+        assert!(matches!(
+            unknown.has(&Need::NoAction("pick".to_owned())),
+            Gate::Unobservable(_)
+        ));
+        assert!(matches!(
+            unknown.has(&Need::Profile("stops-between-nodes".to_owned())),
+            Gate::Unobservable(_)
+        ));
+        assert!(matches!(
+            unknown.has(&Need::Profile("node-bound".to_owned())),
+            Gate::NotApplicable(_)
+        ));
         assert!(matches!(unknown.has(&Need::Tap), Gate::Unobservable(_)));
     }
 }

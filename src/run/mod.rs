@@ -9,8 +9,18 @@ mod bindings;
 mod bundle;
 pub mod capabilities;
 pub mod device_peer;
+mod header;
+mod library;
+mod qualify;
+mod reference_agv;
 mod session;
+mod virtual_run;
 
 pub use bundle::{Bundle, BundleError};
 pub use capabilities::Capabilities;
+pub use header::{HeaderParts, Subject, tool};
+pub use library::Library;
+pub use qualify::{Decider, Kill, Qualification, decided, qualify};
+pub use reference_agv::ReferenceAgv;
 pub use session::{End, Progress, Setup, run};
+pub use virtual_run::{Finished, Silent, VirtualRun, run_silently, run_virtually};

@@ -105,7 +105,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
 
     async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
         if let Err(why) = self.admit().await? {
-            let end = if self.engine.interrupted() { End::Interrupted } else { End::NoDevice(why.clone()) };
+            let end = if self.engine.interrupted() {
+                End::Interrupted
+            } else {
+                End::NoDevice(why.clone())
+            };
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
                 gate: Gate::Unobservable(why.clone()),
@@ -148,7 +152,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
                 Ok(own) => {
                     self.progress.test_begun(test, number, runs);
-                    self.engine.run_test(test, own, &mut AsWatcher(&mut *self.progress)).await?;
+                    self.engine
+                        .run_test(test, own, &mut AsWatcher(&mut *self.progress))
+                        .await?;
                     if let Some(result) = self.engine.recorder.judge().done().last() {
                         self.progress.test_ended(result);
                     }
@@ -165,7 +171,12 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     }
 
     fn plan(&self, tests: Vec<PlannedTest>) -> Plan {
-        let series = self.setup.capabilities.factsheet.as_ref().and_then(|sheet| sheet.pointer("/typeSpecification/seriesName"));
+        let series = self
+            .setup
+            .capabilities
+            .factsheet
+            .as_ref()
+            .and_then(|sheet| sheet.pointer("/typeSpecification/seriesName"));
         let mut limits = self.setup.limits.clone();
         limits.extend(self.halted.clone());
         if !self.setup.complete {
@@ -176,7 +187,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             capabilities: self.setup.capabilities.list(),
             limits,
             deviations: self.setup.deviations.clone(),
-            series_name: series.and_then(Value::as_str).map(|name| name.chars().take(200).collect()),
+            series_name: series
+                .and_then(Value::as_str)
+                .map(|name| name.chars().take(200).collect()),
             complete: self.setup.complete,
         }
     }
@@ -208,7 +221,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
         settle_link(self).await?;
         self.engine.drain().await?;
-        if is_idle(self.engine.recorder.judge()) || !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there() {
+        if is_idle(self.engine.recorder.judge())
+            || !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there()
+        {
             return Ok(());
         }
         if !recover(self).await? {

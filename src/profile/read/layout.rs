@@ -55,13 +55,23 @@ impl Reader<'_> {
         for (at, node) in list.nodes.iter().enumerate() {
             if ids[..at].contains(&node.id.as_str()) {
                 let title = format!("there are two nodes `{}`", node.id);
-                wrong.push(Diagnostic::new("duplicate-node", node.span.clone(), title, "the second one"));
+                wrong.push(Diagnostic::new(
+                    "duplicate-node",
+                    node.span.clone(),
+                    title,
+                    "the second one",
+                ));
             }
         }
         for (at, edge) in list.edges.iter().enumerate() {
             if list.edges[..at].iter().any(|other| other.id == edge.id) {
                 let title = format!("there are two edges `{}`", edge.id);
-                wrong.push(Diagnostic::new("duplicate-edge", edge.span.clone(), title, "the second one"));
+                wrong.push(Diagnostic::new(
+                    "duplicate-edge",
+                    edge.span.clone(),
+                    title,
+                    "the second one",
+                ));
             }
             for end in [&edge.start, &edge.end] {
                 if !ids.contains(&end.as_str()) {

@@ -1,0 +1,108 @@
+//! The first record of a journal: what the run is about.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value, json};
+
+use crate::journal::event::{RunHeader, Setting};
+use crate::link::Vantage;
+use crate::pack::{Pack, Role};
+
+/// Format of the journal.
+pub const JOURNAL_FORMAT: &str = "vda5050-tck.journal/1";
+
+/// Who is judged, and by what.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// Which side it is.
+    pub role: Role,
+    /// Manufacturer as in topics and headers.
+    pub manufacturer: String,
+    /// Serial number as in topics and headers.
+    pub serial_number: String,
+    /// How its topics are built; the pack's own way unless said.
+    pub topic_template: Option<String>,
+}
+
+impl Subject {
+    /// Full topic by topic name.
+    #[must_use]
+    pub fn topics(&self, pack: &Pack) -> BTreeMap<String, String> {
+        let template = self.topic_template.as_deref().unwrap_or_else(|| pack.topic_template());
+        let full = |name: &str| pack.fill_topic(template, &self.manufacturer, &self.serial_number, name);
+        pack.topics()
+            .iter()
+            .map(|rule| (rule.name.as_str().to_owned(), full(rule.name.as_str())))
+            .collect()
+    }
+
+    /// The topics the device publishes.
+    #[must_use]
+    pub fn published(&self, pack: &Pack) -> Vec<String> {
+        let topics = self.topics(pack);
+        let own = pack.topics().iter().filter(|rule| rule.publisher == self.role);
+        own.filter_map(|rule| topics.get(rule.name.as_str()).cloned()).collect()
+    }
+}
+
+/// Name and version of this program.
+#[must_use]
+pub fn tool() -> String {
+    format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
+}
+
+/// Makes the header of a run.
+pub struct HeaderParts<'a> {
+    /// Who is judged.
+    pub subject: &'a Subject,
+    /// The protocol version.
+    pub pack: &'a Pack,
+    /// Identifier of the run.
+    pub run: &'a str,
+    /// From where the harness sees.
+    pub vantage: Vantage,
+    /// SHA-256 over suites, schemas and requirements.
+    pub suites: &'a str,
+    /// Whether the suites differ from the built-in ones.
+    pub modified: bool,
+    /// `time.*` in milliseconds.
+    pub time: Map<String, Value>,
+    /// `device.*` beside identity and factsheet.
+    pub device: Map<String, Value>,
+    /// Effective settings.
+    pub settings: Vec<Setting>,
+    /// The command line.
+    pub command: Vec<String>,
+}
+
+impl HeaderParts<'_> {
+    /// The header.
+    #[must_use]
+    pub fn header(self) -> RunHeader {
+        let mut device = self.device;
+        device.insert("manufacturer".to_owned(), json!(self.subject.manufacturer));
+        device.insert("serialNumber".to_owned(), json!(self.subject.serial_number));
+        let mut bindings = Map::new();
+        bindings.insert("time".to_owned(), Value::Object(self.time));
+        bindings.insert("device".to_owned(), Value::Object(device));
+        RunHeader {
+            format: JOURNAL_FORMAT.to_owned(),
+            tool: tool(),
+            run: self.run.to_owned(),
+            role: self.subject.role.word().to_owned(),
+            protocol: self.pack.version.to_string(),
+            manufacturer: self.subject.manufacturer.clone(),
+            serial_number: self.subject.serial_number.clone(),
+            topics: self.subject.topics(self.pack),
+            vantage: match self.vantage {
+                Vantage::Tap => "tap".to_owned(),
+                Vantage::Subscriber => "subscriber".to_owned(),
+            },
+            suites: self.suites.to_owned(),
+            modified: self.modified,
+            bindings,
+            settings: self.settings,
+            command: self.command,
+        }
+    }
+}

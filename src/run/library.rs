@@ -1,0 +1,74 @@
+//! Everything that is data: packs, catalogue, suites; loaded once per process.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::checks;
+use crate::diagnostic::Diagnostic;
+use crate::judge::Rules;
+use crate::pack::{Assets, Catalogue, Packs, Role};
+use crate::suite::model::Test;
+use crate::suite::{CheckInfo, Suites};
+
+/// The loaded data.
+pub struct Library {
+    /// The files.
+    pub assets: Assets,
+    /// What a run is judged by.
+    pub rules: Rules,
+}
+
+impl Library {
+    /// Loads the embedded files, or those of `suites` in place of the embedded suites.
+    ///
+    /// # Errors
+    /// Every mistake in them.
+    pub fn load(suites: Option<&Path>) -> Result<Self, Vec<Diagnostic>> {
+        let assets = match suites {
+            None => Assets::embedded(),
+            Some(folder) => Assets::with_suites(folder).map_err(|error| {
+                let title = format!("the suites in {} cannot be read: {error}", folder.display());
+                vec![Diagnostic::whole("unreadable", title).hint("give a folder that is laid out like `suites/`")]
+            })?,
+        };
+        let packs = Packs::load(&assets).map_err(|error| vec![Diagnostic::whole("pack", error.to_string())])?;
+        let catalogue = Catalogue::load(&assets)?;
+        let checks: Vec<CheckInfo> = checks::registry()
+            .iter()
+            .map(|check| CheckInfo {
+                name: check.name,
+                decides: check.decides,
+                arguments: check.arguments,
+            })
+            .collect();
+        let suites = Suites::load(&assets, &packs, &catalogue, &checks)?;
+        let sha256 = assets.sha256().to_owned();
+        Ok(Self {
+            assets,
+            rules: Rules {
+                packs: Arc::new(packs),
+                catalogue: Arc::new(catalogue),
+                suites: Arc::new(suites),
+                sha256,
+            },
+        })
+    }
+
+    /// The tests of a role for a protocol version that decide at least one requirement of it, by id.
+    pub fn tests(&self, role: Role, protocol: &str) -> Vec<Arc<Test>> {
+        let Some(pack) = self.rules.packs.get(protocol) else {
+            return Vec::new();
+        };
+        let decides = |test: &Test| {
+            test.requirements().iter().any(|id| {
+                let requirement = self.rules.catalogue.get(id.as_str());
+                requirement.is_some_and(|requirement| requirement.in_version(pack).is_some())
+            })
+        };
+        let tests = self.rules.suites.tests.iter();
+        tests
+            .filter(|test| test.device == role && test.spec.contains(pack.version) && decides(test))
+            .cloned()
+            .collect()
+    }
+}

@@ -1,0 +1,228 @@
+//! Proof of every check: it passes on the faultless reference device, and a named fault makes it fail.
+//!
+//! Qualification runs everything in virtual time, once without and once with each fault, and draws up the
+//! kill matrix: which clause and which monitor is failed by which fault. A clause no fault can fail is
+//! unproven, and is said so by name.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::library::Library;
+use super::virtual_run::{Finished, VirtualRun, run_silently};
+use crate::engine::EngineError;
+use crate::pack::Pack;
+use crate::reference::Fault;
+use crate::report::result::RunResult;
+use crate::verdict::Verdict;
+
+/// A clause of a test, or a monitor, deciding one requirement.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Decider {
+    /// Requirement id.
+    pub requirement: String,
+    /// Test id and clause, or monitor id.
+    pub place: String,
+}
+
+/// What one fault did.
+#[derive(Clone, Debug)]
+pub struct Kill {
+    /// The fault.
+    pub fault: Fault,
+    /// What failed or warned because of it.
+    pub deciders: BTreeSet<Decider>,
+    /// The requirements that failed or warned, in the order they were decided.
+    pub requirements: Vec<String>,
+    /// The verdict of the run.
+    pub verdict: Option<Verdict>,
+}
+
+impl Kill {
+    /// Whether a requirement the fault names was reported.
+    #[must_use]
+    pub fn named(&self) -> bool {
+        self.requirements
+            .iter()
+            .any(|id| self.fault.breaks.contains(&id.as_str()))
+    }
+}
+
+/// The outcome of a qualification.
+#[derive(Clone, Debug)]
+pub struct Qualification {
+    /// What is not a pass on the faultless device: decider and verdict.
+    pub blemishes: Vec<(Decider, Verdict)>,
+    /// Everything that passes on the faultless device.
+    pub deciders: BTreeSet<Decider>,
+    /// One per fault.
+    pub kills: Vec<Kill>,
+}
+
+impl Qualification {
+    /// Deciders no fault can fail.
+    #[must_use]
+    pub fn unproven(&self) -> Vec<&Decider> {
+        let killed: BTreeSet<&Decider> = self.kills.iter().flat_map(|kill| &kill.deciders).collect();
+        self.deciders
+            .iter()
+            .filter(|decider| !killed.contains(decider))
+            .collect()
+    }
+
+    /// Faults that no requirement they name was reported for.
+    #[must_use]
+    pub fn missed(&self) -> Vec<&Kill> {
+        self.kills.iter().filter(|kill| !kill.named()).collect()
+    }
+
+    /// The matrix as text: per fault what it kills, then what is unproven.
+    #[must_use]
+    pub fn matrix(&self) -> String {
+        use std::fmt::Write as _;
+        let mut text = String::new();
+        for kill in &self.kills {
+            let verdict = kill.verdict.map_or("nothing", Verdict::word);
+            let _ = writeln!(text, "{} ({verdict})", kill.fault.name);
+            let mut by_requirement: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+            for decider in &kill.deciders {
+                by_requirement
+                    .entry(&decider.requirement)
+                    .or_default()
+                    .push(&decider.place);
+            }
+            for (requirement, places) in by_requirement {
+                let mark = if kill.fault.breaks.contains(&requirement) {
+                    '*'
+                } else {
+                    ' '
+                };
+                let _ = writeln!(text, "  {mark} {requirement:<14} {}", places.join(", "));
+            }
+        }
+        let unproven = self.unproven();
+        let _ = writeln!(
+            text,
+            "\n{} clauses and monitors, {} unproven",
+            self.deciders.len(),
+            unproven.len()
+        );
+        for decider in unproven {
+            let _ = writeln!(text, "  {:<14} {}", decider.requirement, decider.place);
+        }
+        text
+    }
+}
+
+/// What was decided in a result, with its verdict.
+#[must_use]
+pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
+    let mut all = Vec::new();
+    for test in &result.tests {
+        for decision in &test.decisions {
+            let decider = Decider {
+                requirement: decision.requirement.clone(),
+                place: format!("{} {}", test.id, decision.clause),
+            };
+            all.push((decider, decision.verdict));
+        }
+    }
+    for requirement in &result.requirements {
+        for id in &requirement.decided_by {
+            let Some(monitor) = result.monitors.iter().find(|monitor| monitor.id == *id) else {
+                continue;
+            };
+            let findings = monitor
+                .findings
+                .iter()
+                .filter(|finding| finding.requirement == requirement.id);
+            let verdict = findings
+                .map(|finding| finding.verdict)
+                .fold(Verdict::Pass, Verdict::join);
+            let decider = Decider {
+                requirement: requirement.id.clone(),
+                place: id.clone(),
+            };
+            all.push((decider, verdict));
+        }
+    }
+    all
+}
+
+/// Qualifies all tests and monitors of a protocol version with these faults.
+///
+/// # Errors
+/// When a run cannot be carried out.
+pub fn qualify(
+    library: &Library,
+    pack: &Pack,
+    faults: &[Fault],
+    told: &(dyn Fn(&str) + Sync),
+) -> Result<Qualification, EngineError> {
+    let Finished { result, .. } = run_silently(library, pack, VirtualRun::of(library, pack))?;
+    let mut blemishes = Vec::new();
+    let mut deciders = BTreeSet::new();
+    for (decider, verdict) in decided(&result) {
+        if verdict != Verdict::Pass {
+            blemishes.push((decider.clone(), verdict));
+        }
+        deciders.insert(decider);
+    }
+    for test in result
+        .tests
+        .iter()
+        .filter(|test| test.verdict.is_some_and(|verdict| verdict != Verdict::Pass) && test.decisions.is_empty())
+    {
+        let decider = Decider {
+            requirement: String::new(),
+            place: test.id.clone(),
+        };
+        blemishes.push((decider, Verdict::Error));
+    }
+    let next = AtomicUsize::new(0);
+    let kills: Mutex<Vec<(usize, Result<Kill, EngineError>)>> = Mutex::new(Vec::new());
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    told(fault.name);
+                    let at = faults.iter().position(|other| other == fault).unwrap_or_default();
+                    let kill = kill(library, pack, *fault);
+                    if let Ok(mut all) = kills.lock() {
+                        all.push((at, kill));
+                    }
+                }
+            });
+        }
+    });
+    let mut kills = kills.into_inner().unwrap_or_default();
+    kills.sort_by_key(|(at, _)| *at);
+    Ok(Qualification {
+        blemishes,
+        deciders,
+        kills: kills.into_iter().map(|(_, kill)| kill).collect::<Result<_, _>>()?,
+    })
+}
+
+fn kill(library: &Library, pack: &Pack, fault: Fault) -> Result<Kill, EngineError> {
+    let mut request = VirtualRun::of(library, pack);
+    request.faults = vec![fault.name.to_owned()];
+    let finished = run_silently(library, pack, request)?;
+    let mut deciders = BTreeSet::new();
+    let mut requirements = Vec::new();
+    for (decider, verdict) in decided(&finished.result) {
+        if matches!(verdict, Verdict::Fail | Verdict::Warning) {
+            if !requirements.contains(&decider.requirement) {
+                requirements.push(decider.requirement.clone());
+            }
+            deciders.insert(decider);
+        }
+    }
+    Ok(Kill {
+        fault,
+        deciders,
+        requirements,
+        verdict: finished.result.verdict,
+    })
+}

@@ -1,0 +1,132 @@
+//! The built-in reference AGV as a device under test: its floor, its profile, its configuration.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::{Map, Value, json};
+
+use super::header::Subject;
+use crate::course::Layout;
+use crate::pack::{Pack, Role};
+use crate::profile::TimeLimits;
+use crate::reference::agv::{AgvConfig, LayoutNode, OnboardMap};
+
+/// The reference AGV and everything a run must know about it.
+#[derive(Clone, Debug)]
+pub struct ReferenceAgv {
+    /// Who it says it is.
+    pub subject: Subject,
+    /// The floor.
+    pub layout: Layout,
+    /// How it is configured.
+    pub config: AgvConfig,
+    /// Its part of the timing contract.
+    pub time: TimeLimits,
+}
+
+impl ReferenceAgv {
+    /// A reference AGV for a protocol version.
+    #[must_use]
+    pub fn new(pack: &Pack) -> Self {
+        let subject = Subject {
+            role: Role::Agv,
+            manufacturer: "vda5050-tck".to_owned(),
+            serial_number: "reference-agv".to_owned(),
+            topic_template: None,
+        };
+        let layout = Layout::built_in();
+        let nodes: Vec<LayoutNode> = layout
+            .nodes()
+            .iter()
+            .map(|node| LayoutNode {
+                id: node.id.clone(),
+                x: node.x,
+                y: node.y,
+                theta: node.theta,
+                map_id: node.map_id.clone(),
+            })
+            .collect();
+        let first = nodes
+            .first()
+            .map(|node| (node.id.clone(), node.map_id.clone()))
+            .unwrap_or_default();
+        let config = AgvConfig {
+            manufacturer: subject.manufacturer.clone(),
+            serial_number: subject.serial_number.clone(),
+            version: pack.version.to_string(),
+            topics: subject.topics(pack),
+            features: pack
+                .features()
+                .filter(|(_, on)| *on)
+                .map(|(name, _)| name.to_owned())
+                .collect(),
+            nodes,
+            start_node: first.0,
+            maps: vec![OnboardMap {
+                map_id: first.1,
+                map_version: "1".to_owned(),
+                enabled: true,
+            }],
+            ..AgvConfig::default()
+        };
+        let time = TimeLimits {
+            drive: Duration::from_secs(60),
+            quiet: Duration::from_millis(400),
+            settle: Duration::from_millis(300),
+            reconnect: Duration::from_secs(20),
+            connect: Duration::from_secs(20),
+            ..TimeLimits::default()
+        };
+        Self {
+            subject,
+            layout,
+            config,
+            time,
+        }
+    }
+
+    /// What a profile would state about it.
+    #[must_use]
+    pub fn statements(&self) -> BTreeMap<String, bool> {
+        let stops = self.config.stops_between_nodes;
+        [
+            ("stops-between-nodes", stops),
+            ("node-bound", !stops),
+            ("interruptible-actions", self.config.interruptible),
+            ("uninterruptible-actions", true),
+            ("line-guided", false),
+            ("free-navigation", true),
+        ]
+        .into_iter()
+        .map(|(name, said)| (name.to_owned(), said))
+        .collect()
+    }
+
+    /// `device.*` beside identity and factsheet: the actions tests may use for their own ends.
+    #[must_use]
+    pub fn device_bindings(&self) -> Map<String, Value> {
+        let action = |name: &str| json!({ "type": name, "parameters": { "duration": 1.0 } });
+        let mut all = Map::new();
+        all.insert("longAction".to_owned(), action("beep"));
+        all.insert("uninterruptibleAction".to_owned(), action("calibrate"));
+        all
+    }
+
+    /// The hooks it understands as commands.
+    pub const HOOKS: [&'static str; 14] = [
+        "power-cycle",
+        "shutdown",
+        "start",
+        "set-mode",
+        "emergency-stop",
+        "release-emergency-stop",
+        "trigger",
+        "place-load",
+        "remove-load",
+        "press-pause",
+        "release-pause",
+        "enable-map",
+        "enter-field",
+        "leave-field",
+    ];
+}

@@ -1,0 +1,207 @@
+//! A whole run against the reference AGV in virtual time, in one process and without a network.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::{Map, Value};
+
+use super::capabilities::Capabilities;
+use super::device_peer::DevicePeer;
+use super::header::HeaderParts;
+use super::library::Library;
+use super::reference_agv::ReferenceAgv;
+use super::session::{End, Progress, Setup, run};
+use crate::clock::{Moment, Stamp};
+use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
+use crate::journal::event::{Event, Occurrence};
+use crate::journal::file::JournalWriter;
+use crate::judge::RunJudge;
+use crate::link::memory::{MemoryLink, MemoryOptions};
+use crate::link::{Link, Vantage};
+use crate::pack::Pack;
+use crate::reference::agv::Agv;
+use crate::report::result::RunResult;
+use crate::suite::model::{Step, Test};
+
+/// What is run.
+#[derive(Clone)]
+pub struct VirtualRun {
+    /// The device.
+    pub device: ReferenceAgv,
+    /// Names of its faults.
+    pub faults: Vec<String>,
+    /// The tests, in order.
+    pub tests: Vec<Arc<Test>>,
+    /// Whether that is every test.
+    pub complete: bool,
+    /// Seed of the jitter.
+    pub seed: u64,
+    /// Jitter on every packet.
+    pub jitter: Duration,
+    /// Packets arrive in bundles of this period.
+    pub coalesce: Duration,
+    /// From where the harness sees.
+    pub vantage: Vantage,
+    /// When it begins; virtual time goes on from here.
+    pub begun: jiff::Timestamp,
+    /// Identifier of the run.
+    pub run: String,
+    /// The command line, for the record.
+    pub command: Vec<String>,
+}
+
+impl VirtualRun {
+    /// All tests against the faultless reference AGV, always at the same time of the same day.
+    pub fn of(library: &Library, pack: &Pack) -> Self {
+        Self {
+            device: ReferenceAgv::new(pack),
+            faults: Vec::new(),
+            tests: library.tests(crate::pack::Role::Agv, &pack.id),
+            complete: true,
+            seed: 1,
+            jitter: Duration::ZERO,
+            coalesce: Duration::ZERO,
+            vantage: Vantage::Tap,
+            begun: jiff::Timestamp::UNIX_EPOCH,
+            run: "virtual".to_owned(),
+            command: Vec::new(),
+        }
+    }
+}
+
+/// A finished virtual run.
+pub struct Finished {
+    /// How it ended.
+    pub end: End,
+    /// What came out.
+    pub result: RunResult,
+    /// Journal and judge.
+    pub recorder: Recorder,
+}
+
+/// Hooks are commands to the device on the bus.
+struct OnTheBus;
+
+impl Operator for OnTheBus {
+    fn hooks(&self) -> Vec<String> {
+        ReferenceAgv::HOOKS.map(str::to_owned).to_vec()
+    }
+
+    async fn run(&mut self, _hook: &str, _parameters: Map<String, Value>) -> HookOutcome {
+        HookOutcome::Missing
+    }
+
+    fn runs_on_the_link(&self) -> bool {
+        true
+    }
+}
+
+/// Carries it out.
+///
+/// # Errors
+/// When the journal cannot be written or judged.
+pub async fn run_virtually(
+    library: &Library,
+    pack: &Pack,
+    request: VirtualRun,
+    writer: Option<JournalWriter>,
+    interrupt: tokio::sync::watch::Receiver<bool>,
+    progress: &mut dyn Progress,
+    saved: &mut dyn FnMut(&RunJudge),
+) -> Result<Finished, EngineError> {
+    let device = &request.device;
+    let start = Stamp {
+        moment: Moment::START,
+        utc: request.begun,
+    };
+    let faults: Vec<&str> = request.faults.iter().map(String::as_str).collect();
+    let agv = Agv::new(device.config.clone(), &faults);
+    let options = MemoryOptions {
+        device_topics: device.subject.published(pack),
+        jitter: request.jitter,
+        seed: request.seed,
+        coalesce: request.coalesce,
+        vantage: request.vantage,
+        ..MemoryOptions::default()
+    };
+    let link = MemoryLink::new(start, vec![Box::new(DevicePeer(agv))], options);
+    let header = HeaderParts {
+        subject: &device.subject,
+        pack,
+        run: &request.run,
+        vantage: request.vantage,
+        suites: &library.rules.sha256,
+        modified: library.assets.modified(),
+        time: device.time.bindings(),
+        device: device.device_bindings(),
+        settings: Vec::new(),
+        command: request.command.clone(),
+    };
+    let first = Occurrence::harness(
+        link.now(),
+        Event::RunBegun {
+            header: Box::new(header.header()),
+        },
+    );
+    let recorder = Recorder::begin(&library.rules, writer, first)?;
+    let composer = Composer::new(&request.run);
+    let mut engine = Engine::new(link, OnTheBus, recorder, composer, interrupt);
+    let setup = Setup {
+        tests: request.tests,
+        complete: request.complete,
+        capabilities: Capabilities {
+            factsheet: None,
+            statements: device.statements(),
+            claims: std::collections::BTreeMap::new(),
+            vantage: request.vantage,
+            hooks: OnTheBus.hooks(),
+            maps: true,
+            motion: Ok(()),
+        },
+        layout: Some(device.layout.clone()),
+        deviations: std::collections::BTreeMap::new(),
+        limits: vec!["The device is the built-in reference AGV, run in virtual time.".to_owned()],
+        run: request.run.clone(),
+    };
+    let end = run(&mut engine, setup, progress, saved).await;
+    let recorder = engine.recorder;
+    Ok(Finished {
+        result: recorder.judge().result(),
+        end,
+        recorder,
+    })
+}
+
+/// Nobody is watching.
+pub struct Silent;
+
+impl crate::engine::Watcher for Silent {
+    fn waiting(&mut self, _step: &Step) {}
+}
+
+impl Progress for Silent {
+    fn planned(&mut self, _plan: &crate::journal::event::Plan) {}
+    fn test_begun(&mut self, _test: &Test, _number: usize, _of: usize) {}
+    fn test_ended(&mut self, _result: &crate::report::result::TestResult) {}
+    fn note(&mut self, _text: &str) {}
+}
+
+/// Carries it out on this thread, with nobody watching.
+///
+/// # Errors
+/// When the journal cannot be judged.
+pub fn run_silently(library: &Library, pack: &Pack, request: VirtualRun) -> Result<Finished, EngineError> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .map_err(|error| crate::engine::RecordError::Write(error))?;
+    let (_keep, interrupt) = tokio::sync::watch::channel(false);
+    runtime.block_on(run_virtually(
+        library,
+        pack,
+        request,
+        None,
+        interrupt,
+        &mut Silent,
+        &mut |_| {},
+    ))
+}
