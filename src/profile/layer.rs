@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::effective::{Effective, effective};
 use super::hooks::Hook;
@@ -74,6 +75,34 @@ impl Layer {
             self.deviations
                 .retain(|(lower, _)| lower.requirement != deviation.requirement);
             self.deviations.push((deviation, origin));
+        }
+        self
+    }
+
+    fn duration(&self, path: &str) -> Option<Duration> {
+        match self.values.get(path)?.value {
+            Value::Duration(duration) => Some(duration),
+            _ => None,
+        }
+    }
+
+    /// Fits the default of a limit to the limit it belongs to, if only the latter was set: whoever asks for
+    /// a reaction within 4 s means that there is nothing to warn about before.
+    fn fit_defaults(mut self) -> Self {
+        for (shorter, longer) in [("time.slow", "time.react"), ("time.event", "time.event-warning")] {
+            let (Some(short), Some(long)) = (self.duration(shorter), self.duration(longer)) else {
+                continue;
+            };
+            if short <= long {
+                continue;
+            }
+            for (path, fitted) in [(shorter, long), (longer, short)] {
+                if let Some(setter) = self.values.get_mut(path)
+                    && setter.origin == Origin::Default
+                {
+                    setter.value = Value::Duration(fitted);
+                }
+            }
         }
         self
     }
@@ -162,7 +191,7 @@ fn given(key: &Key, text: &str, folder: &Path, origin: &Origin, what: &str) -> R
             span: None,
         }),
         Err(refusal) => {
-            let title = format!("{what} cannot be this: {}", refusal.label);
+            let title = format!("bad value for {what}: {}", refusal.label);
             let diagnostic = Diagnostic::whole(refusal.code, title);
             Err(match refusal.hint {
                 Some(hint) => diagnostic.hint(hint),
@@ -219,7 +248,7 @@ pub fn load(
             Err(diagnostics) => wrong.extend(diagnostics),
         }
     }
-    if wrong.is_empty() { effective(merged) } else { Err(wrong) }
+    if wrong.is_empty() { effective(merged.fit_defaults()) } else { Err(wrong) }
 }
 
 /// Reads one profile by itself, over the defaults only. Relative files in it are found from `folder`.
@@ -228,5 +257,5 @@ pub fn load(
 /// Every mistake in it.
 pub fn check(source: &Arc<Source>, folder: &Path) -> Result<Effective, Vec<Diagnostic>> {
     let layer = read::read(source, folder, Origin::File(source.name.clone()))?;
-    effective(defaults()?.under(layer))
+    effective(defaults()?.under(layer).fit_defaults())
 }
