@@ -238,17 +238,17 @@ fn a_layout_that_looks_wrong_is_refused_at_its_node_or_edge() {
     let mistakes = [
         ("degrees", "\"theta\": 1.5708", "\"theta\": 90.0"),
         ("millimetres", "\"x\": 3, \"y\": 0", "\"x\": 30000, \"y\": 0"),
-        ("no map", "\"mapId\": \"hall\", \"nodePosition\": {\"x\": 6, \"y\": 0}", "\"nodePosition\": {\"x\": 6, \"y\": 0}"),
-        ("two nodes", "\"nodeId\": \"H2\"", "\"nodeId\": \"H1\""),
-        ("edge to nowhere", "\"endNodeId\": \"H2\"", "\"endNodeId\": \"H22\""),
-        ("no speed", "\"maxSpeed\": 0.3", "\"maxSpeed\": 0"),
-        ("km/h", "\"maxSpeed\": 1.2", "\"maxSpeed\": 120"),
+        ("no-map", "\"mapId\": \"hall\", \"nodePosition\": {\"x\": 6, \"y\": 0}", "\"nodePosition\": {\"x\": 6, \"y\": 0}"),
+        ("two-nodes", "\"nodeId\": \"H2\"", "\"nodeId\": \"H1\""),
+        ("edge-to-nowhere", "\"endNodeId\": \"H2\"", "\"endNodeId\": \"H22\""),
+        ("no-speed", "\"maxSpeed\": 0.3", "\"maxSpeed\": 0"),
+        ("kilometres-per-hour", "\"maxSpeed\": 1.2", "\"maxSpeed\": 120"),
         ("orientation", "\"vehicleOrientation\": 0.0", "\"vehicleOrientation\": 180.0"),
-        ("missing member", "\"nodeId\": \"H3\", ", ""),
-        ("not JSON", "\"layouts\": [", "\"layouts\": [,"),
+        ("missing-member", "\"nodeId\": \"H3\", ", ""),
+        ("not-json", "\"layouts\": [", "\"layouts\": [,"),
     ];
     for (name, from, to) in mistakes {
-        insta::assert_snapshot!(format!("lif {name}"), wrong(from, to));
+        insta::assert_snapshot!(format!("lif-{name}"), wrong(from, to));
     }
 }
 
