@@ -4,7 +4,17 @@
 //! floor of the reference AGV. [`Layout::assign`] gives the names a test speaks of (a, b, c …) to nodes of it,
 //! beginning where the vehicle stands. Building orders from a [`Course`] is left to the engine.
 
-use serde_json::{Map, Value, json};
+mod assign;
+mod layout;
+mod lif;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value};
+
+pub use layout::{BUILT_IN_MAP, Edge, Layout, Node};
 
 /// What a test asks of the course.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -13,4 +23,110 @@ pub struct CourseNeed {
     pub nodes: Vec<String>,
     /// Pairs of names that must be joined by an edge.
     pub edges: Vec<(String, String)>,
+}
+
+/// The name of the node where the vehicle stands.
+pub const HERE: &str = "a";
+
+/// The name of a node far away, which no edge joins to where the vehicle stands, if the layout has one.
+pub const FAR: &str = "far";
+
+/// Where the vehicle stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Standing {
+    /// On a node, by its own account.
+    Node(String),
+    /// At a place; the nearest node of that map counts if it is near enough.
+    Pose {
+        /// mapId.
+        map: String,
+        /// Metres.
+        x: f64,
+        /// Metres.
+        y: f64,
+    },
+}
+
+/// Why no course could be found. What the device says about itself is shown escaped.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CourseError {
+    /// A node that is not in the layout.
+    #[error("there is no node {id:?} in the layout; {hint}")]
+    UnknownNode {
+        /// The id.
+        id: String,
+        /// Did you mean …
+        hint: String,
+    },
+    /// The vehicle stands on no node.
+    #[error("the vehicle stands at x = {x}, y = {y} on map {map:?}, and {nearest}")]
+    OnNoNode {
+        /// mapId.
+        map: String,
+        /// Metres.
+        x: f64,
+        /// Metres.
+        y: f64,
+        /// The nearest node, in words.
+        nearest: String,
+    },
+    /// The layout cannot give what the test asks.
+    #[error("no {nodes} nodes of the layout from {start:?} on are joined as the test asks ({edges})")]
+    Unsatisfiable {
+        /// How many nodes are asked for.
+        nodes: usize,
+        /// Where the vehicle stands.
+        start: String,
+        /// The edges that are asked for.
+        edges: String,
+    },
+    /// The search was given up.
+    #[error("the layout is too big to say whether it has a course as the test asks; name a few nodes in `layout.allow-list`")]
+    GivenUp,
+}
+
+/// Names of a test, given to nodes of the layout.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Course {
+    nodes: BTreeMap<String, Node>,
+    edges: BTreeMap<(String, String), Edge>,
+}
+
+impl Course {
+    /// The node of a name.
+    #[must_use]
+    pub fn node(&self, name: &str) -> Option<&Node> {
+        self.nodes.get(name)
+    }
+
+    /// The edge between two names.
+    #[must_use]
+    pub fn edge(&self, from: &str, to: &str) -> Option<&Edge> {
+        self.edges.get(&(from.to_owned(), to.to_owned()))
+    }
+
+    /// Names and nodes.
+    pub fn nodes(&self) -> impl Iterator<Item = (&str, &Node)> {
+        self.nodes.iter().map(|(name, node)| (name.as_str(), node))
+    }
+
+    /// The value of `course`: `a` is a nodeId, `a-b` an edgeId; everything else about them stands below
+    /// `nodes` and `edges`, where `course.a.x` is to be looked up as `course.nodes.a.x`.
+    #[must_use]
+    pub fn bindings(&self) -> Value {
+        let mut all = Map::new();
+        let mut nodes = Map::new();
+        let mut edges = Map::new();
+        for (name, node) in &self.nodes {
+            all.insert(name.clone(), node.id.as_str().into());
+            nodes.insert(name.clone(), node.value());
+        }
+        for ((from, to), edge) in &self.edges {
+            all.insert(format!("{from}-{to}"), edge.id.as_str().into());
+            edges.insert(format!("{from}-{to}"), edge.value());
+        }
+        all.insert("nodes".into(), nodes.into());
+        all.insert("edges".into(), edges.into());
+        all.into()
+    }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::effective::{Effective, effective};
 use super::hooks::Hook;
@@ -77,6 +78,34 @@ impl Layer {
         }
         self
     }
+
+    fn duration(&self, path: &str) -> Option<Duration> {
+        match self.values.get(path)?.value {
+            Value::Duration(duration) => Some(duration),
+            _ => None,
+        }
+    }
+
+    /// Fits the default of a limit to the limit it belongs to, if only the latter was set: whoever asks for
+    /// a reaction within 4 s means that there is nothing to warn about before.
+    fn fit_defaults(mut self) -> Self {
+        for (shorter, longer) in [("time.slow", "time.react"), ("time.event", "time.event-warning")] {
+            let (Some(short), Some(long)) = (self.duration(shorter), self.duration(longer)) else {
+                continue;
+            };
+            if short <= long {
+                continue;
+            }
+            for (path, fitted) in [(shorter, long), (longer, short)] {
+                if let Some(setter) = self.values.get_mut(path)
+                    && setter.origin == Origin::Default
+                {
+                    setter.value = Value::Duration(fitted);
+                }
+            }
+        }
+        self
+    }
 }
 
 /// What a process finds around itself. A value, so that tests need no real environment.
@@ -145,13 +174,7 @@ impl Surroundings {
                 wrong.push(Diagnostic::whole("unknown-key", title).hint(hint));
                 continue;
             };
-            match given(
-                key,
-                text,
-                &self.directory,
-                &Origin::Environment,
-                &format!("the environment variable {name}"),
-            ) {
+            match given(key, text, &self.directory, &Origin::Environment, &format!("the environment variable {name}")) {
                 Ok(setter) => drop(layer.values.insert(key.path, setter)),
                 Err(diagnostic) => wrong.push(diagnostic),
             }
@@ -168,7 +191,7 @@ fn given(key: &Key, text: &str, folder: &Path, origin: &Origin, what: &str) -> R
             span: None,
         }),
         Err(refusal) => {
-            let title = format!("{what} cannot be this: {}", refusal.label);
+            let title = format!("bad value for {what}: {}", refusal.label);
             let diagnostic = Diagnostic::whole(refusal.code, title);
             Err(match refusal.hint {
                 Some(hint) => diagnostic.hint(hint),
@@ -182,10 +205,7 @@ fn file(path: &Path) -> Result<Layer, Vec<Diagnostic>> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|error| {
         let diagnostic = Diagnostic::whole("unreadable", format!("the profile {name} cannot be read: {error}"));
-        vec![
-            diagnostic
-                .hint("give the path of a profile with --profile; every setting is explained in the documentation"),
-        ]
+        vec![diagnostic.hint("give the path of a profile with --profile; every setting is explained in the documentation")]
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     read::read(&Source::new(name.clone(), text), folder, Origin::File(name))
@@ -209,28 +229,15 @@ pub fn load(
     let mut wrong = Vec::new();
     for (path, text) in flags {
         let Some(key) = Key::find(path) else {
-            wrong.push(Diagnostic::whole(
-                "unknown-key",
-                format!("there is no setting `{path}`"),
-            ));
+            wrong.push(Diagnostic::whole("unknown-key", format!("there is no setting `{path}`")));
             continue;
         };
-        match given(
-            key,
-            text,
-            &surroundings.directory,
-            &Origin::Flag,
-            &format!("the flag for `{path}`"),
-        ) {
+        match given(key, text, &surroundings.directory, &Origin::Flag, &format!("the flag for `{path}`")) {
             Ok(setter) => drop(from_flags.values.insert(key.path, setter)),
             Err(diagnostic) => wrong.push(diagnostic),
         }
     }
-    let files = [
-        surroundings.user_file(),
-        surroundings.project_file(),
-        profile.map(Path::to_path_buf),
-    ];
+    let files = [surroundings.user_file(), surroundings.project_file(), profile.map(Path::to_path_buf)];
     let layers = std::iter::once(defaults())
         .chain(files.into_iter().flatten().map(|path| file(&path)))
         .chain([surroundings.layer(), Ok(from_flags)]);
@@ -241,11 +248,7 @@ pub fn load(
             Err(diagnostics) => wrong.extend(diagnostics),
         }
     }
-    if wrong.is_empty() {
-        effective(merged)
-    } else {
-        Err(wrong)
-    }
+    if wrong.is_empty() { effective(merged.fit_defaults()) } else { Err(wrong) }
 }
 
 /// Reads one profile by itself, over the defaults only. Relative files in it are found from `folder`.
@@ -254,5 +257,5 @@ pub fn load(
 /// Every mistake in it.
 pub fn check(source: &Arc<Source>, folder: &Path) -> Result<Effective, Vec<Diagnostic>> {
     let layer = read::read(source, folder, Origin::File(source.name.clone()))?;
-    effective(defaults()?.under(layer))
+    effective(defaults()?.under(layer).fit_defaults())
 }

@@ -259,6 +259,15 @@ fn a_full_profile_arrives_whole() {
 }
 
 #[test]
+fn a_limit_that_was_not_set_gives_way_to_the_one_that_was() {
+    let limits = |text: &str| check_text(text).expect("no contradiction").profile.time;
+    let tight = limits("[time]\nreact = \"4 s\"\nevent-warning = \"800 ms\"\n");
+    assert_eq!((tight.slow, tight.event), (tight.react, tight.event_warning));
+    let loose = limits("[time]\nevent = \"8 s\"\n");
+    assert_eq!(loose.event_warning, loose.event);
+}
+
+#[test]
 fn a_later_complaint_points_at_the_line_of_the_setting() {
     let effective = check_text("[device]\nprotocol = \"9.9\"\n").expect("a version by its form");
     let diagnostic = effective.complain("device.protocol", "unknown-version", "no such version", "this one");

@@ -15,15 +15,15 @@ impl Reader<'_> {
         let members = self.members("a node", item, &KNOWN, &["id", "x", "y", "map"])?;
         let id = self.text("the id of a node", members.get("id")?);
         let map_id = self.text("the map of a node", members.get("map")?);
-        let x = self.number("x of a node", members.get("x")?, METRES, "metres");
-        let y = self.number("y of a node", members.get("y")?, METRES, "metres");
-        let mut optional = |name: &str, limits, unit: &str| match members.get(name) {
-            Some(value) => self.number(&format!("{name} of a node"), value, limits, unit).map(Some),
+        let x = self.number("x of a node", members.get("x")?, METRES, "metres, at most 10 km from the origin");
+        let y = self.number("y of a node", members.get("y")?, METRES, "metres, at most 10 km from the origin");
+        let mut optional = |name: &str, limits, expected: &str| match members.get(name) {
+            Some(value) => self.number(&format!("{name} of a node"), value, limits, expected).map(Some),
             None => Some(None),
         };
-        let theta = optional("theta", TURN, "radians");
-        let deviation_xy = optional("deviation-xy", (0.0, METRES.1), "metres");
-        let deviation_theta = optional("deviation-theta", (0.0, TURN.1), "radians");
+        let theta = optional("theta", TURN, "radians from -π to π");
+        let deviation_xy = optional("deviation-xy", (0.0, METRES.1), "metres, 0 or more");
+        let deviation_theta = optional("deviation-theta", (0.0, TURN.1), "radians from 0 to π");
         Some(LayoutNode {
             id: id?,
             map_id: map_id?,

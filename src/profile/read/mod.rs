@@ -84,7 +84,7 @@ impl Reader<'_> {
             (Some(element), DeValue::Array(items)) => items.get(element).map_or(value.span(), Spanned::span),
             _ => value.span(),
         };
-        let title = format!("{what} cannot be this");
+        let title = format!("bad value for {what}");
         if refusal.code == "credentials" {
             self.complain_masked(at, &title, &refusal.label, refusal.hint);
         } else {
@@ -243,13 +243,18 @@ impl Reader<'_> {
         }
     }
 
-    /// A number within `range`.
-    fn number(&mut self, what: &str, value: &Spanned<DeValue<'_>>, limits: (f64, f64), unit: &str) -> Option<f64> {
-        let (low, high) = limits;
+    /// A number within limits; `expected` says which.
+    fn number(
+        &mut self,
+        what: &str,
+        value: &Spanned<DeValue<'_>>,
+        (low, high): (f64, f64),
+        expected: &str,
+    ) -> Option<f64> {
         match value::number(value.get_ref()) {
             Some(number) if (low..=high).contains(&number) => Some(number),
             Some(number) => {
-                let hint = format!("expected {unit} from {low} to {high}");
+                let hint = format!("expected {expected}");
                 let title = format!("{what} cannot be {number}");
                 self.complain("out-of-range", value.span(), &title, "out of range", Some(hint));
                 None

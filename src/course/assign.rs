@@ -1,0 +1,250 @@
+//! Giving the names of a test to nodes of a layout: a bounded search that prefers short ways.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Course, CourseError, CourseNeed, FAR, HERE, Layout, Node, Standing};
+
+/// How far from a node the vehicle may stand to be on it, in metres, unless the node allows more.
+const TOLERANCE: f64 = 0.5;
+
+/// How many nodes may be tried. Far above what a test of six nodes needs on a floor where they are joined
+/// to eight others each, and a fraction of a second.
+const BUDGET: u32 = 100_000;
+
+/// Driving over a node where loads are handed over counts like this many metres.
+const STATION_DETOUR: f64 = 100.0;
+
+impl Layout {
+    /// The node where the vehicle stands.
+    ///
+    /// # Errors
+    /// When it is not in the layout, or none is near enough.
+    pub fn standing(&self, standing: &Standing) -> Result<&Node, CourseError> {
+        match standing {
+            Standing::Node(id) => self.node(id).ok_or_else(|| self.unknown(id)),
+            Standing::Pose { map, x, y } => {
+                let nearest = self
+                    .nodes()
+                    .filter(|node| node.map_id == *map)
+                    .min_by(|one, other| one.distance(*x, *y).total_cmp(&other.distance(*x, *y)));
+                let on = |node: &&Node| node.distance(*x, *y) <= node.deviation_xy.unwrap_or(0.0).max(TOLERANCE);
+                nearest.filter(on).ok_or_else(|| CourseError::OnNoNode {
+                    map: map.clone(),
+                    x: *x,
+                    y: *y,
+                    nearest: match nearest {
+                        Some(node) => format!("the nearest node, {:?}, is {:.2} m away", node.id, node.distance(*x, *y)),
+                        None => "the layout has no node on that map".to_owned(),
+                    },
+                })
+            }
+        }
+    }
+
+    /// Gives the names a test asks for to different nodes, joined as it asks; `a` is where the vehicle
+    /// stands. Of several ways to do so the shortest found is taken, always the same one, and one from
+    /// which the vehicle can come back is preferred.
+    ///
+    /// # Errors
+    /// When the vehicle stands on no node, or the layout cannot give what the test asks.
+    pub fn assign(&self, need: &CourseNeed, standing: &Standing) -> Result<Course, CourseError> {
+        let start = self.standing(standing)?;
+        let names = names_of(need);
+        if need.edges.iter().any(|(from, to)| from == to) {
+            return Err(unsatisfiable(need, names.len(), start));
+        }
+        let graph = Graph::of(self, &start.id);
+        let mut budget = BUDGET;
+        for returning in [true, false] {
+            let mut search = Search::new(&graph, need, &names, returning, budget);
+            search.place(1, 0.0);
+            budget = search.budget;
+            if let Some((_, places)) = search.best {
+                return self
+                    .course(&graph, need, &names, &places)
+                    .ok_or_else(|| unsatisfiable(need, names.len() + 1, start));
+            }
+            if budget == 0 {
+                return Err(CourseError::GivenUp);
+            }
+        }
+        Err(unsatisfiable(need, names.len(), start))
+    }
+
+    fn course(&self, graph: &Graph<'_>, need: &CourseNeed, names: &[&str], places: &[usize]) -> Option<Course> {
+        let mut course = Course::default();
+        for (name, place) in names.iter().zip(places) {
+            course.nodes.insert((*name).to_owned(), graph.nodes[*place].clone());
+        }
+        if need.nodes.iter().any(|name| name == FAR) && !course.nodes.contains_key(FAR) {
+            course.nodes.insert(FAR.to_owned(), graph.far(places)?.clone());
+        }
+        let named: Vec<(String, String)> = course
+            .nodes
+            .iter()
+            .map(|(name, node)| (name.clone(), node.id.clone()))
+            .collect();
+        for (from, start) in &named {
+            for (to, end) in &named {
+                if let Some(edge) = self.edge(start, end) {
+                    course.edges.insert((from.clone(), to.clone()), edge.clone());
+                }
+            }
+        }
+        Some(course)
+    }
+}
+
+/// The names to be searched for: `a` first, then as the test uses them. `far` is found afterwards, unless
+/// the test wants edges to it.
+fn names_of(need: &CourseNeed) -> Vec<&str> {
+    let in_edges = need.edges.iter().flat_map(|(from, to)| [from.as_str(), to.as_str()]);
+    let mut names = vec![HERE];
+    for name in need.nodes.iter().map(String::as_str).filter(|name| *name != FAR).chain(in_edges) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+fn unsatisfiable(need: &CourseNeed, nodes: usize, start: &Node) -> CourseError {
+    let edges: Vec<String> = need.edges.iter().map(|(from, to)| format!("{from}-{to}")).collect();
+    CourseError::Unsatisfiable {
+        nodes,
+        start: start.id.clone(),
+        edges: edges.join(", "),
+    }
+}
+
+/// The layout by numbers, on the map where the vehicle stands. Node 0 is where it stands.
+struct Graph<'a> {
+    nodes: Vec<&'a Node>,
+    /// Lengths of the edges from a node, by end.
+    ways: Vec<BTreeMap<usize, f64>>,
+    /// Nodes from which the vehicle can come back to where it stands.
+    returning: BTreeSet<usize>,
+}
+
+impl<'a> Graph<'a> {
+    fn of(layout: &'a Layout, start: &str) -> Self {
+        let mut nodes: Vec<&Node> = layout.nodes().collect();
+        if let Some(at) = nodes.iter().position(|node| node.id == start) {
+            nodes[..=at].rotate_right(1);
+        }
+        if let Some(map) = nodes.first().map(|node| node.map_id.as_str()) {
+            nodes.retain(|node| node.map_id == map);
+        }
+        let numbers: BTreeMap<&str, usize> = nodes.iter().enumerate().map(|(at, node)| (node.id.as_str(), at)).collect();
+        let mut ways = vec![BTreeMap::new(); nodes.len()];
+        let mut back = vec![Vec::new(); nodes.len()];
+        for edge in layout.edges() {
+            if let (Some(&from), Some(&to)) = (numbers.get(edge.start.as_str()), numbers.get(edge.end.as_str())) {
+                let detour = if nodes[to].station { STATION_DETOUR } else { 0.0 };
+                ways[from].insert(to, nodes[from].distance(nodes[to].x, nodes[to].y) + detour);
+                back[to].push(from);
+            }
+        }
+        let mut returning = BTreeSet::from([0]);
+        let mut open = vec![0];
+        while let Some(at) = open.pop() {
+            open.extend(back[at].iter().copied().filter(|from| returning.insert(*from)));
+        }
+        Self { nodes, ways, returning }
+    }
+
+    /// A node that is not taken, not next to where the vehicle stands if possible, and as far away as possible.
+    fn far(&self, taken: &[usize]) -> Option<&'a Node> {
+        let here = self.nodes.first()?;
+        (0..self.nodes.len())
+            .filter(|place| !taken.contains(place))
+            .max_by(|one, other| {
+                let apart = |place: usize| !self.ways[0].contains_key(&place);
+                let distance = |place: usize| self.nodes[place].distance(here.x, here.y);
+                apart(*one)
+                    .cmp(&apart(*other))
+                    .then(distance(*one).total_cmp(&distance(*other)))
+                    // Of equals the first one by id.
+                    .then(other.cmp(one))
+            })
+            .map(|place| self.nodes[place])
+    }
+}
+
+/// Depth-first over the names, cutting off what is already longer than the best found.
+struct Search<'g, 'a> {
+    graph: &'g Graph<'a>,
+    /// For each name: earlier names it must be joined to, and whether the edge leads from (true) or to them.
+    joins: Vec<Vec<(usize, bool)>>,
+    returning: bool,
+    budget: u32,
+    places: Vec<usize>,
+    best: Option<(f64, Vec<usize>)>,
+}
+
+impl<'g, 'a> Search<'g, 'a> {
+    fn new(graph: &'g Graph<'a>, need: &CourseNeed, names: &[&str], returning: bool, budget: u32) -> Self {
+        let number = |name: &str| names.iter().position(|other| *other == name);
+        let mut joins = vec![Vec::new(); names.len()];
+        for (from, to) in &need.edges {
+            let (Some(from), Some(to)) = (number(from), number(to)) else {
+                continue;
+            };
+            let join = if from < to { (to, (from, true)) } else { (from, (to, false)) };
+            if !joins[join.0].contains(&join.1) {
+                joins[join.0].push(join.1);
+            }
+        }
+        Self {
+            graph,
+            joins,
+            returning,
+            budget,
+            places: vec![0],
+            best: None,
+        }
+    }
+
+    /// The length of the edges that joining `place` to the earlier names takes; `None` if one is missing.
+    fn length(&self, name: usize, place: usize) -> Option<f64> {
+        self.joins[name]
+            .iter()
+            .map(|(other, forth)| {
+                let other = self.places[*other];
+                let (from, to) = if *forth { (other, place) } else { (place, other) };
+                self.graph.ways[from].get(&to).copied()
+            })
+            .sum()
+    }
+
+    fn place(&mut self, name: usize, length: f64) {
+        if name == self.joins.len() {
+            if self.best.as_ref().is_none_or(|(best, _)| length < *best) {
+                self.best = Some((length, self.places.clone()));
+            }
+            return;
+        }
+        let mut candidates: Vec<(f64, usize)> = match self.joins[name].iter().find(|(_, forth)| *forth) {
+            Some((earlier, _)) => self.graph.ways[self.places[*earlier]].keys().copied().collect::<Vec<_>>(),
+            None => (0..self.graph.nodes.len()).collect(),
+        }
+        .into_iter()
+        .filter(|place| !self.places.contains(place))
+        .filter(|place| !self.returning || self.graph.returning.contains(place))
+        .filter_map(|place| Some((self.length(name, place)?, place)))
+        .collect();
+        candidates.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+        for (more, place) in candidates {
+            if self.budget == 0 {
+                return;
+            }
+            self.budget -= 1;
+            if self.best.as_ref().is_some_and(|(best, _)| length + more >= *best) {
+                continue;
+            }
+            self.places.push(place);
+            self.place(name + 1, length + more);
+            self.places.pop();
+        }
+    }
+}
