@@ -1,3 +1,19 @@
 //! The result model and its renderings; pure functions, no clock, no network.
+//!
+//! Everything shown comes from a [`result::RunResult`], the journal it was judged from, and the
+//! [`sources::Sources`] it quotes: the same input gives the same bytes. Running tests and judging them is
+//! left to others.
 
+pub mod clean;
+pub mod compare;
+pub mod coverage;
+pub mod headline;
+pub mod html;
+pub mod json;
+pub mod junit;
+pub mod manifest;
 pub mod result;
+pub mod sequence;
+pub mod sources;
+pub mod statement;
+pub mod text;

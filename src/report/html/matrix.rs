@@ -1,0 +1,114 @@
+//! The requirement matrix: every requirement of the role and version, by chapter, gaps visible.
+
+use super::Anchors;
+use super::view::Badge;
+use crate::report::result::{RequirementResult, RunResult};
+use crate::report::sources::{HowDecided, RequirementText, Sources};
+use crate::report::statement::Counts;
+use crate::verdict::Verdict;
+
+/// One chapter.
+pub struct ChapterView {
+    pub anchor: String,
+    pub title: String,
+    pub decided: usize,
+    pub total: usize,
+    /// Whether the table is shown unfolded.
+    pub open: bool,
+    pub rows: Vec<RequirementView>,
+}
+
+/// One requirement.
+pub struct RequirementView {
+    pub anchor: String,
+    pub badge: Badge,
+    pub id: String,
+    pub section: String,
+    pub mood: String,
+    pub text: String,
+    /// How the catalogue says it can be decided.
+    pub how: &'static str,
+    /// Tests and monitors, with the ids they have in the page.
+    pub deciders: Vec<(String, Option<String>)>,
+    /// Why nothing decided it.
+    pub gap: Option<String>,
+    pub interpretation: Option<String>,
+    pub deviation: Option<String>,
+}
+
+pub fn chapters(result: &RunResult, sources: &Sources, anchors: &Anchors) -> Vec<ChapterView> {
+    let mut chapters: Vec<ChapterView> = Vec::new();
+    for requirement in &result.requirements {
+        let known = sources.requirement(&requirement.id);
+        let title = known.map_or_else(|| group(&requirement.id), |known| known.chapter.clone());
+        let row = row(requirement, known, result, anchors);
+        match chapters.iter_mut().find(|chapter| chapter.title == title) {
+            Some(chapter) => chapter.rows.push(row),
+            None => {
+                let anchor = format!("chapter-{}", chapters.len() + 1);
+                chapters.push(ChapterView { anchor, title, decided: 0, total: 0, open: false, rows: vec![row] });
+            }
+        }
+        let verdict = requirement.verdict;
+        let at = chapters.iter_mut().find(|chapter| chapter.rows.iter().any(|row| row.id == requirement.id));
+        if let Some(chapter) = at {
+            chapter.total += 1;
+            chapter.decided += Counts::of([verdict]).decided();
+            chapter.open |= matches!(verdict, Some(verdict) if verdict != Verdict::Pass);
+        }
+    }
+    chapters
+}
+
+/// `ORD-REJ` of `ORD-REJ-12`, where the catalogue has no title.
+fn group(id: &str) -> String {
+    match id.rsplit_once('-') {
+        Some((group, _)) if !group.is_empty() => group.to_owned(),
+        _ => "Other requirements".to_owned(),
+    }
+}
+
+fn row(
+    requirement: &RequirementResult,
+    known: Option<&RequirementText>,
+    result: &RunResult,
+    anchors: &Anchors,
+) -> RequirementView {
+    let gap = requirement.not_decided.clone().filter(|_| requirement.verdict.is_none());
+    let badge = match (requirement.verdict, gap.as_deref()) {
+        (Some(verdict), _) => Badge::of(Some(verdict)),
+        (None, Some(why)) if why.starts_with("not applicable") => Badge::NOT_APPLICABLE,
+        (None, Some(why)) if why.starts_with("not testable") => Badge::NOT_TESTABLE,
+        (None, _) => Badge::NOT_DECIDED,
+    };
+    // The reason of the catalogue is the better one where the result only has the word.
+    let reason = match known.map(|known| &known.decided) {
+        Some(HowDecided::NotTestable(why)) if gap.as_deref() == Some("not testable") => {
+            Some(format!("not testable: {why}"))
+        }
+        _ => gap,
+    };
+    RequirementView {
+        anchor: anchors.requirement(&requirement.id).unwrap_or_default(),
+        badge,
+        id: requirement.id.clone(),
+        section: known.map(|known| known.section.clone()).unwrap_or_default(),
+        mood: known.map(|known| known.mood.clone()).unwrap_or_default(),
+        text: known.map(|known| known.text.clone()).unwrap_or_default(),
+        how: match known.map(|known| &known.decided) {
+            Some(HowDecided::Active) => "by stimulus",
+            Some(HowDecided::Passive) => "by observation",
+            Some(HowDecided::Operator) => "with an operator",
+            Some(HowDecided::NotTestable(_)) => "not testable",
+            None => "",
+        },
+        deciders: requirement
+            .decided_by
+            .iter()
+            .map(|id| (id.clone(), anchors.decider(id)))
+            .collect(),
+        gap: reason.or_else(|| requirement.verdict.is_none().then(|| "no reason given".to_owned())),
+        interpretation: known.and_then(|known| known.interpretation.clone()),
+        deviation: result.deviations.get(&requirement.id).cloned(),
+    }
+}

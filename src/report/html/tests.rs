@@ -1,0 +1,364 @@
+//! One test of the page: what was decided, by which clause and which message, and what happened around it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Anchors;
+use super::messages::{Gallery, MessageView};
+use super::view::Badge;
+use crate::journal::Event;
+use crate::report::headline::reference;
+use crate::report::result::{Decision, RunResult, TestResult};
+use crate::report::sources::{Sources, TestSource};
+use crate::report::statement::{many, seconds, test_verdict};
+use crate::report::{clean, sequence};
+use crate::verdict::Verdict;
+
+/// Most messages shown of one test.
+const MESSAGES: usize = 24;
+/// Stimuli shown before and after each deciding message.
+const STIMULI: usize = 3;
+/// Longest source shown, in lines.
+const SOURCE_LINES: usize = 600;
+
+/// One test.
+pub struct TestView {
+    pub anchor: String,
+    pub badge: Badge,
+    pub id: String,
+    pub title: String,
+    pub why: String,
+    pub reason: Option<String>,
+    pub not_applicable: bool,
+    pub watchlist: bool,
+    pub seconds: String,
+    /// Whether there is something to look at.
+    pub finding: bool,
+    pub decisions: Vec<DecisionView>,
+    pub steps: Vec<StepView>,
+    pub source: Option<SourceView>,
+    pub diagram: Option<String>,
+    pub messages: Vec<MessageView>,
+    /// What was left out of the messages.
+    pub left_out: Option<String>,
+}
+
+/// One decision.
+pub struct DecisionView {
+    pub badge: Badge,
+    pub pass: bool,
+    pub requirement: String,
+    pub link: Option<String>,
+    pub origin: String,
+    pub text: String,
+    pub clause: String,
+    pub place: String,
+    pub message: String,
+    pub witness: Option<(u64, bool)>,
+    pub expected: Option<String>,
+    pub nearest: Option<NearestView>,
+    pub waited: Option<String>,
+    pub explanation: Option<String>,
+    pub interpretation: Option<String>,
+    pub deviation: Option<String>,
+}
+
+/// The nearest miss.
+pub struct NearestView {
+    pub seq: u64,
+    pub shown: bool,
+    pub headline: String,
+    pub path: String,
+    pub found: String,
+    pub expected: String,
+}
+
+/// One step.
+pub struct StepView {
+    pub path: String,
+    pub verb: String,
+    pub title: String,
+    pub place: String,
+    pub outcome: String,
+    pub class: &'static str,
+    pub took: Option<(u64, bool)>,
+    pub seconds: String,
+}
+
+/// The file of a test.
+pub struct SourceView {
+    pub file: String,
+    pub lines: Vec<SourceLine>,
+    pub cut: bool,
+}
+
+/// One line of it.
+pub struct SourceLine {
+    pub number: usize,
+    pub text: String,
+    /// `deciding`, `step` or nothing.
+    pub class: &'static str,
+    /// What stands beside a deciding line.
+    pub notes: Vec<(Badge, String)>,
+}
+
+pub fn views(
+    result: &RunResult,
+    sources: &Sources,
+    anchors: &Anchors,
+    gallery: &mut Gallery<'_>,
+) -> Result<Vec<TestView>, askama::Error> {
+    let mut all = Vec::with_capacity(result.tests.len());
+    for (at, test) in result.tests.iter().enumerate() {
+        all.push(view(at, test, result, sources, anchors, gallery)?);
+    }
+    Ok(all)
+}
+
+fn view(
+    at: usize,
+    test: &TestResult,
+    result: &RunResult,
+    sources: &Sources,
+    anchors: &Anchors,
+    gallery: &mut Gallery<'_>,
+) -> Result<TestView, askama::Error> {
+    let verdict = test_verdict(test);
+    let finding = !matches!(verdict, None | Some(Verdict::Pass));
+    let source = sources.test(&test.id);
+    let left_out = if finding { choose(test, gallery) } else { None };
+    let diagram = match (gallery.journal(), test.journal) {
+        (Some(journal), Some(window)) if finding => {
+            let marked = marked(test);
+            let steps = test
+                .steps
+                .iter()
+                .map(|step| (step.path.clone(), step.title.clone().unwrap_or_else(|| step.verb.clone())))
+                .collect();
+            let options = sequence::Options {
+                id: &format!("seq{}", at + 1),
+                title: &format!("What happened during {}", clean::line(&test.id)),
+                linked: gallery.shown(),
+                marked: &marked,
+                steps: &steps,
+                limit: sequence::ROW_LIMIT,
+            };
+            Some(sequence::render(journal, window, &options)?)
+        }
+        _ => None,
+    };
+    let decisions = test
+        .decisions
+        .iter()
+        .map(|decision| decision_view(decision, result, sources, anchors, gallery))
+        .collect();
+    Ok(TestView {
+        anchor: format!("t{}", at + 1),
+        badge: verdict.map_or(Badge::NOT_APPLICABLE, |verdict| Badge::of(Some(verdict))),
+        id: test.id.clone(),
+        title: test.title.clone(),
+        why: source.map(|source| source.why.clone()).unwrap_or_default(),
+        reason: test
+            .not_applicable
+            .clone()
+            .or_else(|| test.reason.clone())
+            .or_else(|| finding.then(|| "the test decided nothing".to_owned()).filter(|_| test.decisions.is_empty())),
+        not_applicable: verdict.is_none(),
+        watchlist: test.maturity == "watchlist",
+        seconds: seconds(test.seconds),
+        finding,
+        decisions,
+        steps: test
+            .steps
+            .iter()
+            .map(|step| StepView {
+                path: step.path.clone(),
+                verb: step.verb.clone(),
+                title: step.title.clone().unwrap_or_default(),
+                place: step.place.clone(),
+                class: match step.outcome.as_str() {
+                    "done" => "done",
+                    "not run" => "notrun",
+                    _ => "bad",
+                },
+                outcome: step.outcome.clone(),
+                took: step.took.map(|seq| (seq, gallery.shows(seq))),
+                seconds: seconds(step.seconds),
+            })
+            .collect(),
+        source: source.filter(|_| finding).map(|source| source_view(source, test)),
+        diagram,
+        messages: gallery.take(),
+        left_out,
+    })
+}
+
+/// The records a diagram points out.
+fn marked(test: &TestResult) -> BTreeMap<u64, String> {
+    let mut marked = BTreeMap::new();
+    for decision in test.decisions.iter().filter(|decision| decision.verdict != Verdict::Pass) {
+        if let Some(nearest) = &decision.nearest {
+            marked.entry(nearest.seq).or_insert("nearest miss".to_owned());
+        }
+        if let Some(witness) = decision.witness {
+            marked.insert(witness, decision.verdict.word().to_owned());
+        }
+    }
+    marked
+}
+
+/// Asks for the messages of a test: those that decided, the nearest misses, the stimuli around them. Says what
+/// was left out.
+fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
+    let journal = gallery.journal()?;
+    // The most important first, because there is a limit.
+    let mut wanted: Vec<(u64, &str, Option<&str>)> = Vec::new();
+    let mut centres = BTreeSet::new();
+    for decision in test.decisions.iter().filter(|decision| decision.verdict != Verdict::Pass) {
+        let nearest = decision.nearest.as_ref();
+        if let Some(witness) = decision.witness {
+            let place = nearest.filter(|nearest| nearest.seq == witness).map(|nearest| nearest.path.as_str());
+            wanted.push((witness, decision.verdict.word(), place.or(Some(""))));
+            centres.insert(witness);
+        }
+        if let Some(nearest) = nearest {
+            wanted.push((nearest.seq, "nearest miss", Some(&nearest.path)));
+            centres.insert(nearest.seq);
+        }
+        if let Some(waited) = &decision.waited {
+            wanted.push((waited.since, "stimulus", None));
+        }
+    }
+    let (first, last) = test.journal?;
+    let all: Vec<_> = journal
+        .entries()
+        .iter()
+        .filter(|entry| (first..=last).contains(&entry.seq()))
+        .collect();
+    let sent: Vec<u64> = all
+        .iter()
+        .filter(|entry| matches!(entry.event(), Event::Sent { .. } | Event::Fault { .. }))
+        .map(|entry| entry.seq())
+        .collect();
+    if centres.is_empty() {
+        centres.insert(last);
+    }
+    for centre in &centres {
+        let split = sent.partition_point(|seq| seq < centre);
+        wanted.extend(sent[..split].iter().rev().take(STIMULI).map(|seq| (*seq, "stimulus", None)));
+        wanted.extend(sent[split..].iter().take(1).map(|seq| (*seq, "stimulus", None)));
+    }
+    wanted.extend(test.steps.iter().filter_map(|step| step.took).map(|seq| (seq, "taken by a step", None)));
+    let mut asked = BTreeSet::new();
+    for (seq, role, place) in wanted {
+        if asked.len() >= MESSAGES && !asked.contains(&seq) {
+            continue;
+        }
+        if gallery.show(seq, role, place) {
+            asked.insert(seq);
+        }
+    }
+    let messages = all.iter().filter(|entry| entry.payload().is_some()).count();
+    let shown = all.iter().filter(|entry| entry.payload().is_some() && gallery.shows(entry.seq())).count();
+    (shown < messages).then(|| {
+        format!(
+            "{shown} of the {} recorded during this test; the journal has all of them.",
+            many(messages, "message")
+        )
+    })
+}
+
+fn decision_view(
+    decision: &Decision,
+    result: &RunResult,
+    sources: &Sources,
+    anchors: &Anchors,
+    gallery: &Gallery<'_>,
+) -> DecisionView {
+    let known = sources.requirement(&decision.requirement);
+    let see = |seq: u64| reference(gallery.entry(seq), seq);
+    DecisionView {
+        badge: Badge::of(Some(decision.verdict)),
+        pass: decision.verdict == Verdict::Pass,
+        requirement: decision.requirement.clone(),
+        link: anchors.requirement(&decision.requirement),
+        origin: known.map(|known| format!("{}, §{}", known.mood, known.section)).unwrap_or_default(),
+        text: known.map(|known| known.text.clone()).unwrap_or_default(),
+        clause: decision.clause.clone(),
+        place: decision.place.clone(),
+        message: decision.message.clone(),
+        witness: decision.witness.map(|seq| (seq, gallery.shows(seq))),
+        expected: decision.expected.as_deref().map(|text| clean::block(text).into_owned()),
+        nearest: decision.nearest.as_ref().map(|nearest| NearestView {
+            seq: nearest.seq,
+            shown: gallery.shows(nearest.seq),
+            headline: see(nearest.seq),
+            path: nearest.path.clone(),
+            found: clean::block(&nearest.found).into_owned(),
+            expected: clean::block(&nearest.expected).into_owned(),
+        }),
+        waited: decision.waited.as_ref().map(|waited| {
+            let came = many(usize::try_from(waited.messages).unwrap_or(usize::MAX), "message");
+            format!("{} after {}; {came} came meanwhile", seconds(waited.seconds), see(waited.since))
+        }),
+        explanation: decision.explanation.as_deref().map(|text| clean::block(text).into_owned()),
+        interpretation: decision.interpretation.clone(),
+        deviation: result.deviations.get(&decision.requirement).cloned(),
+    }
+}
+
+fn source_view(source: &TestSource, test: &TestResult) -> SourceView {
+    let mut notes: BTreeMap<usize, Vec<(Badge, String)>> = BTreeMap::new();
+    let mut deciding = BTreeSet::new();
+    let mut around = BTreeSet::new();
+    for decision in test.decisions.iter().filter(|decision| decision.verdict != Verdict::Pass) {
+        let clause = source
+            .clauses
+            .iter()
+            .find(|clause| clause.path == decision.clause && clause.requirement == decision.requirement);
+        let lines = match clause {
+            Some(clause) => {
+                around.extend(clause.step.0..=clause.step.1.min(clause.step.0 + SOURCE_LINES));
+                clause.lines
+            }
+            None => match place_line(&decision.place, &source.file) {
+                Some(line) => (line, line),
+                None => continue,
+            },
+        };
+        deciding.extend(lines.0..=lines.1.min(lines.0 + SOURCE_LINES));
+        notes
+            .entry(lines.0)
+            .or_default()
+            .push((Badge::of(Some(decision.verdict)), decision.requirement.clone()));
+    }
+    let lines = source
+        .text
+        .lines()
+        .take(SOURCE_LINES)
+        .enumerate()
+        .map(|(at, text)| {
+            let number = at + 1;
+            SourceLine {
+                number,
+                text: clean::line(text).into_owned(),
+                class: match (deciding.contains(&number), around.contains(&number)) {
+                    (true, _) => "deciding",
+                    (false, true) => "step",
+                    (false, false) => "",
+                },
+                notes: notes.remove(&number).unwrap_or_default(),
+            }
+        })
+        .collect();
+    SourceView {
+        file: source.file.clone(),
+        lines,
+        cut: source.text.lines().count() > SOURCE_LINES,
+    }
+}
+
+/// The line of `file:line`, when it is that file.
+fn place_line(place: &str, file: &str) -> Option<usize> {
+    let (name, line) = place.rsplit_once(':')?;
+    (name == file).then(|| line.parse().ok()).flatten()
+}

@@ -1,0 +1,261 @@
+//! What a run says, in one sentence, in numbers, and with its limits.
+//!
+//! Terminal and HTML say the same words because both take them from here. The sentence never claims more
+//! than was decided: a pass speaks of the requirements that were decided and names how many were not.
+
+use super::clean::line;
+use super::result::{RunResult, TestResult};
+use crate::verdict::Verdict;
+
+/// How many of something got which verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Passed.
+    pub pass: usize,
+    /// Passed with a remark.
+    pub warning: usize,
+    /// Could not be decided.
+    pub inconclusive: usize,
+    /// Our own trouble.
+    pub error: usize,
+    /// Failed.
+    pub fail: usize,
+    /// Without a verdict: not applicable, or not decided.
+    pub none: usize,
+}
+
+impl Counts {
+    /// Counts verdicts.
+    #[must_use]
+    pub fn of(verdicts: impl IntoIterator<Item = Option<Verdict>>) -> Self {
+        let mut counts = Self::default();
+        for verdict in verdicts {
+            *match verdict {
+                Some(Verdict::Pass) => &mut counts.pass,
+                Some(Verdict::Warning) => &mut counts.warning,
+                Some(Verdict::Inconclusive) => &mut counts.inconclusive,
+                Some(Verdict::Error) => &mut counts.error,
+                Some(Verdict::Fail) => &mut counts.fail,
+                None => &mut counts.none,
+            } += 1;
+        }
+        counts
+    }
+
+    /// How many got this verdict.
+    #[must_use]
+    pub fn get(&self, verdict: Option<Verdict>) -> usize {
+        match verdict {
+            Some(Verdict::Pass) => self.pass,
+            Some(Verdict::Warning) => self.warning,
+            Some(Verdict::Inconclusive) => self.inconclusive,
+            Some(Verdict::Error) => self.error,
+            Some(Verdict::Fail) => self.fail,
+            None => self.none,
+        }
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn total(&self) -> usize {
+        self.pass + self.warning + self.inconclusive + self.error + self.fail + self.none
+    }
+
+    /// How many were decided one way or the other: pass, warning or fail.
+    #[must_use]
+    pub fn decided(&self) -> usize {
+        self.pass + self.warning + self.fail
+    }
+}
+
+/// Counts of the tests; `none` is *not applicable*.
+#[must_use]
+pub fn tests(result: &RunResult) -> Counts {
+    Counts::of(result.tests.iter().map(test_verdict))
+}
+
+/// The verdict of a test as it counts: one that decided nothing, and was not set aside, is an error.
+#[must_use]
+pub fn test_verdict(test: &TestResult) -> Option<Verdict> {
+    match (test.verdict, &test.not_applicable) {
+        (None, None) => Some(Verdict::Error),
+        (verdict, _) => verdict,
+    }
+}
+
+/// Counts of the monitors; `none` is *nothing to judge*.
+#[must_use]
+pub fn monitors(result: &RunResult) -> Counts {
+    Counts::of(result.monitors.iter().map(|monitor| monitor.verdict))
+}
+
+/// Counts of the requirements; `none` is *not decided*.
+#[must_use]
+pub fn requirements(result: &RunResult) -> Counts {
+    Counts::of(result.requirements.iter().map(|requirement| requirement.verdict))
+}
+
+/// `1 requirement`, `2 requirements`.
+#[must_use]
+pub fn many(count: usize, one: &str) -> String {
+    match count {
+        1 => format!("1 {one}"),
+        _ => format!("{count} {one}s"),
+    }
+}
+
+/// Manufacturer and serial number, made safe to show.
+#[must_use]
+pub fn device(result: &RunResult) -> String {
+    let device = &result.device;
+    let name = format!("{} {}", device.manufacturer, device.serial_number);
+    if name.trim().is_empty() {
+        return "The device under test".to_owned();
+    }
+    line(name.trim()).into_owned()
+}
+
+/// `AGV` or `master control`.
+#[must_use]
+pub fn role(result: &RunResult) -> &str {
+    match result.role.as_str() {
+        "agv" => "AGV",
+        "master-control" => "master control",
+        other => other,
+    }
+}
+
+/// The statement of the run, in one sentence. Device strings in it are clean, but not escaped for a format.
+#[must_use]
+pub fn statement(result: &RunResult) -> String {
+    let who = device(result);
+    let counts = requirements(result);
+    let decided = counts.decided();
+    let open = counts.total() - decided;
+    let partial = if result.partial { "This run ended early. " } else { "" };
+    let standard = format!("VDA 5050 {}", line(&result.protocol));
+    let role = line(role(result));
+    let of_decided = format!("{} decided", many(decided, "requirement"));
+    let rest = match open {
+        0 => String::new(),
+        1 => "; 1 more was not decided".to_owned(),
+        _ => format!("; {open} more were not decided"),
+    };
+    let sentence = match result.verdict {
+        Some(Verdict::Fail) => {
+            let broken = match counts.fail {
+                0 => "a test or monitor failed".to_owned(),
+                1 => format!("1 of {of_decided} is broken"),
+                count => format!("{count} of {of_decided} are broken"),
+            };
+            format!("{who} does not conform to {standard} as {role}: {broken}{rest}.")
+        }
+        Some(Verdict::Error) => format!(
+            "No statement on {who} and {standard} can be made, because the harness or its environment broke; {of_decided} nevertheless, none of them broken."
+        ),
+        Some(Verdict::Inconclusive) => format!(
+            "{who} was not found to break {standard} as {role}, but conformance is not shown either: {} could not be decided, {of_decided}.",
+            many(counts.inconclusive, "requirement"),
+        ),
+        Some(Verdict::Warning) => format!(
+            "{who} broke no binding requirement of {standard} as {role}, with {}: {of_decided}{rest}.",
+            many(counts.warning, "remark"),
+        ),
+        Some(Verdict::Pass) => format!("{who} conforms to {standard} as {role} in all it was tested for: {of_decided}, none broken{rest}."),
+        None => format!("Nothing was decided about {who} and {standard}."),
+    };
+    format!("{partial}{sentence}")
+}
+
+/// What restricts the statement, one sentence each: what follows from the result itself, then what the run
+/// noted. Clean, but not escaped for a format.
+#[must_use]
+pub fn limits(result: &RunResult) -> Vec<String> {
+    let mut all = Vec::new();
+    if result.partial {
+        all.push(match &result.partial_reason {
+            Some(reason) => format!("The run ended before its plan did: {}.", line(reason.trim_end_matches('.'))),
+            None => "The run ended before its plan did.".to_owned(),
+        });
+    }
+    if result.suites_modified {
+        all.push("The suites differ from the ones this tool was delivered with.".to_owned());
+    }
+    if result.vantage == "subscriber" {
+        all.push(
+            "Packets of the device could not be seen, only what the broker delivered: facts such as last will and keep-alive stay undecided."
+                .to_owned(),
+        );
+    }
+    let open = requirements(result);
+    let open = open.total() - open.decided();
+    if open > 0 {
+        all.push(format!(
+            "Nothing is said about {} that {} not decided; the matrix below shows which, and why.",
+            many(open, "requirement"),
+            if open == 1 { "was" } else { "were" },
+        ));
+    }
+    let young = result
+        .tests
+        .iter()
+        .filter(|test| test.maturity == "watchlist" && matches!(test.verdict, Some(Verdict::Fail | Verdict::Warning)))
+        .count();
+    if young > 0 {
+        all.push(format!(
+            "{} with a finding {} still on the watchlist: its evidence wants a second look by a person.",
+            many(young, "test"),
+            if young == 1 { "is" } else { "are" },
+        ));
+    }
+    for limit in &result.limits {
+        let limit = line(limit).into_owned();
+        if !all.contains(&limit) {
+            all.push(limit);
+        }
+    }
+    all
+}
+
+/// Seconds for people: `0.412 s`, `31.9 s`, `12 min 5 s`.
+#[must_use]
+pub fn seconds(seconds: f64) -> String {
+    if !seconds.is_finite() || seconds < 0.0 {
+        return "?".to_owned();
+    }
+    if seconds < 1.0 {
+        format!("{seconds:.3} s")
+    } else if seconds < 60.0 {
+        format!("{seconds:.1} s")
+    } else {
+        let whole = seconds.round();
+        let minutes = (whole / 60.0).floor();
+        format!("{minutes:.0} min {:.0} s", whole - minutes * 60.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_read_well_at_every_size() {
+        assert_eq!(seconds(0.0), "0.000 s");
+        assert_eq!(seconds(0.4119), "0.412 s");
+        assert_eq!(seconds(31.94), "31.9 s");
+        assert_eq!(seconds(725.2), "12 min 5 s");
+        assert_eq!(seconds(f64::NAN), "?");
+        assert_eq!(seconds(-1.0), "?");
+    }
+
+    #[test]
+    fn counts_add_up() {
+        let counts = Counts::of(Verdict::ALL.into_iter().map(Some).chain([None, None]));
+        assert_eq!(counts.total(), 7);
+        assert_eq!(counts.decided(), 3);
+        for verdict in Verdict::ALL {
+            assert_eq!(counts.get(Some(verdict)), 1);
+        }
+        assert_eq!(counts.get(None), 2);
+    }
+}
