@@ -1,6 +1,6 @@
 //! From course names to the nodes and edges of an order, with sequenceIds that run on through updates.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::compose::ComposeError;
 use crate::suite::model::{Route, RoutePlace};
@@ -97,8 +97,9 @@ impl RouteBuilder<'_> {
             "released": released,
             "actions": actions,
         });
-        if let Some(position) = place.get("position") {
-            node["nodePosition"] = position.clone();
+        let position = members(place, &["x", "y", "mapId", "theta", "allowedDeviationXY", "allowedDeviationTheta"]);
+        if position.contains_key("x") {
+            node["nodePosition"] = Value::Object(position);
         }
         Ok(node)
     }
@@ -127,9 +128,15 @@ impl RouteBuilder<'_> {
             "endNodeId": end(to),
             "actions": actions,
         });
-        if let (Some(Value::Object(more)), Value::Object(built)) = (edge.get("members"), &mut built) {
-            built.extend(more.clone());
+        if let Value::Object(built) = &mut built {
+            // What else the layout knows of an edge is optional in an order: only a speed cap is worth sending.
+            built.extend(members(edge, &["maxSpeed"]));
         }
         Ok(built)
     }
+}
+
+/// The members of these names that are there.
+fn members(value: &Value, names: &[&str]) -> Map<String, Value> {
+    names.iter().filter_map(|name| Some(((*name).to_owned(), value.get(name)?.clone()))).collect()
 }

@@ -30,7 +30,7 @@ pub(super) fn standing(judge: &RunJudge, layout: &Layout) -> Option<Standing> {
     let position = state.get("agvPosition")?;
     let number = |name: &str| position.get(name).and_then(Value::as_f64);
     Some(Standing::Pose {
-        map_id: position.get("mapId")?.as_str()?.to_owned(),
+        map: position.get("mapId")?.as_str()?.to_owned(),
         x: number("x")?,
         y: number("y")?,
     })
@@ -46,7 +46,7 @@ pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) 
     let course = layout
         .assign(&test.course, &standing)
         .map_err(|error| error.to_string())?;
-    Ok(Some(course.bindings()))
+    Ok(Some(flat(course.bindings())))
 }
 
 /// The variables only this test has.
@@ -101,4 +101,18 @@ fn fresh_names(test: &Test) -> BTreeSet<String> {
         }
     }
     names
+}
+
+/// `course.a.x` beside `course.nodes.a.x`: suites name a node and its members in one breath.
+fn flat(mut course: Value) -> Value {
+    let mut short = Map::new();
+    for (name, node) in course.get("nodes").and_then(Value::as_object).into_iter().flatten() {
+        for (member, value) in node.as_object().into_iter().flatten() {
+            short.insert(format!("{name}.{member}"), value.clone());
+        }
+    }
+    if let Value::Object(members) = &mut course {
+        members.extend(short);
+    }
+    course
 }

@@ -37,7 +37,6 @@ impl ReferenceAgv {
         let layout = Layout::built_in();
         let nodes: Vec<LayoutNode> = layout
             .nodes()
-            .iter()
             .map(|node| LayoutNode {
                 id: node.id.clone(),
                 x: node.x,

@@ -279,6 +279,7 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
             row
         }
         Event::RunBegun { .. }
+        | Event::Planned { .. }
         | Event::RunEnded { .. }
         | Event::TestBegun { .. }
         | Event::TestEnded { .. }
