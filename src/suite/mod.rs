@@ -1,16 +1,75 @@
 //! YAML into typed tests, with a source span on everything, linted against the packs.
 //!
-//! [`model`] is what the rest of the program sees. `syntax` turns text into a spanned tree (the only place
-//! that knows the YAML crate), `read` turns the tree into the model, `lint` checks every path, literal,
+//! [`model`] is what the rest of the program sees. [`Suites::load`] makes it from the files: tables of cases and
+//! states are filled in on the tree, the tree is read into the model, and `lint` looks up every path, literal,
 //! requirement, variable, state and check name. Running a test is left to the engine, judging it to the judge.
 
+mod course;
+mod expand;
+mod fields;
+mod grammar;
+mod lint;
+mod load;
 pub mod model;
+mod steps;
+mod stimuli;
+mod terms;
+#[cfg(test)]
+mod tests;
+mod visit;
 
-/// All tests and monitors.
-#[derive(Debug, Default)]
+use std::sync::Arc;
+
+pub use lint::{HookFacts, PathShape, RequirementFacts, Vocabulary};
+
+use crate::diagnostic::Diagnostic;
+use model::{Monitor, Test};
+
+/// What the linter has to know of a named check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CheckInfo {
+    /// Name, such as `order/remaining-route`.
+    pub name: &'static str,
+    /// Requirements it can decide.
+    pub decides: &'static [&'static str],
+    /// Names of arguments it takes.
+    pub arguments: &'static [&'static str],
+}
+
+/// All tests and monitors, sorted by id.
+#[derive(Clone, Debug, Default)]
 pub struct Suites {
-    /// Tests, by id.
-    pub tests: Vec<std::sync::Arc<model::Test>>,
-    /// Monitors, by id.
-    pub monitors: Vec<std::sync::Arc<model::Monitor>>,
+    /// The tests; every row of a table is one.
+    pub tests: Vec<Arc<Test>>,
+    /// The monitors.
+    pub monitors: Vec<Arc<Monitor>>,
+}
+
+impl Suites {
+    /// Loads every file below `suites/`, given by path (`suites/agv/…`) and text, against any vocabulary.
+    ///
+    /// # Errors
+    /// Everything that is wrong with any of the files, by file and place.
+    pub fn load_files<'a>(
+        files: impl Iterator<Item = (&'a str, &'a str)>,
+        vocabulary: &dyn Vocabulary,
+        checks: &[CheckInfo],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        load::load(files, vocabulary, checks)
+    }
+
+    /// Loads the text of one test, state or monitor, told apart by content, wherever it lies. `files` are
+    /// searched for the states it uses.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn load_one<'a>(
+        name: &str,
+        text: &str,
+        files: impl Iterator<Item = (&'a str, &'a str)>,
+        vocabulary: &dyn Vocabulary,
+        checks: &[CheckInfo],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        load::load_text(name, text, files, vocabulary, checks)
+    }
 }
