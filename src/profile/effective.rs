@@ -241,6 +241,7 @@ impl Taken<'_> {
                     HookAction::Run(_) => "run",
                     HookAction::Http { .. } => "http",
                     HookAction::Prompt(_) => "prompt",
+                    HookAction::RestartDevice => "builtin",
                 }
                 .to_owned(),
                 origin: origin.to_string(),

@@ -212,7 +212,12 @@ pub enum HookAction {
     },
     /// A text for a person.
     Prompt(String),
+    /// The harness ends and starts again the device it has started itself (`device.command`).
+    RestartDevice,
 }
+
+/// The one value of `builtin`.
+pub const RESTART_DEVICE: &str = "restart-command";
 
 impl HookAction {
     /// A program or request that needs nobody.
@@ -235,6 +240,7 @@ impl HookAction {
         match self {
             Self::Run(arguments) => Self::Run(arguments.iter().map(|text| fill(text, values, verbatim)).collect()),
             Self::Prompt(text) => Self::Prompt(fill(text, values, verbatim)),
+            Self::RestartDevice => Self::RestartDevice,
             Self::Http { method, url, body } => Self::Http {
                 method: method.clone(),
                 url: fill(url, values, |value| {
@@ -254,6 +260,7 @@ impl HookAction {
         match self {
             Self::Run(arguments) => arguments.iter().map(String::as_str).collect(),
             Self::Prompt(text) => vec![text],
+            Self::RestartDevice => Vec::new(),
             Self::Http { url, body, .. } => [Some(url), body.as_ref()]
                 .into_iter()
                 .flatten()

@@ -5,7 +5,7 @@ use toml::de::DeValue;
 
 use super::{Entry, Reader};
 use crate::diagnostic;
-use crate::profile::hooks::{HOOKS, Hook, HookAction};
+use crate::profile::hooks::{HOOKS, Hook, HookAction, RESTART_DEVICE};
 use crate::profile::key::{COMMON_PLACEHOLDERS, Kind};
 use crate::profile::value::{self, Value};
 
@@ -20,7 +20,7 @@ impl Reader<'_> {
             return;
         }
         let what = format!("hook `{id}`");
-        let Some(members) = self.members(&what, value, &["run", "http", "prompt", "timeout"], &[]) else {
+        let Some(members) = self.members(&what, value, &["run", "http", "prompt", "builtin", "timeout"], &[]) else {
             return;
         };
         let ways: Vec<&str> = members.keys().copied().filter(|way| *way != "timeout").collect();
@@ -33,7 +33,7 @@ impl Reader<'_> {
                     "more than one way to be done"
                 }
             );
-            let hint = "give exactly one of `run`, `http` and `prompt`".to_owned();
+            let hint = "give exactly one of `run`, `http`, `prompt` and `builtin`".to_owned();
             self.complain("contradiction", name.span(), &title, &ways.join(" and "), Some(hint));
             return;
         };
@@ -63,6 +63,7 @@ impl Reader<'_> {
         let action = match way {
             "run" => HookAction::Run(self.command(&what, value)?),
             "prompt" => HookAction::Prompt(self.text(&what, value)?),
+            "builtin" => self.builtin(&what, value)?,
             _ => self.http(&what, value)?,
         };
         let mut known: Vec<&str> = HOOKS
@@ -80,6 +81,16 @@ impl Reader<'_> {
             }
         }
         Some(action)
+    }
+
+    fn builtin(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<HookAction> {
+        let name = self.text(what, value)?;
+        if name == RESTART_DEVICE {
+            return Some(HookAction::RestartDevice);
+        }
+        let hint = Some(format!("did you mean `{RESTART_DEVICE}`?"));
+        self.complain("bad-value", value.span(), &format!("{what} is not known"), &name, hint);
+        None
     }
 
     fn command(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<Vec<String>> {
