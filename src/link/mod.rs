@@ -4,7 +4,9 @@
 //! server), `memory` an in-process bus with MQTT's retain, will and QoS rules in virtual time. A link
 //! reports everything as journal occurrences and judges nothing.
 
+pub(crate) mod inbox;
 pub mod memory;
+pub mod mqtt;
 
 use crate::clock::{Moment, Stamp};
 use crate::journal::event::{LinkFault, Occurrence};

@@ -2,5 +2,208 @@
 //!
 //! It forwards bytes, decodes a copy, reports both as occurrences and injects link faults. It judges nothing.
 
+mod connection;
 pub mod faults;
+mod pump;
+mod rewrite;
+pub mod tls;
 pub mod wire;
+
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
+use tokio::task::{JoinHandle, JoinSet};
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::rustls::{ClientConfig, ServerConfig};
+
+use crate::journal::event::{Direction, Event, LinkFault, Source};
+use crate::link::LinkError;
+use crate::link::inbox::Reporter;
+use faults::{Change, Faults};
+
+/// How long a cut may take; closing sockets takes no time, so this is only a safety net.
+const CUT_LIMIT: Duration = Duration::from_secs(2);
+
+/// The broker behind the tap.
+#[derive(Clone)]
+pub(crate) struct Upstream {
+    /// Host, and port.
+    pub(crate) host: String,
+    pub(crate) port: u16,
+    /// For `mqtts://`.
+    pub(crate) tls: Option<Arc<ClientConfig>>,
+    /// Whether it is the embedded broker, whose peculiarities the tap absorbs.
+    pub(crate) embedded: bool,
+}
+
+/// What open connections are told.
+#[derive(Clone, Copy, Debug, Default)]
+struct Control {
+    cuts: u64,
+    reset: bool,
+    restores: u64,
+}
+
+/// What all connections share.
+struct Shared {
+    reporter: Reporter,
+    upstream: Upstream,
+    tls: Option<TlsAcceptor>,
+    faults: Mutex<Faults>,
+    control: watch::Sender<Control>,
+    /// Number of open connections.
+    open: watch::Sender<usize>,
+}
+
+/// A running tap.
+pub struct Tap {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+    accepting: JoinHandle<()>,
+}
+
+impl Tap {
+    /// Opens the port devices connect to.
+    ///
+    /// # Errors
+    /// [`LinkError::Listen`] when the port is taken or may not be opened.
+    pub(crate) async fn start(
+        listen: &str,
+        tls: Option<Arc<ServerConfig>>,
+        upstream: Upstream,
+        reporter: Reporter,
+    ) -> Result<Self, LinkError> {
+        let listener = listen_on(listen).await?;
+        let address = listener.local_addr().map_err(|error| cannot_listen(listen, &error))?;
+        let shared = Arc::new(Shared {
+            reporter,
+            upstream,
+            tls: tls.map(TlsAcceptor::from),
+            faults: Mutex::default(),
+            control: watch::Sender::default(),
+            open: watch::Sender::default(),
+        });
+        let accepting = tokio::spawn(accept(listener, shared.clone()));
+        Ok(Self {
+            shared,
+            address,
+            accepting,
+        })
+    }
+
+    /// Where devices connect to.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Changes what the tap does. In effect when this returns: after a cut all connections are closed.
+    pub async fn fault(&self, fault: &LinkFault) {
+        let change = self
+            .shared
+            .faults
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .apply(fault);
+        self.shared.control.send_modify(|control| match change {
+            Change::Cut { reset } => {
+                control.cuts += 1;
+                control.reset = reset;
+            }
+            Change::Keep => control.restores += u64::from(*fault == LinkFault::Restore),
+        });
+        if let Change::Cut { .. } = change {
+            let mut open = self.shared.open.subscribe();
+            let _ = tokio::time::timeout(CUT_LIMIT, open.wait_for(|open| *open == 0)).await;
+        }
+    }
+
+    /// Closes the port and all connections.
+    pub async fn stop(self) {
+        self.accepting.abort();
+        let _ = self.accepting.await;
+    }
+}
+
+/// Opens a port; a port that is taken gets a text that says what to do.
+pub(crate) async fn listen_on(address: &str) -> Result<TcpListener, LinkError> {
+    TcpListener::bind(address)
+        .await
+        .map_err(|error| cannot_listen(address, &error))
+}
+
+fn cannot_listen(address: &str, error: &std::io::Error) -> LinkError {
+    let reason = match error.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            "another program is using this port already; stop it or listen on another port".to_owned()
+        }
+        std::io::ErrorKind::PermissionDenied => "the system does not allow this port; choose one above 1023".to_owned(),
+        std::io::ErrorKind::AddrNotAvailable => "this machine has no such address".to_owned(),
+        _ => error.to_string(),
+    };
+    LinkError::Listen {
+        address: address.to_owned(),
+        reason,
+    }
+}
+
+/// Lets devices in. Connections end with this task.
+async fn accept(listener: TcpListener, shared: Arc<Shared>) {
+    let mut connections = JoinSet::new();
+    let mut number = 0;
+    loop {
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            Some(_) = connections.join_next() => continue,
+        };
+        let Ok((socket, peer)) = accepted else {
+            // Out of file descriptors, most likely; the next attempt may work.
+            tokio::time::sleep(Duration::from_millis(20)).await;
+            continue;
+        };
+        let Some(admitted) = admit(&shared) else {
+            refuse(socket, peer, &shared.reporter).await;
+            continue;
+        };
+        number += 1;
+        connections.spawn(connection::serve(socket, peer, number, shared.clone(), admitted));
+    }
+}
+
+/// Counts a connection as open until it is dropped.
+struct Admitted {
+    shared: Arc<Shared>,
+    control: watch::Receiver<Control>,
+}
+
+impl Drop for Admitted {
+    fn drop(&mut self) {
+        self.shared.open.send_modify(|open| *open -= 1);
+    }
+}
+
+fn admit(shared: &Arc<Shared>) -> Option<Admitted> {
+    // Under the lock, so that a cut either finds this connection open or keeps it out.
+    let faults = shared.faults.lock().unwrap_or_else(PoisonError::into_inner);
+    if !faults.admits() {
+        return None;
+    }
+    shared.open.send_modify(|open| *open += 1);
+    Some(Admitted {
+        shared: shared.clone(),
+        control: shared.control.subscribe(),
+    })
+}
+
+/// A connection attempt that is to fail: the port stays ours, and the connection is reset at once.
+async fn refuse(socket: TcpStream, peer: SocketAddr, reporter: &Reporter) {
+    faults::abort(&socket);
+    drop(socket);
+    let text = format!("a connection attempt from {peer} was refused");
+    reporter
+        .report(Source::Tap, Some(Direction::FromDevice), Event::Note { text })
+        .await;
+}

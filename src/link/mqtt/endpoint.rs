@@ -1,0 +1,151 @@
+//! Where a broker is and how to get in.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use tokio_rustls::rustls::ClientConfig;
+
+use crate::link::LinkError;
+use crate::tap::tls;
+
+/// User name and password for a broker.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Credentials {
+    /// User name.
+    pub username: String,
+    /// Password; never shown.
+    pub password: String,
+}
+
+impl std::fmt::Debug for Credentials {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Credentials")
+            .field("username", &self.username)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A broker.
+#[derive(Clone, Debug)]
+pub struct Endpoint {
+    /// Host name or address.
+    pub host: String,
+    /// Port.
+    pub port: u16,
+    /// Set for TLS.
+    pub tls: Option<Arc<ClientConfig>>,
+    /// How to log in.
+    pub credentials: Option<Credentials>,
+}
+
+impl Endpoint {
+    /// A broker without TLS and without credentials.
+    #[must_use]
+    pub fn plain(address: std::net::SocketAddr) -> Self {
+        Self {
+            host: address.ip().to_string(),
+            port: address.port(),
+            tls: None,
+            credentials: None,
+        }
+    }
+
+    /// Reads `mqtt://host:port`, `mqtts://host:port` or `host:port`; the port may be left out. `authority` is a
+    /// PEM file to check an `mqtts` broker's certificate against, instead of what the system trusts.
+    ///
+    /// # Errors
+    /// [`LinkError::Setup`] when the address cannot be read or the certificates do not work.
+    pub fn parse(url: &str, authority: Option<&Path>, credentials: Option<Credentials>) -> Result<Self, LinkError> {
+        let wrong = |what: &str| LinkError::Setup(format!("`{url}` is not a broker: {what}"));
+        let (secure, rest) = match url.split_once("://") {
+            None | Some(("mqtt" | "tcp", _)) => (false, url.rsplit("://").next().unwrap_or(url)),
+            Some(("mqtts" | "ssl" | "tls", rest)) => (true, rest),
+            Some((scheme, _)) => return Err(wrong(&format!("`{scheme}` is not supported, use mqtt:// or mqtts://"))),
+        };
+        let rest = rest.strip_suffix('/').unwrap_or(rest);
+        if rest.contains(['@', '/', '?']) {
+            return Err(wrong(
+                "only host and port belong there; user and password are given apart",
+            ));
+        }
+        let (host, port) = match rest.rsplit_once(':') {
+            Some((host, port)) if !host.ends_with(':') && (!host.contains(':') || host.ends_with(']')) => (
+                host,
+                port.parse()
+                    .map_err(|_| wrong("the port is not a number up to 65535"))?,
+            ),
+            _ => (rest, if secure { 8883 } else { 1883 }),
+        };
+        let host = host.trim_start_matches('[').trim_end_matches(']');
+        if host.is_empty() {
+            return Err(wrong("there is no host"));
+        }
+        Ok(Self {
+            host: host.to_owned(),
+            port,
+            tls: if secure { Some(tls::client(authority)?) } else { None },
+            credentials,
+        })
+    }
+
+    /// `host:port`, for messages.
+    #[must_use]
+    pub fn address(&self) -> String {
+        if self.host.contains(':') {
+            format!("[{}]:{}", self.host, self.port)
+        } else {
+            format!("{}:{}", self.host, self.port)
+        }
+    }
+
+    /// The error that this broker is not there.
+    pub(crate) fn lost(&self, reason: impl Into<String>) -> LinkError {
+        LinkError::Broker {
+            address: self.address(),
+            reason: reason.into(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_read_with_and_without_scheme_and_port() {
+        for (url, host, port) in [
+            ("mqtt://broker.local:1884", "broker.local", 1884),
+            ("mqtt://broker.local/", "broker.local", 1883),
+            ("10.0.0.7", "10.0.0.7", 1883),
+            ("10.0.0.7:99", "10.0.0.7", 99),
+            ("mqtt://[::1]:1885", "::1", 1885),
+            ("::1", "::1", 1883),
+        ] {
+            let endpoint = Endpoint::parse(url, None, None).unwrap();
+            assert_eq!((endpoint.host.as_str(), endpoint.port), (host, port), "{url}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_broker_is_refused_with_a_reason() {
+        for (url, reason) in [
+            ("http://x", "http"),
+            ("mqtt://", "no host"),
+            ("mqtt://x:99999", "port"),
+            ("mqtt://user:secret@x", "given apart"),
+        ] {
+            let error = Endpoint::parse(url, None, None).unwrap_err().to_string();
+            assert!(error.contains(reason), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_password_is_never_shown() {
+        let credentials = Credentials {
+            username: "u".to_owned(),
+            password: "hunter2".to_owned(),
+        };
+        assert!(!format!("{credentials:?}").contains("hunter2"));
+    }
+}

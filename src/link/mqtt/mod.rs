@@ -1,0 +1,452 @@
+//! The real bench: broker, tap, map server and the harness's own MQTT connection, behind one [`Link`].
+//!
+//! Everything that happens comes through one inbox, stamped on arrival. The bench owns all tasks and sockets;
+//! [`MqttLink::stop`] closes them.
+
+pub mod client;
+pub mod endpoint;
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+use tokio::time::{Instant, sleep_until, timeout};
+
+use crate::broker::{EmbeddedBroker, self_test};
+use crate::clock::{Moment, Stamp, WallClock};
+use crate::journal::event::{Direction, Event, LinkFault, Occurrence, Payload, Source};
+use crate::link::inbox::{Inbox, inbox};
+use crate::link::{Link, LinkError, Offer, Outgoing, Vantage};
+use crate::maps::MapServer;
+use crate::tap::tls::{self, TlsFiles};
+use crate::tap::{Tap, Upstream};
+use client::{Client, ClientEvent, ClientOptions};
+use endpoint::{Credentials, Endpoint};
+
+pub use crate::link::inbox::Reporter;
+
+/// How long the broker may take to accept the harness, or to serve a fresh subscriber.
+const ANSWER_LIMIT: Duration = Duration::from_secs(10);
+/// Keep-alive of the harness's own connections.
+const KEEP_ALIVE: Duration = Duration::from_secs(30);
+
+/// Which broker is used.
+#[derive(Clone, Debug)]
+pub enum BrokerChoice {
+    /// The embedded one.
+    Embedded,
+    /// Another one.
+    External {
+        /// `mqtt://host:port` or `mqtts://host:port`.
+        url: String,
+        /// PEM file to check its certificate against.
+        authority: Option<PathBuf>,
+        /// How the harness logs in. The device's own credentials pass the tap untouched.
+        credentials: Option<Credentials>,
+    },
+}
+
+/// What the bench is to be.
+#[derive(Clone, Debug)]
+pub struct BenchOptions {
+    /// Where the tap listens for the device; port 0 lets the system choose.
+    pub listen: String,
+    /// The broker.
+    pub broker: BrokerChoice,
+    /// Whether there is a tap. Without one the device connects to the broker itself.
+    pub tap: bool,
+    /// Certificate of the tap; without one it speaks plain TCP.
+    pub tls: Option<TlsFiles>,
+    /// Where the map server listens.
+    pub maps_listen: String,
+    /// Topic filters of the standing subscription: the topics of the device.
+    pub device_topics: Vec<String>,
+    /// The clock of the run.
+    pub clock: WallClock,
+}
+
+impl BenchOptions {
+    /// A bench on loopback with everything embedded, on ports the system chooses.
+    #[must_use]
+    pub fn loopback(device_topics: Vec<String>) -> Self {
+        Self {
+            listen: "127.0.0.1:0".to_owned(),
+            broker: BrokerChoice::Embedded,
+            tap: true,
+            tls: None,
+            maps_listen: "127.0.0.1:0".to_owned(),
+            device_topics,
+            clock: WallClock::start(),
+        }
+    }
+}
+
+/// Where everything is.
+#[derive(Clone, Debug)]
+pub struct BenchInfo {
+    /// `host:port` the device connects to: the tap, or the broker when there is no tap.
+    pub device_address: String,
+    /// `host:port` of the broker.
+    pub broker_address: String,
+    /// The broker, for clients of the harness itself.
+    pub broker: Endpoint,
+    /// Where the map server listens.
+    pub maps_address: SocketAddr,
+}
+
+/// Starts benches.
+pub struct MqttBench;
+
+impl MqttBench {
+    /// Starts broker, tap and map server, tests the broker, and connects. When it returns, the standing
+    /// subscription is acknowledged and the device may connect.
+    ///
+    /// # Errors
+    /// [`LinkError::Listen`] when a port is taken, [`LinkError::Broker`] when an external broker is not there,
+    /// [`LinkError::Setup`] when certificates do not work or the broker fails its self-test.
+    pub async fn start(options: BenchOptions) -> Result<(MqttLink, BenchInfo), LinkError> {
+        let (reporter, inbox) = inbox(options.clock);
+        // The port for the device first: that it is taken is what goes wrong most often.
+        let tls = options.tls.as_ref().map(tls::server).transpose()?;
+        let (embedded, endpoint) = match &options.broker {
+            BrokerChoice::Embedded => {
+                let broker = EmbeddedBroker::start().await?;
+                let endpoint = Endpoint::plain(broker.address());
+                (Some(broker), endpoint)
+            }
+            BrokerChoice::External {
+                url,
+                authority,
+                credentials,
+            } => (None, Endpoint::parse(url, authority.as_deref(), credentials.clone())?),
+        };
+        let upstream = Upstream {
+            host: endpoint.host.clone(),
+            port: endpoint.port,
+            tls: endpoint.tls.clone(),
+            embedded: embedded.is_some(),
+        };
+        let maps = MapServer::start(&options.maps_listen, reporter.clone()).await?;
+        self_test(&endpoint).await?;
+        let run = uuid::Uuid::new_v4().simple().to_string();
+        let standing = standing(&endpoint, &run, &options, &reporter).await?;
+        // Last, so that nothing of the device can be missed.
+        let tap = match options.tap {
+            true => Some(Tap::start(&options.listen, tls, upstream, reporter.clone()).await?),
+            false => None,
+        };
+        let info = BenchInfo {
+            device_address: tap
+                .as_ref()
+                .map_or_else(|| endpoint.address(), |tap| tap.address().to_string()),
+            broker_address: endpoint.address(),
+            broker: endpoint.clone(),
+            maps_address: maps.address(),
+        };
+        let mut tasks = JoinSet::new();
+        if let Some(broker) = &embedded {
+            let (mut ended, reporter, endpoint) = (broker.ended(), reporter.clone(), endpoint.clone());
+            tasks.spawn(async move {
+                if let Ok(reason) = ended.wait_for(Option::is_some).await {
+                    reporter.broken(endpoint.lost(reason.clone().unwrap_or_default()));
+                }
+            });
+        }
+        tasks.spawn(listen(
+            standing.events,
+            endpoint.clone(),
+            probe_topic(&run),
+            reporter.clone(),
+        ));
+        let link = MqttLink {
+            clock: options.clock,
+            vantage: if options.tap { Vantage::Tap } else { Vantage::Subscriber },
+            endpoint,
+            run,
+            client: standing.client,
+            inbox,
+            reporter,
+            tap,
+            maps,
+            embedded,
+            tasks,
+            requests: 0,
+            probes: 0,
+            broken: None,
+        };
+        Ok((link, info))
+    }
+}
+
+struct Standing {
+    client: Client,
+    events: mpsc::Receiver<ClientEvent>,
+}
+
+/// Connects the harness and waits until its standing subscription is acknowledged.
+async fn standing(
+    endpoint: &Endpoint,
+    run: &str,
+    options: &BenchOptions,
+    reporter: &Reporter,
+) -> Result<Standing, LinkError> {
+    let topics = options.device_topics.iter().cloned().chain([probe_topic(run)]);
+    let (client, mut events) = Client::open(&own_client(endpoint, &format!("tck-{run}"), topics));
+    let connected = async {
+        loop {
+            match events.recv().await {
+                Some(ClientEvent::Connected) => return Ok(()),
+                // Stored messages may come before the acknowledgement.
+                Some(message @ ClientEvent::Message { .. }) => tell(message, reporter, "").await,
+                Some(ClientEvent::Lost(reason)) => return Err(endpoint.lost(reason)),
+                None => return Err(endpoint.lost("the connection ended")),
+            }
+        }
+    };
+    match timeout(ANSWER_LIMIT, connected).await {
+        Ok(result) => result?,
+        Err(_) => return Err(endpoint.lost("it does not answer")),
+    }
+    Ok(Standing { client, events })
+}
+
+fn own_client(endpoint: &Endpoint, client_id: &str, topics: impl Iterator<Item = String>) -> ClientOptions {
+    ClientOptions {
+        endpoint: endpoint.clone(),
+        client_id: client_id.to_owned(),
+        keep_alive: KEEP_ALIVE,
+        clean_session: true,
+        will: None,
+        subscriptions: topics.map(|topic| (topic, 2)).collect(),
+    }
+}
+
+fn probe_topic(run: &str) -> String {
+    format!("vda5050-tck/{run}/probe")
+}
+
+/// Reports what the standing subscription receives, until the connection is gone.
+async fn listen(mut events: mpsc::Receiver<ClientEvent>, endpoint: Endpoint, probes: String, reporter: Reporter) {
+    let reason = loop {
+        match events.recv().await {
+            Some(ClientEvent::Lost(reason)) => break reason,
+            Some(event) => tell(event, &reporter, &probes).await,
+            None => break "the connection ended".to_owned(),
+        }
+    };
+    reporter.broken(endpoint.lost(reason));
+}
+
+async fn tell(event: ClientEvent, reporter: &Reporter, probes: &str) {
+    let ClientEvent::Message {
+        topic,
+        payload,
+        qos,
+        retain,
+        dup,
+    } = event
+    else {
+        return;
+    };
+    if topic == probes {
+        if let Some(probe) = std::str::from_utf8(&payload).ok().and_then(|text| text.parse().ok()) {
+            reporter
+                .report(Source::Link, None, Event::ProbeReceived { probe })
+                .await;
+        }
+        return;
+    }
+    let payload = Payload::keep(payload);
+    let event = Event::Message {
+        topic,
+        qos,
+        retain,
+        dup,
+        payload,
+    };
+    reporter.report(Source::Link, Some(Direction::FromDevice), event).await;
+}
+
+/// The real bench as the engine sees it.
+pub struct MqttLink {
+    clock: WallClock,
+    vantage: Vantage,
+    endpoint: Endpoint,
+    run: String,
+    client: Client,
+    inbox: Inbox,
+    reporter: Reporter,
+    tap: Option<Tap>,
+    maps: MapServer,
+    embedded: Option<EmbeddedBroker>,
+    tasks: JoinSet<()>,
+    requests: u64,
+    probes: u64,
+    /// Why the broker is gone, once it is.
+    broken: Option<String>,
+}
+
+impl MqttLink {
+    /// For other sources of the harness, such as a mock AGV that reports what it sends.
+    #[must_use]
+    pub fn reporter(&self) -> Reporter {
+        self.reporter.clone()
+    }
+
+    /// Takes the bench down: connections, ports, broker.
+    pub async fn stop(mut self) {
+        self.tasks.abort_all();
+        if let Some(tap) = self.tap {
+            tap.stop().await;
+        }
+        self.client.disconnect().await;
+        self.maps.stop().await;
+        if let Some(broker) = self.embedded {
+            broker.stop().await;
+        }
+    }
+
+    fn check(&self) -> Result<(), LinkError> {
+        match &self.broken {
+            Some(reason) => Err(self.endpoint.lost(reason.clone())),
+            None => Ok(()),
+        }
+    }
+
+    fn note<T>(&mut self, result: Result<T, LinkError>) -> Result<T, LinkError> {
+        if let Err(LinkError::Broker { reason, .. }) = &result {
+            self.broken = Some(reason.clone());
+        }
+        result
+    }
+
+    fn send(&mut self, message: Outgoing) -> Result<(), LinkError> {
+        self.check()?;
+        if self.client.publish(message) {
+            return Ok(());
+        }
+        let result = Err(self.endpoint.lost("the harness's own connection is gone"));
+        self.note(result)
+    }
+}
+
+impl Link for MqttLink {
+    fn now(&self) -> Stamp {
+        self.clock.now()
+    }
+
+    fn vantage(&self) -> Vantage {
+        self.vantage
+    }
+
+    async fn publish(&mut self, message: Outgoing) -> Result<(), LinkError> {
+        self.send(message)
+    }
+
+    async fn next(&mut self, until: Moment) -> Result<Option<Occurrence>, LinkError> {
+        let ready = self.inbox.ready();
+        if let Some(occurrence) = self.note(ready)? {
+            return Ok(Some(occurrence));
+        }
+        self.check()?;
+        let deadline = Instant::from_std(self.clock.instant(until));
+        let next = tokio::select! {
+            biased;
+            next = self.inbox.next() => next.map(Some),
+            () = sleep_until(deadline) => Ok(None),
+        };
+        self.note(next)
+    }
+
+    async fn fault(&mut self, fault: LinkFault) -> Result<(), LinkError> {
+        let Some(tap) = &self.tap else {
+            return Err(LinkError::NeedsTap {
+                what: "a link fault".to_owned(),
+            });
+        };
+        tap.fault(&fault).await;
+        Ok(())
+    }
+
+    async fn fresh_subscriber(&mut self, topic: &str) -> Result<u64, LinkError> {
+        self.check()?;
+        self.requests += 1;
+        let request = self.requests;
+        let end = format!("vda5050-tck/{}/end/{request}", self.run);
+        let id = format!("tck-{}-{request}", self.run);
+        let options = own_client(&self.endpoint, &id, [topic.to_owned(), end.clone()].into_iter());
+        let (endpoint, reporter) = (self.endpoint.clone(), self.reporter.clone());
+        while self.tasks.try_join_next().is_some() {}
+        self.tasks.spawn(async move {
+            let served = timeout(ANSWER_LIMIT, serve_fresh(request, &options, end, &reporter)).await;
+            if let Err(reason) = served.unwrap_or_else(|_| Err("it does not serve a fresh subscriber".to_owned())) {
+                reporter.broken(endpoint.lost(reason));
+            }
+        });
+        Ok(request)
+    }
+
+    async fn probe(&mut self) -> Result<u64, LinkError> {
+        self.probes += 1;
+        let probe = self.probes;
+        self.send(Outgoing {
+            topic: probe_topic(&self.run),
+            payload: probe.to_string().into(),
+            qos: 1,
+            retain: false,
+        })?;
+        Ok(probe)
+    }
+
+    async fn serve(&mut self, offer: Offer) -> Result<String, LinkError> {
+        Ok(self.maps.offer(offer))
+    }
+}
+
+/// Subscribes with a new client and reports what comes. A message of its own, sent after the subscription was
+/// granted, comes back behind everything the broker had stored.
+async fn serve_fresh(request: u64, options: &ClientOptions, end: String, reporter: &Reporter) -> Result<(), String> {
+    let (client, mut events) = Client::open(options);
+    loop {
+        match events.recv().await {
+            Some(ClientEvent::Connected) => {
+                let marker = Outgoing {
+                    topic: end.clone(),
+                    payload: bytes::Bytes::new(),
+                    qos: 1,
+                    retain: false,
+                };
+                if !client.publish(marker) {
+                    return Err("a fresh subscriber lost its connection".to_owned());
+                }
+            }
+            Some(ClientEvent::Message { topic, .. }) if topic == end => break,
+            Some(ClientEvent::Message {
+                topic,
+                payload,
+                qos,
+                retain,
+                ..
+            }) => {
+                let payload = Payload::keep(payload);
+                let event = Event::Retained {
+                    request,
+                    topic,
+                    qos,
+                    retain,
+                    payload,
+                };
+                reporter.report(Source::Link, Some(Direction::FromDevice), event).await;
+            }
+            Some(ClientEvent::Lost(reason)) => return Err(reason),
+            None => return Err("a fresh subscriber lost its connection".to_owned()),
+        }
+    }
+    reporter
+        .report(Source::Link, None, Event::RetainedEnd { request })
+        .await;
+    client.disconnect().await;
+    Ok(())
+}
