@@ -45,6 +45,14 @@ impl Bundle {
         Ok(Self { folder })
     }
 
+    /// A bundle that is there already.
+    #[must_use]
+    pub fn open(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+        }
+    }
+
     /// The folder.
     #[must_use]
     pub fn folder(&self) -> &Path {

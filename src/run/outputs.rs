@@ -1,0 +1,79 @@
+//! Everything a bundle holds beside the journal, written from the result alone.
+
+use super::bundle::{Bundle, BundleError};
+use crate::journal::Journal;
+use crate::pack::{Catalogue, Decided, Pack};
+use crate::report::result::RunResult;
+use crate::report::sources::{HowDecided, MonitorSource, RequirementText, Sources, TestSource};
+use crate::report::{html, json, junit, manifest};
+use crate::suite::Suites;
+
+/// Why the outputs could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// A file cannot be written.
+    #[error(transparent)]
+    Bundle(#[from] BundleError),
+    /// `result.json` cannot be made.
+    #[error(transparent)]
+    Result(#[from] json::ResultError),
+    /// `junit.xml` cannot be made.
+    #[error(transparent)]
+    Junit(#[from] junit::JunitError),
+    /// `report.html` cannot be made.
+    #[error("cannot render the report: {0}")]
+    Html(String),
+    /// `manifest.json` cannot be made.
+    #[error(transparent)]
+    Manifest(#[from] manifest::ManifestError),
+}
+
+/// What catalogue and suites say, for a protocol version.
+#[must_use]
+pub fn sources(catalogue: &Catalogue, suites: &Suites, pack: &Pack) -> Sources {
+    let requirements = catalogue.all().filter_map(|requirement| {
+        let note = requirement.in_version(pack)?;
+        Some(RequirementText {
+            id: requirement.id.as_str().to_owned(),
+            chapter: requirement.chapter.clone(),
+            text: requirement.text.clone(),
+            role: requirement.role.word().to_owned(),
+            mood: note.mood.word().to_owned(),
+            section: note.section.clone(),
+            interpretation: requirement.interpretation.clone(),
+            decided: match &requirement.decided {
+                Decided::Active => HowDecided::Active,
+                Decided::Passive => HowDecided::Passive,
+                Decided::Operator => HowDecided::Operator,
+                Decided::NotTestable { reason } => HowDecided::NotTestable(reason.clone()),
+            },
+        })
+    });
+    let tests = suites.tests.iter().filter(|test| test.spec.contains(pack.version));
+    let monitors = suites.monitors.iter().filter(|monitor| monitor.spec.contains(pack.version));
+    Sources {
+        requirements: requirements.collect(),
+        tests: tests.map(|test| TestSource::of(test)).collect(),
+        monitors: monitors.map(|monitor| MonitorSource::of(monitor)).collect(),
+    }
+}
+
+/// Writes `result.json`, as after every test.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_result(bundle: &Bundle, result: &RunResult) -> Result<(), OutputError> {
+    Ok(json::write(&bundle.folder().join("result.json"), result)?)
+}
+
+/// Writes everything but the journal, and returns the root hash of the bundle.
+///
+/// # Errors
+/// When something cannot be made or written.
+pub fn write_all(bundle: &Bundle, result: &RunResult, sources: &Sources, journal: &Journal) -> Result<String, OutputError> {
+    write_result(bundle, result)?;
+    bundle.write("junit.xml", junit::render(result)?.as_bytes())?;
+    let page = html::render(result, sources, Some(journal)).map_err(|error| OutputError::Html(error.to_string()))?;
+    bundle.write("report.html", page.as_bytes())?;
+    Ok(manifest::Manifest::write(bundle.folder())?.root)
+}
