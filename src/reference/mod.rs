@@ -3,6 +3,8 @@
 //! A reference device is handed inputs and the time and hands back outputs; it owns no socket, no clock and
 //! no randomness. Drivers that connect one to a link live in `link::memory` and `cli::simulate`.
 
+pub mod agv;
+
 use std::time::Duration;
 
 use crate::clock::{Moment, Stamp};

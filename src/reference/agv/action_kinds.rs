@@ -1,0 +1,370 @@
+//! The actions the vehicle offers: scopes, parameters, and how they behave.
+//!
+//! One table feeds the factsheet, the check of orders and instant actions, and the life cycle.
+
+use serde_json::Value;
+
+use super::config::AgvConfig;
+use super::order_message::ActionRequest;
+
+/// Where an action may be asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scope {
+    Instant,
+    Node,
+    Edge,
+}
+
+impl Scope {
+    /// The literal of the factsheet.
+    pub(super) fn literal(self) -> &'static str {
+        match self {
+            Self::Instant => "INSTANT",
+            Self::Node => "NODE",
+            Self::Edge => "EDGE",
+        }
+    }
+}
+
+/// What an action does when it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Deed {
+    StartPause,
+    StopPause,
+    StartCharging,
+    StopCharging,
+    InitPosition,
+    EnableMap,
+    DownloadMap,
+    DeleteMap,
+    StateRequest,
+    LogReport,
+    Pick,
+    Drop,
+    DetectObject,
+    FinePositioning,
+    WaitForTrigger,
+    CancelOrder,
+    FactsheetRequest,
+    Beep,
+    Calibrate,
+}
+
+/// A parameter of an action.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parameter {
+    pub(super) key: &'static str,
+    /// valueDataType of the factsheet.
+    pub(super) data_type: &'static str,
+    pub(super) optional: bool,
+}
+
+/// One action the vehicle offers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ActionKind {
+    pub(super) name: &'static str,
+    pub(super) deed: Deed,
+    pub(super) scopes: &'static [Scope],
+    pub(super) parameters: &'static [Parameter],
+    /// Has a preparation, reported as INITIALIZING.
+    pub(super) prepares: bool,
+    /// Can be held, reported as PAUSED.
+    pub(super) pausable: bool,
+    /// Takes time also as an instant action.
+    pub(super) lasting: bool,
+    pub(super) description: &'static str,
+    /// resultDescription of the factsheet.
+    pub(super) result: Option<&'static str>,
+}
+
+const fn required(key: &'static str, data_type: &'static str) -> Parameter {
+    Parameter {
+        key,
+        data_type,
+        optional: false,
+    }
+}
+
+const fn optional(key: &'static str, data_type: &'static str) -> Parameter {
+    Parameter {
+        key,
+        data_type,
+        optional: true,
+    }
+}
+
+const INSTANT: &[Scope] = &[Scope::Instant];
+const INSTANT_NODE: &[Scope] = &[Scope::Instant, Scope::Node];
+const NODE: &[Scope] = &[Scope::Node];
+const NODE_EDGE: &[Scope] = &[Scope::Node, Scope::Edge];
+const ALL: &[Scope] = &[Scope::Instant, Scope::Node, Scope::Edge];
+const MAP: &[Parameter] = &[required("mapId", "STRING"), required("mapVersion", "STRING")];
+const DURATION: &[Parameter] = &[optional("duration", "NUMBER")];
+
+/// Highest lift in metres; a pick or drop above it cannot be performed.
+pub(super) const MAX_HEIGHT: f64 = 2.0;
+
+/// Names of the load handling devices.
+pub(super) const LOAD_POSITIONS: [&str; 1] = ["LHD1"];
+
+const PICK: &[Parameter] = &[
+    required("stationType", "STRING"),
+    required("loadType", "STRING"),
+    optional("lhd", "STRING"),
+    optional("stationName", "STRING"),
+    optional("loadId", "STRING"),
+    optional("height", "FLOAT"),
+    optional("depth", "FLOAT"),
+    optional("side", "STRING"),
+];
+const DROP: &[Parameter] = &[
+    optional("stationType", "STRING"),
+    optional("loadType", "STRING"),
+    optional("lhd", "STRING"),
+    optional("stationName", "STRING"),
+    optional("loadId", "STRING"),
+    optional("height", "FLOAT"),
+    optional("depth", "FLOAT"),
+    optional("side", "STRING"),
+];
+const POSE: &[Parameter] = &[
+    required("x", "FLOAT"),
+    required("y", "FLOAT"),
+    required("theta", "FLOAT"),
+    required("mapId", "STRING"),
+    required("lastNodeId", "STRING"),
+];
+const DOWNLOAD: &[Parameter] = &[
+    required("mapId", "STRING"),
+    required("mapVersion", "STRING"),
+    required("mapDownloadLink", "STRING"),
+    optional("mapHash", "STRING"),
+];
+const STATION: &[Parameter] = &[optional("stationType", "STRING"), optional("stationName", "STRING")];
+
+const fn kind(
+    name: &'static str,
+    deed: Deed,
+    scopes: &'static [Scope],
+    parameters: &'static [Parameter],
+    description: &'static str,
+) -> ActionKind {
+    ActionKind {
+        name,
+        deed,
+        scopes,
+        parameters,
+        prepares: false,
+        pausable: false,
+        lasting: false,
+        description,
+        result: None,
+    }
+}
+
+impl ActionKind {
+    const fn preparing(mut self) -> Self {
+        self.prepares = true;
+        self
+    }
+
+    const fn pausing(mut self) -> Self {
+        self.pausable = true;
+        self
+    }
+
+    const fn taking_time(mut self) -> Self {
+        self.lasting = true;
+        self
+    }
+
+    const fn resulting(mut self, result: &'static str) -> Self {
+        self.result = Some(result);
+        self
+    }
+}
+
+/// All actions, in the order of the factsheet.
+const KINDS: [ActionKind; 19] = [
+    kind(
+        "startPause",
+        Deed::StartPause,
+        INSTANT,
+        &[],
+        "Stops driving and holds actions",
+    ),
+    kind("stopPause", Deed::StopPause, INSTANT, &[], "Goes on after a pause"),
+    kind(
+        "startCharging",
+        Deed::StartCharging,
+        INSTANT_NODE,
+        &[],
+        "Connects to the charger",
+    )
+    .taking_time(),
+    kind(
+        "stopCharging",
+        Deed::StopCharging,
+        INSTANT_NODE,
+        &[],
+        "Disconnects from the charger",
+    )
+    .taking_time(),
+    kind(
+        "initPosition",
+        Deed::InitPosition,
+        INSTANT_NODE,
+        POSE,
+        "Takes over a pose",
+    ),
+    kind(
+        "enableMap",
+        Deed::EnableMap,
+        INSTANT_NODE,
+        MAP,
+        "Enables a map on board",
+    ),
+    kind(
+        "downloadMap",
+        Deed::DownloadMap,
+        INSTANT,
+        DOWNLOAD,
+        "Fetches a map; mapHash is SHA-256 in hexadecimal",
+    ),
+    kind("deleteMap", Deed::DeleteMap, INSTANT, MAP, "Removes a map"),
+    kind("stateRequest", Deed::StateRequest, INSTANT, &[], "Sends a state"),
+    kind(
+        "logReport",
+        Deed::LogReport,
+        INSTANT,
+        &[required("reason", "STRING")],
+        "Stores a log",
+    )
+    .taking_time()
+    .resulting("Name of the log"),
+    kind("pick", Deed::Pick, NODE_EDGE, PICK, "Takes a load")
+        .preparing()
+        .pausing(),
+    kind("drop", Deed::Drop, NODE_EDGE, DROP, "Puts the load down")
+        .preparing()
+        .pausing(),
+    kind(
+        "detectObject",
+        Deed::DetectObject,
+        NODE_EDGE,
+        &[optional("objectType", "STRING")],
+        "Looks for an object",
+    )
+    .resulting("What was detected"),
+    kind(
+        "finePositioning",
+        Deed::FinePositioning,
+        NODE_EDGE,
+        STATION,
+        "Aligns to a station",
+    )
+    .pausing(),
+    kind(
+        "waitForTrigger",
+        Deed::WaitForTrigger,
+        NODE,
+        &[required("triggerType", "STRING")],
+        "Waits for the button on the vehicle",
+    ),
+    kind("cancelOrder", Deed::CancelOrder, INSTANT, &[], "Gives the order up"),
+    kind(
+        "factsheetRequest",
+        Deed::FactsheetRequest,
+        INSTANT,
+        &[],
+        "Sends the factsheet",
+    ),
+    kind(
+        "beep",
+        Deed::Beep,
+        ALL,
+        DURATION,
+        "Sounds the horn, for `duration` seconds",
+    )
+    .pausing()
+    .taking_time(),
+    kind(
+        "calibrate",
+        Deed::Calibrate,
+        ALL,
+        DURATION,
+        "Calibrates sensors; cannot be interrupted",
+    )
+    .taking_time(),
+];
+
+/// The actions this vehicle offers.
+pub(super) fn offered(config: &AgvConfig) -> impl Iterator<Item = &'static ActionKind> {
+    KINDS.iter().filter(|kind| is_offered(config, kind))
+}
+
+fn is_offered(config: &AgvConfig, kind: &ActionKind) -> bool {
+    let in_version = match kind.deed {
+        Deed::EnableMap | Deed::DownloadMap | Deed::DeleteMap => config.has("maps"),
+        Deed::FactsheetRequest => config.has("factsheetRequest"),
+        _ => true,
+    };
+    in_version && !config.without_actions.contains(kind.name)
+}
+
+/// The offered action of that name.
+pub(super) fn find(config: &AgvConfig, name: &str) -> Option<&'static ActionKind> {
+    offered(config).find(|kind| kind.name == name)
+}
+
+/// Why an action cannot be performed as asked; a path or key and a reason.
+pub(super) fn refusal(kind: &ActionKind, request: &ActionRequest, strict: bool) -> Option<(String, &'static str)> {
+    for parameter in kind.parameters {
+        match request.parameter(parameter.key) {
+            None if parameter.optional => {}
+            None => return Some((parameter.key.to_owned(), "required parameter is missing")),
+            Some(value) if !fits(parameter.data_type, value) => {
+                return Some((parameter.key.to_owned(), "parameter has the wrong type"));
+            }
+            Some(_) => {}
+        }
+    }
+    if strict {
+        let known = |key: &str| kind.parameters.iter().any(|parameter| parameter.key == key);
+        if let Some((key, _)) = request.parameters.iter().find(|(key, _)| !known(key)) {
+            return Some((key.clone(), "parameter is unknown"));
+        }
+    }
+    let negative = |key: &str| {
+        request
+            .parameter(key)
+            .and_then(Value::as_f64)
+            .is_some_and(|value| value < 0.0)
+    };
+    if negative("duration") || negative("height") {
+        return Some(("duration".to_owned(), "parameter is negative"));
+    }
+    if matches!(kind.deed, Deed::Pick | Deed::Drop) {
+        if request
+            .parameter("height")
+            .and_then(Value::as_f64)
+            .is_some_and(|height| height > MAX_HEIGHT)
+        {
+            return Some(("height".to_owned(), "is higher than the vehicle can lift"));
+        }
+        if request
+            .parameter("lhd")
+            .is_some_and(|lhd| !LOAD_POSITIONS.iter().any(|name| lhd == name))
+        {
+            return Some(("lhd".to_owned(), "is no load handling device of the vehicle"));
+        }
+    }
+    None
+}
+
+fn fits(data_type: &str, value: &Value) -> bool {
+    match data_type {
+        "STRING" => value.is_string(),
+        _ => value.is_number(),
+    }
+}

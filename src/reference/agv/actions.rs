@@ -1,0 +1,317 @@
+//! Action states and the life cycle of actions: triggering, blocking types, pause, end.
+//!
+//! Knows *when* an action starts and ends, not *what* it does (see `deeds`).
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::clock::Moment;
+
+use super::action_kinds::ActionKind;
+use super::faults::{FaultName as F, Faults};
+use super::order_message::{ActionRequest, Blocking};
+
+/// actionStatus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Status {
+    Waiting,
+    Initializing,
+    Running,
+    Paused,
+    Finished,
+    Failed,
+}
+
+impl Status {
+    /// The literal of the state.
+    pub(super) fn literal(self) -> &'static str {
+        match self {
+            Self::Waiting => "WAITING",
+            Self::Initializing => "INITIALIZING",
+            Self::Running => "RUNNING",
+            Self::Paused => "PAUSED",
+            Self::Finished => "FINISHED",
+            Self::Failed => "FAILED",
+        }
+    }
+
+    /// FINISHED or FAILED.
+    pub(super) fn is_terminal(self) -> bool {
+        matches!(self, Self::Finished | Self::Failed)
+    }
+
+    /// INITIALIZING, RUNNING or PAUSED.
+    pub(super) fn is_active(self) -> bool {
+        matches!(self, Self::Initializing | Self::Running | Self::Paused)
+    }
+}
+
+/// What asked for an action: an element of the order, by its sequenceId, or master control directly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Origin {
+    Node(u32),
+    Edge(u32),
+    Instant,
+}
+
+/// One action and its state.
+#[derive(Clone, Debug)]
+pub(super) struct Action {
+    pub(super) request: ActionRequest,
+    /// `None` for an action the vehicle does not know.
+    pub(super) kind: Option<&'static ActionKind>,
+    pub(super) origin: Origin,
+    pub(super) status: Status,
+    pub(super) result: Option<String>,
+    /// When the present stage ends; `None` if something else ends it.
+    pub(super) due: Option<Moment>,
+    /// What was left, and what it was, when it was held.
+    held: Option<(Status, Option<Duration>)>,
+    /// The end of the present stage was reported early (`cancel-fails-early`).
+    pub(super) masked: Option<Status>,
+}
+
+impl Action {
+    /// An action that waits for its trigger.
+    pub(super) fn waiting(request: ActionRequest, kind: Option<&'static ActionKind>, origin: Origin) -> Self {
+        Self {
+            request,
+            kind,
+            origin,
+            status: Status::Waiting,
+            result: None,
+            due: None,
+            held: None,
+            masked: None,
+        }
+    }
+
+    /// Whether the action belongs to the order.
+    pub(super) fn of_order(&self) -> bool {
+        self.origin != Origin::Instant
+    }
+
+    fn occupies(&self) -> bool {
+        self.of_order() && self.status.is_active()
+    }
+
+    /// Ends the action.
+    pub(super) fn end(&mut self, status: Status) {
+        self.status = status;
+        self.due = None;
+        self.held = None;
+    }
+
+    /// Holds the action, if it runs and can be held.
+    fn hold(&mut self, now: Moment, faults: Faults) {
+        let pausable = self.kind.is_some_and(|kind| kind.pausable);
+        if pausable && matches!(self.status, Status::Running | Status::Initializing) {
+            self.held = Some((self.status, self.due.map(|due| due.since(now))));
+            self.due = None;
+            self.status = if faults.has(F::PauseToWaiting) {
+                Status::Waiting
+            } else {
+                Status::Paused
+            };
+        }
+    }
+
+    fn resume(&mut self, now: Moment) {
+        if let Some((status, left)) = self.held.take() {
+            self.status = status;
+            self.due = left.map(|left| now + left);
+        }
+    }
+
+    /// A parameter that is a string.
+    pub(super) fn text(&self, key: &str) -> &str {
+        self.request.parameter(key).and_then(Value::as_str).unwrap_or_default()
+    }
+
+    /// A parameter that is a number.
+    pub(super) fn number(&self, key: &str) -> Option<f64> {
+        self.request.parameter(key).and_then(Value::as_f64)
+    }
+}
+
+/// The actions of one node or edge that was triggered, cut where nothing may run in parallel (figure 17).
+#[derive(Clone, Debug)]
+struct List {
+    origin: Origin,
+    phases: VecDeque<Vec<String>>,
+    running: Vec<String>,
+}
+
+/// All actions, in the order they became known.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Actions {
+    all: Vec<Action>,
+    lists: Vec<List>,
+}
+
+impl Actions {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Action> {
+        self.all.iter()
+    }
+
+    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Action> {
+        self.all.iter_mut()
+    }
+
+    pub(super) fn get(&self, id: &str) -> Option<&Action> {
+        self.all.iter().find(|action| action.request.id == id)
+    }
+
+    pub(super) fn get_mut(&mut self, id: &str) -> Option<&mut Action> {
+        self.all.iter_mut().find(|action| action.request.id == id)
+    }
+
+    pub(super) fn push(&mut self, action: Action) {
+        self.all.push(action);
+    }
+
+    pub(super) fn retain(&mut self, keep: impl FnMut(&Action) -> bool) {
+        self.all.retain(keep);
+        let all = &self.all;
+        let known = |id: &String| all.iter().any(|action| action.request.id == *id);
+        for list in &mut self.lists {
+            list.running.retain(known);
+            list.phases.iter_mut().for_each(|phase| phase.retain(known));
+        }
+    }
+
+    /// Forgets what was triggered and not begun.
+    pub(super) fn drop_lists(&mut self) {
+        self.lists.clear();
+    }
+
+    /// Forgets everything.
+    pub(super) fn clear(&mut self) {
+        self.all.clear();
+        self.lists.clear();
+    }
+
+    /// Whether an action of the order has not ended.
+    pub(super) fn order_unfinished(&self) -> bool {
+        self.all
+            .iter()
+            .any(|action| action.of_order() && !action.status.is_terminal())
+    }
+
+    /// A node was traversed, or an edge entered: its actions are triggered.
+    pub(super) fn trigger(&mut self, origin: Origin, faults: Faults) {
+        let mut phases: VecDeque<Vec<String>> = VecDeque::new();
+        let mut parallel = Vec::new();
+        let waiting = |action: &&Action| action.origin == origin && action.status == Status::Waiting;
+        let mut triggered: Vec<&Action> = self.all.iter().filter(waiting).collect();
+        if faults.has(F::ListReversed) {
+            triggered.reverse();
+        }
+        for action in triggered {
+            let alone = action.request.blocking == Blocking::Hard && !faults.has(F::HardOverlaps);
+            if alone || faults.has(F::AllSequential) {
+                phases.extend((!parallel.is_empty()).then(|| std::mem::take(&mut parallel)));
+                phases.push_back(vec![action.request.id.clone()]);
+            } else {
+                parallel.push(action.request.id.clone());
+            }
+        }
+        phases.extend((!parallel.is_empty()).then_some(parallel));
+        if !phases.is_empty() {
+            self.lists.push(List {
+                origin,
+                phases,
+                running: Vec::new(),
+            });
+        }
+    }
+
+    /// Ids of actions that can begin now, if any.
+    pub(super) fn startable(&mut self) -> Vec<String> {
+        for index in 0..self.lists.len() {
+            let list = &self.lists[index];
+            let open = list
+                .running
+                .iter()
+                .any(|id| self.get(id).is_some_and(|action| !action.status.is_terminal()));
+            let Some(next) = list.phases.front().filter(|_| !open) else {
+                continue;
+            };
+            let hard = next.iter().any(|id| self.blocking(id) == Some(Blocking::Hard));
+            let occupied = self.all.iter().any(|action| {
+                action.occupies() && (hard && next.len() == 1 || action.request.blocking == Blocking::Hard)
+            });
+            if occupied {
+                continue;
+            }
+            let list = &mut self.lists[index];
+            if let Some(phase) = list.phases.pop_front() {
+                list.running.clone_from(&phase);
+                return phase;
+            }
+        }
+        self.lists.retain(|list| !list.phases.is_empty());
+        Vec::new()
+    }
+
+    fn blocking(&self, id: &str) -> Option<Blocking> {
+        self.get(id).map(|action| action.request.blocking)
+    }
+
+    /// Whether the actions forbid driving (BLOCK-03, BLOCK-04, BLOCK-07).
+    pub(super) fn block_driving(&self, faults: Faults) -> bool {
+        let stops = |action: &Action| match action.request.blocking {
+            Blocking::None => faults.has(F::NoneStops),
+            Blocking::Soft => !faults.has(F::SoftDrives),
+            Blocking::Hard => !faults.has(F::HardDrives),
+        };
+        let pending = self.lists.iter().flat_map(|list| list.phases.iter().flatten());
+        let ahead = pending.filter_map(|id| self.get(id)).any(stops);
+        ahead || self.all.iter().any(|action| action.occupies() && stops(action))
+    }
+
+    /// Whether an edge has actions that stop the vehicle.
+    pub(super) fn edge_stops(&self, sequence_id: u32) -> bool {
+        let mut actions = self
+            .all
+            .iter()
+            .filter(|action| action.origin == Origin::Edge(sequence_id));
+        actions.any(|action| action.request.blocking != Blocking::None && action.status == Status::Waiting)
+    }
+
+    /// The vehicle leaves the edge: its actions end (NODE-05).
+    pub(super) fn leave_edge(&mut self, sequence_id: u32) {
+        let origin = Origin::Edge(sequence_id);
+        self.lists.retain(|list| list.origin != origin);
+        for action in self.all.iter_mut().filter(|action| action.origin == origin) {
+            match action.status {
+                Status::Waiting => action.end(Status::Failed),
+                status if status.is_active() => action.end(Status::Finished),
+                _ => {}
+            }
+        }
+    }
+
+    /// Holds what can be held.
+    pub(super) fn hold(&mut self, now: Moment, faults: Faults) {
+        self.all.iter_mut().for_each(|action| action.hold(now, faults));
+    }
+
+    /// Lets held actions go on.
+    pub(super) fn resume(&mut self, now: Moment) {
+        self.all.iter_mut().for_each(|action| action.resume(now));
+    }
+
+    /// When the next stage of an action ends.
+    pub(super) fn next_end(&self) -> Option<Moment> {
+        self.all.iter().filter_map(|action| action.due).min()
+    }
+
+    /// The id of an action whose stage has ended.
+    pub(super) fn due(&self, now: Moment) -> Option<String> {
+        let ended = self.all.iter().find(|action| action.due.is_some_and(|due| due <= now));
+        ended.map(|action| action.request.id.clone())
+    }
+}

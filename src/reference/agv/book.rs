@@ -1,0 +1,117 @@
+//! The order book: the order, what is left of it, and where the vehicle was last.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::order_message::{Edge, Node};
+
+/// Where a node is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Place {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) map_id: String,
+}
+
+/// A node still to be traversed.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Stop {
+    pub(super) node: Node,
+    pub(super) place: Place,
+}
+
+/// A cancellation under way.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Cancel {
+    /// actionId of the cancelOrder action.
+    pub(super) action_id: String,
+    /// The vehicle drives to its next node first.
+    pub(super) to_node: bool,
+}
+
+/// The order and its progress.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Book {
+    pub(super) order_id: String,
+    pub(super) update_id: u32,
+    pub(super) last_node: String,
+    pub(super) last_sequence: u32,
+    /// Still to be traversed, horizon included (STATE-12).
+    pub(super) nodes: VecDeque<Stop>,
+    /// Still to be traversed, horizon included.
+    pub(super) edges: VecDeque<Edge>,
+    /// The last released node: the decision point.
+    pub(super) base_end: (String, u32),
+    /// The first of `edges` has been entered.
+    pub(super) entered: bool,
+    pub(super) cancel: Option<Cancel>,
+    /// The node traversed last, and the edge left last.
+    pub(super) left: (Option<Stop>, Option<Edge>),
+    /// First sequenceId by nodeId (`loop-confused` only).
+    pub(super) visits: BTreeMap<String, u32>,
+    /// The order was cancelled, so it cannot be continued.
+    pub(super) cancelled: bool,
+}
+
+impl Book {
+    /// No order yet.
+    pub(super) fn empty(last_node: String) -> Self {
+        Self {
+            order_id: String::new(),
+            update_id: 0,
+            last_node,
+            last_sequence: 0,
+            nodes: VecDeque::new(),
+            edges: VecDeque::new(),
+            base_end: (String::new(), 0),
+            entered: false,
+            cancel: None,
+            left: (None, None),
+            visits: BTreeMap::new(),
+            cancelled: false,
+        }
+    }
+
+    /// Whether there was an order since the vehicle was switched on.
+    pub(super) fn has_order(&self) -> bool {
+        !self.order_id.is_empty()
+    }
+
+    /// The edge that leads to the next node; `None` if the vehicle needs none.
+    pub(super) fn edge_ahead(&self) -> Option<&Edge> {
+        let next = self.nodes.front()?;
+        self.edges
+            .front()
+            .filter(|edge| edge.sequence_id < next.node.sequence_id)
+    }
+
+    /// Removes the horizon; the sequenceIds that went.
+    pub(super) fn drop_horizon(&mut self) -> Vec<u32> {
+        let nodes = self
+            .nodes
+            .iter()
+            .filter(|stop| !stop.node.released)
+            .map(|stop| stop.node.sequence_id);
+        let edges = self
+            .edges
+            .iter()
+            .filter(|edge| !edge.released)
+            .map(|edge| edge.sequence_id);
+        let gone = nodes.chain(edges).collect();
+        self.nodes.retain(|stop| stop.node.released);
+        self.edges.retain(|edge| edge.released);
+        gone
+    }
+
+    /// Removes all nodes and edges.
+    pub(super) fn drop_route(&mut self) {
+        self.nodes.clear();
+        self.edges.clear();
+        self.entered = false;
+    }
+
+    /// Whether the base runs low while there is more to come (STATE-16).
+    pub(super) fn base_runs_low(&self) -> bool {
+        let horizon = self.nodes.iter().any(|stop| !stop.node.released);
+        horizon && self.edges.iter().filter(|edge| edge.released).count() <= 1
+    }
+}

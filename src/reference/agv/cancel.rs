@@ -1,0 +1,145 @@
+//! cancelOrder, for all four capabilities of figure 9, and giving an order up altogether.
+
+use super::Agv;
+use super::action_kinds::Deed;
+use super::actions::{Action, Status};
+use super::book::Cancel;
+use super::errors::{ActiveError, Life};
+use super::faults::FaultName as F;
+
+impl Agv {
+    /// A cancelOrder action begins.
+    pub(super) fn cancel_order(&mut self, action_id: &str) {
+        let active = !self.book.nodes.is_empty() || self.actions.order_unfinished();
+        if !active || self.book.cancel.is_some() || self.book.cancelled {
+            self.nothing_to_cancel(action_id);
+            return;
+        }
+        let to_node = !self.config.stops_between_nodes && (self.book.entered || self.motion.reached);
+        self.stop_actions();
+        if to_node && !self.faults.has(F::CancelKeepsNodes) {
+            self.book.nodes.truncate(1);
+            self.book.edges.clear();
+        }
+        self.book.cancel = Some(Cancel {
+            action_id: action_id.to_owned(),
+            to_node,
+        });
+        if let Some(action) = self.actions.get_mut(action_id) {
+            action.status = Status::Running;
+        }
+    }
+
+    /// No order, or one that was cancelled before (ORD-CANCEL-18 to ORD-CANCEL-20).
+    fn nothing_to_cancel(&mut self, action_id: &str) {
+        let status = if self.faults.has(F::IdleCancelFinished) {
+            Status::Finished
+        } else {
+            Status::Failed
+        };
+        if let Some(action) = self.actions.get_mut(action_id) {
+            action.end(status);
+        }
+        if self.faults.has(F::IdleCancelSilent) {
+            return;
+        }
+        let referenced = !self.faults.has(F::IdleCancelUnreferenced);
+        self.errors.raise(ActiveError {
+            error_type: self.config.errors.no_order_to_cancel.clone(),
+            fatal: self.faults.has(F::IdleCancelFatal),
+            references: referenced
+                .then(|| ("actionId".to_owned(), action_id.to_owned()))
+                .into_iter()
+                .collect(),
+            description: "there is no order to cancel".into(),
+            life: Life::Until(self.moment() + self.config.error_duration),
+        });
+    }
+
+    /// Ends the actions of the order, as far as they can be interrupted (ORD-CANCEL-03 to ORD-CANCEL-05).
+    fn stop_actions(&mut self) {
+        let (faults, interruptible) = (self.faults, self.config.interruptible);
+        for action in self.actions.iter_mut().filter(|action| action.of_order()) {
+            let deed = action.kind.map(|kind| kind.deed);
+            let ends = match deed {
+                Some(Deed::WaitForTrigger) => true,
+                Some(Deed::Calibrate) => false,
+                _ => interruptible && !faults.has(F::CancelLetsRun),
+            };
+            match action.status {
+                Status::Waiting if !faults.has(F::CancelLeavesWaiting) => action.end(Status::Failed),
+                status if status.is_active() && ends => action.end(interrupted(action, faults)),
+                status if status.is_active() && faults.has(F::CancelFailsEarly) => action.masked = Some(Status::Failed),
+                Status::Finished if faults.has(F::FailsAfterFinished) => action.status = Status::Failed,
+                _ => {}
+            }
+        }
+        self.actions.drop_lists();
+    }
+
+    /// Ends the cancellation once nothing moves or runs any more (ORD-CANCEL-07, ORD-CANCEL-11).
+    pub(super) fn settle_cancel(&mut self) -> bool {
+        let Some(cancel) = self.book.cancel.clone() else {
+            return false;
+        };
+        let keeps_nodes = self.faults.has(F::CancelKeepsNodes);
+        let under_way = cancel.to_node && self.book.entered && !self.book.nodes.is_empty()
+            || cancel.to_node && !keeps_nodes && !self.book.nodes.is_empty()
+            || self.motion.is_moving()
+            || (self.faults.has(F::CancelDrivesOn) && self.book.nodes.iter().any(|stop| stop.node.released));
+        let unfinished = self.actions.order_unfinished()
+            && !self.faults.has(F::CancelFinishedEarly)
+            && !self.faults.has(F::CancelLeavesWaiting);
+        if under_way || unfinished {
+            return false;
+        }
+        self.book.cancel = None;
+        self.book.cancelled = true;
+        if !self.faults.has(F::CancelLeavesNodes) {
+            self.book.drop_route();
+        }
+        if self.faults.has(F::CancelClearsOrderId) {
+            self.book.order_id.clear();
+        }
+        if self.faults.has(F::CancelDropsActions) {
+            self.actions.retain(|action| !action.of_order());
+        }
+        if !self.faults.has(F::CancelNeverFinished)
+            && let Some(action) = self.actions.get_mut(&cancel.action_id)
+        {
+            action.end(Status::Finished);
+        }
+        true
+    }
+
+    /// Drops the order at once, with everything that belongs to it.
+    pub(super) fn give_up_order(&mut self) {
+        let moment = self.moment();
+        self.motion.halt(moment);
+        self.motion.reached = false;
+        for action in self
+            .actions
+            .iter_mut()
+            .filter(|action| action.of_order() && !action.status.is_terminal())
+        {
+            action.end(Status::Failed);
+        }
+        self.actions.drop_lists();
+        self.book.drop_route();
+        if let Some(cancel) = self.book.cancel.take()
+            && let Some(action) = self.actions.get_mut(&cancel.action_id)
+        {
+            action.end(Status::Finished);
+        }
+        self.book.cancelled = self.book.has_order();
+    }
+}
+
+fn interrupted(action: &Action, faults: super::Faults) -> Status {
+    let trigger = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
+    if trigger && faults.has(F::TriggerSurvivesCancel) {
+        Status::Finished
+    } else {
+        Status::Failed
+    }
+}

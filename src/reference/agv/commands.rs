@@ -1,0 +1,176 @@
+//! What people and tests do to the vehicle: buttons, switches, moving it by hand.
+
+use serde_json::Value;
+
+use crate::reference::Output;
+
+use super::action_kinds::Deed;
+use super::actions::Status;
+use super::book::Book;
+use super::errors::{ActiveError, Life};
+use super::faults::FaultName as F;
+use super::motion::Pose;
+use super::{Agv, Mode};
+
+/// The commands of [`crate::reference::Input::Command`]; unknown ones are ignored.
+///
+/// `place-on {nodeId}`, `move-to {x, y, theta}`, `set-mode {mode}`, `enable-map {mapId, mapVersion}`,
+/// `place-load {loadId, loadType}`; the others take nothing.
+pub const COMMANDS: [&str; 16] = [
+    "power-cycle",
+    "shutdown",
+    "start",
+    "trigger",
+    "set-mode",
+    "place-on",
+    "move-to",
+    "emergency-stop",
+    "release-emergency-stop",
+    "press-pause",
+    "release-pause",
+    "enable-map",
+    "violate-field",
+    "clear-field",
+    "place-load",
+    "remove-load",
+];
+
+impl Agv {
+    pub(super) fn command(&mut self, name: &str, arguments: &Value) {
+        let text = |key: &str| arguments.get(key).and_then(Value::as_str).unwrap_or_default();
+        match name {
+            "power-cycle" => self.power_cycle(),
+            "shutdown" => self.shut_down(),
+            "start" => self.connection.wanted_at(self.now.moment),
+            "trigger" => self.trigger(),
+            "set-mode" => self.set_mode(text("mode")),
+            "place-on" => self.place_on(text("nodeId")),
+            "move-to" => self.move_to(arguments),
+            "emergency-stop" => self.emergency_stop(),
+            "release-emergency-stop" => {
+                self.errors.released();
+                self.set_holds(|holds| holds.emergency = false);
+            }
+            "press-pause" => self.set_holds(|holds| holds.button = true),
+            "release-pause" => self.set_holds(|holds| holds.button = false),
+            "violate-field" => self.set_holds(|holds| holds.field = true),
+            "clear-field" => self.set_holds(|holds| holds.field = false),
+            "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
+            "enable-map" => {
+                // A map that is not on board cannot be chosen on the vehicle's panel.
+                let _ = self
+                    .maps
+                    .enable(text("mapId"), text("mapVersion"), super::Faults::default());
+            }
+            "place-load" => self.place_load(text("loadId"), text("loadType")),
+            "remove-load" => self.loads.clear(),
+            _ => {}
+        }
+    }
+
+    /// Off and on again: the order is gone, the place, the maps and the load are not.
+    fn power_cycle(&mut self) {
+        let moment = self.moment();
+        self.motion.halt(moment);
+        self.motion.reached = false;
+        let last_node = std::mem::take(&mut self.book.last_node);
+        self.book = Book::empty(last_node);
+        self.actions.clear();
+        self.errors.clear();
+        self.downloads.clear();
+        self.holds = super::Holds::default();
+        self.mode = Mode::Automatic;
+        self.charging = false;
+        self.report = super::Report::default();
+        self.pending.push(Output::Drop);
+        self.connection.dropped(moment + self.config.reconnect_delay);
+    }
+
+    fn trigger(&mut self) {
+        let waits = |action: &&super::actions::Action| {
+            action.status == Status::Running && action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger)
+        };
+        let ids: Vec<String> = self
+            .actions
+            .iter()
+            .filter(waits)
+            .map(|action| action.request.id.clone())
+            .collect();
+        ids.iter().for_each(|id| self.complete(id));
+    }
+
+    /// Master control keeps its order only between the automatic modes (MODE-05).
+    fn set_mode(&mut self, name: &str) {
+        let mode = match name {
+            "AUTOMATIC" => Mode::Automatic,
+            "SEMIAUTOMATIC" => Mode::Semiautomatic,
+            "MANUAL" => Mode::Manual,
+            "SERVICE" => Mode::Service,
+            "TEACHIN" => Mode::Teachin,
+            _ => return,
+        };
+        let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
+        if by_hand && mode != self.mode && !self.faults.has(F::ManualKeepsOrder) && self.is_occupied() {
+            self.give_up_order();
+        }
+        self.mode = mode;
+    }
+
+    fn is_occupied(&self) -> bool {
+        !self.book.nodes.is_empty() || self.actions.order_unfinished() || self.book.cancel.is_some()
+    }
+
+    fn place_on(&mut self, node_id: &str) {
+        let Some(node) = self.config.node(node_id).cloned() else {
+            return;
+        };
+        if self.is_occupied() {
+            self.give_up_order();
+        }
+        let theta = node.theta.unwrap_or(self.motion.pose(self.moment()).theta);
+        self.motion.place(Pose {
+            x: node.x,
+            y: node.y,
+            theta,
+            map_id: node.map_id,
+        });
+        self.book.last_node = node.id;
+        self.book.last_sequence = 0;
+    }
+
+    /// Pushed or steered by hand, which is only possible outside the automatic modes (MODE-06).
+    fn move_to(&mut self, arguments: &Value) {
+        if self.mode.takes_orders() {
+            return;
+        }
+        let mut pose = self.motion.pose(self.moment());
+        let number = |key: &str| arguments.get(key).and_then(Value::as_f64);
+        pose.x = number("x").unwrap_or(pose.x);
+        pose.y = number("y").unwrap_or(pose.y);
+        pose.theta = super::motion::wrapped(number("theta").unwrap_or(pose.theta));
+        self.motion.place(pose);
+        self.report.requested = true;
+    }
+
+    fn emergency_stop(&mut self) {
+        self.set_holds(|holds| holds.emergency = true);
+        self.errors.raise(ActiveError {
+            error_type: self.config.errors.emergency_stop.clone(),
+            fatal: !self.faults.has(F::EmergencyStopWarning),
+            references: Vec::new(),
+            description: "the emergency stop is pressed".into(),
+            life: Life::WhileStopped,
+        });
+    }
+
+    fn place_load(&mut self, id: &str, load_type: &str) {
+        if self.loads.is_empty() {
+            let position = super::action_kinds::LOAD_POSITIONS[0].to_owned();
+            self.loads.push(super::Load {
+                id: id.to_owned(),
+                load_type: load_type.to_owned(),
+                position,
+            });
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! What one reference AGV is told about itself: identity, site, capabilities and timing.
+//!
+//! Everything that differs between protocol versions (version string, topics, error names, features) is
+//! handed in by the caller, who takes it from the pack.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+/// A node of the layout the vehicle knows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayoutNode {
+    /// nodeId.
+    pub id: String,
+    /// Position in metres.
+    pub x: f64,
+    /// Position in metres.
+    pub y: f64,
+    /// Orientation of a vehicle placed here, in radians.
+    pub theta: Option<f64>,
+    /// The map the position is on.
+    pub map_id: String,
+}
+
+/// A map on board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OnboardMap {
+    /// mapId.
+    pub map_id: String,
+    /// mapVersion.
+    pub map_version: String,
+    /// `mapStatus` ENABLED (else DISABLED).
+    pub enabled: bool,
+}
+
+/// The errorType the vehicle reports for each kind of problem.
+///
+/// The default holds the names the standard gives; where it gives none, a name of its family.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorNames {
+    /// A message that is not well-formed (ORD-REJ-02).
+    pub validation: String,
+    /// An order with something the vehicle cannot do (ORD-REJ-06).
+    pub order: String,
+    /// An order update with an outdated orderUpdateId (ORD-REJ-12).
+    pub outdated_update: String,
+    /// An order update that does not continue the order (ORD-FLOW-08, ORD-FLOW-10).
+    pub broken_update: String,
+    /// A new order while another one is active (ORD-FLOW-01).
+    pub other_order_active: String,
+    /// A new order whose first node is too far away (ORD-FLOW-04).
+    pub start_out_of_range: String,
+    /// An order on a map that is not on board or not enabled (MAP-08).
+    pub unknown_map: String,
+    /// An order that exceeds the memory (ORD-REJ-15).
+    pub memory: String,
+    /// cancelOrder without an order (ORD-CANCEL-19).
+    pub no_order_to_cancel: String,
+    /// An instant action the vehicle cannot perform (IACT-06).
+    pub instant_action: String,
+    /// downloadMap, enableMap or deleteMap failed.
+    pub map: String,
+    /// The pose cannot be taken over.
+    pub localization: String,
+    /// pick or drop failed.
+    pub load: String,
+    /// The emergency stop is active.
+    pub emergency_stop: String,
+}
+
+impl Default for ErrorNames {
+    fn default() -> Self {
+        let name = str::to_owned;
+        Self {
+            validation: name("validationError"),
+            order: name("orderError"),
+            outdated_update: name("orderUpdateError"),
+            broken_update: name("orderUpdateError"),
+            other_order_active: name("orderError"),
+            start_out_of_range: name("noRouteError"),
+            unknown_map: name("orderError"),
+            memory: name("orderError"),
+            no_order_to_cancel: name("noOrderToCancel"),
+            instant_action: name("instantActionError"),
+            map: name("mapError"),
+            localization: name("localizationError"),
+            load: name("loadError"),
+            emergency_stop: name("emergencyStop"),
+        }
+    }
+}
+
+/// Configuration of a reference AGV.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AgvConfig {
+    /// Manufacturer as in the header.
+    pub manufacturer: String,
+    /// Serial number as in the header.
+    pub serial_number: String,
+    /// Protocol version as in the header. Empty by default: it comes from the pack.
+    pub version: String,
+    /// Full topic by topic name. A topic that is missing is neither subscribed nor published.
+    pub topics: BTreeMap<String, String>,
+    /// Features of the protocol version: `maps` (maps in the state and their actions), `factsheetRequest`.
+    pub features: BTreeSet<String>,
+    /// Names of errors.
+    pub errors: ErrorNames,
+    /// Predefined actions this vehicle does *not* offer.
+    pub without_actions: BTreeSet<String>,
+    /// Nodes the vehicle knows the position of.
+    pub nodes: Vec<LayoutNode>,
+    /// The node it stands on when it is switched on for the first time.
+    pub start_node: String,
+    /// Driving speed in metres per second. Acceleration is ignored.
+    pub speed: f64,
+    /// Turning speed in radians per second.
+    pub rotation_speed: f64,
+    /// Height of the vehicle in metres, against edge.maxHeight.
+    pub height: f64,
+    /// How far from a node the vehicle may stand and still be on it, in metres, where the order does not say.
+    pub tolerance: f64,
+    /// The same for its orientation, in radians.
+    pub tolerance_theta: f64,
+    /// A state is sent at the latest after this time (STATE-02).
+    pub state_interval: Duration,
+    /// No state is sent sooner after another than this (FACT-14).
+    pub min_state_interval: Duration,
+    /// Interval of the visualization topic; off if `None`.
+    pub visualization_interval: Option<Duration>,
+    /// MQTT keep-alive (CONN-04).
+    pub keep_alive: Duration,
+    /// Time from a lost connection to the next attempt.
+    pub reconnect_delay: Duration,
+    /// How long an action runs.
+    pub action_duration: Duration,
+    /// How long actions of a type run, where it differs.
+    pub action_durations: BTreeMap<String, Duration>,
+    /// Whether running actions end when their order is cancelled. `calibrate` never does, `waitForTrigger` always.
+    pub interruptible: bool,
+    /// Whether the vehicle can stop between nodes when its order is cancelled.
+    pub stops_between_nodes: bool,
+    /// Number of maps the vehicle can store.
+    pub map_capacity: usize,
+    /// Maps on board at first.
+    pub maps: Vec<OnboardMap>,
+    /// A download that has not ended by then has failed.
+    pub download_timeout: Duration,
+    /// How long an error without a rule for its end stays.
+    pub error_duration: Duration,
+    /// Largest number of nodes in an order, and in all its nodeStates.
+    pub max_nodes: usize,
+    /// Largest number of actions per node or edge.
+    pub max_actions: usize,
+    /// Largest message in bytes.
+    pub max_message: usize,
+}
+
+impl Default for AgvConfig {
+    fn default() -> Self {
+        let corners = [
+            ("n1", 0.0, 0.0),
+            ("n2", 3.0, 0.0),
+            ("n3", 6.0, 0.0),
+            ("n4", 6.0, 3.0),
+            ("n5", 3.0, 3.0),
+        ];
+        let nodes = corners
+            .into_iter()
+            .chain([("n6", 0.0, 3.0)])
+            .map(|(id, x, y)| LayoutNode {
+                id: id.into(),
+                x,
+                y,
+                theta: None,
+                map_id: "hall".into(),
+            })
+            .collect();
+        Self {
+            manufacturer: "Reference".into(),
+            serial_number: "agv-1".into(),
+            version: String::new(),
+            topics: BTreeMap::new(),
+            features: ["maps", "factsheetRequest"].map(String::from).into(),
+            errors: ErrorNames::default(),
+            without_actions: BTreeSet::new(),
+            nodes,
+            start_node: "n1".into(),
+            speed: 2.0,
+            rotation_speed: std::f64::consts::PI,
+            height: 1.0,
+            tolerance: 0.1,
+            tolerance_theta: 0.05,
+            state_interval: Duration::from_secs(10),
+            min_state_interval: Duration::ZERO,
+            visualization_interval: None,
+            keep_alive: Duration::from_secs(15),
+            reconnect_delay: Duration::from_secs(1),
+            action_duration: Duration::from_millis(300),
+            action_durations: BTreeMap::new(),
+            interruptible: true,
+            stops_between_nodes: true,
+            map_capacity: 8,
+            maps: vec![OnboardMap {
+                map_id: "hall".into(),
+                map_version: "1".into(),
+                enabled: true,
+            }],
+            download_timeout: Duration::from_secs(20),
+            error_duration: Duration::from_secs(2),
+            max_nodes: 200,
+            max_actions: 20,
+            max_message: 1 << 20,
+        }
+    }
+}
+
+impl AgvConfig {
+    /// The full topic of a topic name.
+    pub(super) fn topic(&self, name: &str) -> Option<&str> {
+        self.topics.get(name).map(String::as_str)
+    }
+
+    /// Whether the protocol version has a feature.
+    pub(super) fn has(&self, feature: &str) -> bool {
+        self.features.contains(feature)
+    }
+
+    /// The node of that id in the layout.
+    pub(super) fn node(&self, id: &str) -> Option<&LayoutNode> {
+        self.nodes.iter().find(|node| node.id == id)
+    }
+}

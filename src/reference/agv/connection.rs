@@ -1,0 +1,305 @@
+//! The link to the broker: last will, ONLINE and OFFLINE, reconnecting, headers and publishing (section 6.14).
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::{Map, Value, json};
+
+use crate::clock::{Moment, Stamp};
+use crate::reference::{ConnectOptions, Output, Publication};
+
+use super::Agv;
+use super::faults::FaultName as F;
+
+/// The state of the link, and what is counted over all connections.
+#[derive(Clone, Debug)]
+pub(super) struct Connection {
+    pub(super) online: bool,
+    /// When to ask for a connection next.
+    attempt_at: Option<Moment>,
+    /// Switched off: a lost connection is not restored.
+    shut_down: bool,
+    /// It was online before.
+    returning: bool,
+    /// The next headerId by topic name (HDR-02).
+    header_ids: BTreeMap<&'static str, u32>,
+}
+
+impl Connection {
+    /// Not connected yet, and eager to be.
+    pub(super) fn new() -> Self {
+        Self {
+            online: false,
+            attempt_at: Some(Moment::START),
+            shut_down: false,
+            returning: false,
+            header_ids: BTreeMap::new(),
+        }
+    }
+
+    /// When the next attempt is due.
+    pub(super) fn next_attempt(&self) -> Option<Moment> {
+        self.attempt_at.filter(|_| !self.online)
+    }
+
+    /// The link is gone, and to be restored at a time.
+    pub(super) fn dropped(&mut self, attempt_at: Moment) {
+        self.online = false;
+        self.shut_down = false;
+        self.attempt_at = Some(attempt_at);
+    }
+
+    /// Somebody wants the vehicle connected.
+    pub(super) fn wanted_at(&mut self, moment: Moment) {
+        if !self.online {
+            self.dropped(moment);
+        }
+    }
+}
+
+impl Agv {
+    /// How to connect: the will says CONNECTIONBROKEN (CONN-01 to CONN-04).
+    pub(super) fn options(&mut self, now: Stamp) -> ConnectOptions {
+        self.now = now.at(now.moment.max(self.now.moment));
+        let will_topic = if self.faults.has(F::WillOnStateTopic) {
+            "state"
+        } else {
+            "connection"
+        };
+        let will = self
+            .config
+            .topic(will_topic)
+            .map(str::to_owned)
+            .filter(|_| !self.faults.has(F::NoWill));
+        let state = match () {
+            () if self.faults.has(F::WillOffline) => "OFFLINE",
+            () if self.faults.has(F::ConnectionStateUnderscore) => "CONNECTION_BROKEN",
+            () => "CONNECTIONBROKEN",
+        };
+        let will = will.map(|topic| {
+            // The will does not count: it has the headerId of the message that would be next.
+            let mut message = self.header("connection", false);
+            if self.faults.has(F::WillWithoutHeader) {
+                message.clear();
+            }
+            message.insert("connectionState".into(), json!(state));
+            Publication {
+                topic,
+                payload: Value::Object(message).to_string().into_bytes(),
+                qos: u8::from(!self.faults.has(F::WillQosZero)),
+                retain: !self.faults.has(F::WillNotRetained),
+            }
+        });
+        let keep_alive = match () {
+            () if self.faults.has(F::KeepAliveOff) => Duration::ZERO,
+            () if self.faults.has(F::KeepAliveLong) => Duration::from_secs(600),
+            () => self.config.keep_alive,
+        };
+        let wanted: &[&str] = if self.faults.has(F::InstantActionsNotSubscribed) {
+            &["order"]
+        } else {
+            &["order", "instantActions"]
+        };
+        let subscriptions = wanted
+            .iter()
+            .filter_map(|name| self.config.topic(name))
+            .map(|topic| (topic.to_owned(), 0));
+        ConnectOptions {
+            client_id: format!("{}.{}", self.config.manufacturer, self.config.serial_number),
+            keep_alive,
+            clean_session: true,
+            will,
+            subscriptions: subscriptions.collect(),
+        }
+    }
+
+    /// The broker accepted: ONLINE, then the factsheet, then a state (CONN-05, CONN-11).
+    pub(super) fn connected(&mut self) {
+        let first = !self.connection.returning;
+        self.connection.online = true;
+        self.connection.returning = true;
+        self.connection.attempt_at = None;
+        self.connection.shut_down = false;
+        if !self.faults.has(F::NoOnline) && (first || !self.faults.has(F::NoOnlineAfterReconnect)) {
+            let online = if self.faults.has(F::ConnectionStateConnected) {
+                "CONNECTED"
+            } else {
+                "ONLINE"
+            };
+            self.publish_connection(online);
+        }
+        self.publish_factsheet();
+        self.start_reporting();
+    }
+
+    /// The link broke. The order goes on (MQTT-03, MQTT-04).
+    pub(super) fn connection_lost(&mut self) {
+        if self.faults.has(F::OrderForgottenOnLinkLoss) {
+            self.give_up_order();
+            self.book.order_id.clear();
+        }
+        self.connection.online = false;
+        let ended = self.connection.shut_down || self.faults.has(F::NeverReconnects);
+        if !ended && self.connection.attempt_at.is_none() {
+            self.connection.attempt_at = Some(self.moment() + self.config.reconnect_delay);
+        }
+    }
+
+    /// Asks for a connection when it is time.
+    pub(super) fn attempt_connection(&mut self) {
+        if self.connection.next_attempt().is_some_and(|at| at <= self.moment()) {
+            self.connection.attempt_at = None;
+            self.pending.push(Output::Connect);
+        }
+    }
+
+    /// Goes offline in good order (CONN-07, CONN-08).
+    pub(super) fn shut_down(&mut self) {
+        if self.connection.online {
+            if !self.faults.has(F::NoOffline) {
+                self.publish_connection("OFFLINE");
+            }
+            let silent = self.faults.has(F::NoDisconnect);
+            self.pending
+                .push(if silent { Output::Drop } else { Output::Disconnect });
+        }
+        self.connection.online = false;
+        self.connection.shut_down = true;
+        self.connection.attempt_at = None;
+    }
+
+    fn publish_connection(&mut self, state: &str) {
+        let mut body = Map::new();
+        body.insert("connectionState".into(), json!(state));
+        self.publish("connection", body, &[]);
+    }
+
+    /// `echoes-order`: tells master control what it said.
+    pub(super) fn echo_order(&mut self, message: &Value) {
+        if let Some(topic) = self.config.topic("order").filter(|_| self.connection.online) {
+            let publication = Publication {
+                topic: topic.to_owned(),
+                payload: message.to_string().into_bytes(),
+                qos: 0,
+                retain: false,
+            };
+            self.pending.push(Output::Publish(publication));
+        }
+    }
+
+    /// Publishes a message: the header, then the body. Nothing is published, or counted, while offline.
+    ///
+    /// `mangle` are replacements in the text of the message, for defects that no JSON writer produces.
+    pub(super) fn publish(&mut self, name: &'static str, body: Map<String, Value>, mangle: &[(&str, &[u8])]) {
+        let Some(topic) = self
+            .config
+            .topic(name)
+            .map(str::to_owned)
+            .filter(|_| self.connection.online)
+        else {
+            return;
+        };
+        let mut message = self.header(name, true);
+        if name == "visualization" && self.faults.has(F::VisualizationWithoutHeader) {
+            message.clear();
+        }
+        if name == "connection" && self.faults.has(F::HeaderNested) {
+            message = Map::from_iter([("header".to_owned(), Value::Object(message))]);
+        }
+        message.extend(body);
+        let mut payload = Value::Object(message).to_string().into_bytes();
+        for (text, bytes) in mangle {
+            payload = replaced(&payload, text.as_bytes(), bytes);
+        }
+        let (qos, retain) = match name {
+            "connection" => (
+                u8::from(!self.faults.has(F::ConnectionQosZero)),
+                !self.faults.has(F::ConnectionNotRetained),
+            ),
+            "factsheet" => (
+                if self.faults.has(F::FactsheetQosTwo) { 2 } else { 0 },
+                !self.faults.has(F::FactsheetNotRetained),
+            ),
+            "state" => (u8::from(self.faults.has(F::StateQosOne)), false),
+            _ => (0, false),
+        };
+        let topic = match topic
+            .strip_suffix("factsheet")
+            .filter(|_| self.faults.has(F::MisspelledTopic))
+        {
+            Some(prefix) => format!("{prefix}fact_sheet"),
+            None => topic,
+        };
+        self.pending.push(Output::Publish(Publication {
+            topic,
+            payload,
+            qos,
+            retain,
+        }));
+    }
+
+    /// The header of the next message on a topic (HDR-01 to HDR-05).
+    fn header(&mut self, name: &'static str, counts: bool) -> Map<String, Value> {
+        let counter = if self.faults.has(F::HeaderIdShared) {
+            "all"
+        } else {
+            name
+        };
+        let next = self.connection.header_ids.entry(counter).or_insert(0);
+        let id = *next;
+        if counts && !(name == "state" && self.faults.has(F::HeaderIdConstant)) {
+            *next = next.wrapping_add(1);
+        }
+        let header_id = if self.faults.has(F::HeaderIdText) {
+            json!(id.to_string())
+        } else {
+            json!(id)
+        };
+        let version = match self
+            .config
+            .version
+            .rsplit_once('.')
+            .filter(|_| self.faults.has(F::VersionShort))
+        {
+            Some((short, _)) => short,
+            None => &self.config.version,
+        };
+        let serial = &self.config.serial_number;
+        let serial_number = match () {
+            () if self.faults.has(F::TopicWithoutPrefix) => format!("{serial}0"),
+            () if self.faults.has(F::SerialNumberWithSpace) => format!("No. {serial}"),
+            () => serial.clone(),
+        };
+        let mut header = Map::new();
+        header.insert("headerId".into(), header_id);
+        header.insert("timestamp".into(), self.timestamp());
+        header.insert("version".into(), json!(version));
+        if !(name == "state" && self.faults.has(F::HeaderWithoutManufacturer)) {
+            header.insert("manufacturer".into(), json!(self.config.manufacturer));
+        }
+        header.insert("serialNumber".into(), json!(serial_number));
+        header
+    }
+
+    fn timestamp(&self) -> Value {
+        let utc = self.now.utc;
+        let text = format!("{utc:.2}");
+        match () {
+            () if self.faults.has(F::TimestampLocal) => {
+                let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);
+                json!(format!("{local:.2}").replace('Z', "+01:00"))
+            }
+            () if self.faults.has(F::TimestampWithoutZone) => json!(text.trim_end_matches('Z')),
+            () if self.faults.has(F::TimestampUnix) => json!(utc.as_second()),
+            () => json!(text),
+        }
+    }
+}
+
+/// `bytes` with the first occurrence of `from` replaced.
+fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
+    let Some(at) = bytes.windows(from.len().max(1)).position(|window| window == from) else {
+        return bytes.to_vec();
+    };
+    [&bytes[..at], to, &bytes[at + from.len()..]].concat()
+}

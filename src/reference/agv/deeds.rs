@@ -1,0 +1,354 @@
+//! What actions do: their stages, their effect on the vehicle, and how a failure is reported.
+
+use std::f64::consts::PI;
+
+use serde_json::Value;
+
+use super::action_kinds::{Deed, LOAD_POSITIONS};
+use super::actions::{Action, Origin, Status};
+use super::faults::FaultName as F;
+use super::motion::Pose;
+use super::{Agv, Load};
+
+/// Coordinates beyond this are no place on any map of the site, in metres.
+const FARTHEST: f64 = 10_000.0;
+
+/// Which error a failed action raises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Area {
+    InstantAction,
+    Map,
+    Localization,
+    Load,
+}
+
+/// Why an action failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Problem {
+    area: Area,
+    reason: String,
+    references: Vec<(String, String)>,
+    silent: bool,
+}
+
+impl Problem {
+    fn new(area: Area, action: &Action, reason: &str) -> Self {
+        let reference = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+        let references = vec![
+            reference("actionId", &action.request.id),
+            reference("actionType", &action.request.action_type),
+        ];
+        Self {
+            area,
+            reason: reason.to_owned(),
+            references,
+            silent: false,
+        }
+    }
+
+    /// A problem with the map an action is about.
+    pub(super) fn map(action: &Action, reason: &str) -> Self {
+        let mut problem = Self::new(Area::Map, action, reason);
+        for key in ["mapId", "mapVersion"] {
+            problem.references.push((key.to_owned(), action.text(key).to_owned()));
+        }
+        problem
+    }
+
+    /// An instant action that cannot be performed.
+    pub(super) fn unable(action: &Action, reason: &str) -> Self {
+        Self::new(Area::InstantAction, action, reason)
+    }
+
+    /// The same, without an error.
+    pub(super) fn silent_if(mut self, silent: bool) -> Self {
+        self.silent |= silent;
+        self
+    }
+}
+
+/// How a deed went.
+enum Outcome {
+    Done(Option<String>),
+    Failed(Problem),
+    /// Something else ends the action.
+    Open,
+}
+
+impl From<Result<(), Problem>> for Outcome {
+    fn from(result: Result<(), Problem>) -> Self {
+        result.map_or_else(Self::Failed, |()| Self::Done(None))
+    }
+}
+
+impl Agv {
+    /// An action of the order begins.
+    pub(super) fn begin_action(&mut self, id: &str) {
+        let moment = self.moment();
+        let Some(action) = self.actions.get(id).filter(|action| action.status == Status::Waiting) else {
+            return;
+        };
+        let duration = self.duration_of(action);
+        let Some(action) = self.actions.get_mut(id) else { return };
+        match action.kind {
+            None => action.end(Status::Failed),
+            Some(kind) if kind.prepares => {
+                action.status = Status::Initializing;
+                action.due = Some(moment + duration / 3);
+            }
+            Some(_) => self.run_action(id),
+        }
+    }
+
+    /// An action does its work now.
+    pub(super) fn run_action(&mut self, id: &str) {
+        let moment = self.moment();
+        let Some(duration) = self.actions.get(id).map(|action| self.duration_of(action)) else {
+            return;
+        };
+        let awaits = !self.faults.has(F::TriggerNotAwaited);
+        let stuck = self.faults.has(F::InstantActionStuck);
+        let Some(action) = self.actions.get_mut(id) else { return };
+        action.status = Status::Running;
+        let awaits = awaits && action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
+        let endless = awaits || (stuck && !action.of_order());
+        action.due = (!endless).then(|| moment + duration);
+    }
+
+    /// A stage of an action has ended.
+    pub(super) fn stage_finished(&mut self, id: &str) {
+        let Some(action) = self.actions.get_mut(id) else { return };
+        action.due = None;
+        if action.kind.is_some_and(|kind| kind.deed == Deed::DownloadMap) {
+            self.download_failed(id, "the server did not deliver in time");
+            return;
+        }
+        match action.status {
+            Status::Initializing => self.run_action(id),
+            Status::Running => self.complete(id),
+            _ => {}
+        }
+    }
+
+    /// An action has worked for as long as it takes: its effect shows.
+    pub(super) fn complete(&mut self, id: &str) {
+        let Some(action) = self.actions.get(id).cloned() else {
+            return;
+        };
+        match self.deed(&action) {
+            Outcome::Done(result) => self.finish(id, result),
+            Outcome::Failed(problem) => self.fail(id, &problem),
+            Outcome::Open => {}
+        }
+    }
+
+    /// Ends an action with success.
+    pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
+        let stuck = self.faults.has(F::InstantActionStuck);
+        if let Some(action) = self.actions.get_mut(id) {
+            let stuck = stuck && action.origin == Origin::Instant;
+            action.end(if stuck { Status::Running } else { Status::Finished });
+            action.result = result;
+        }
+        self.forget_if_faulty(id);
+    }
+
+    /// Ends an action without success, and says why (IACT-06, BP-03).
+    pub(super) fn fail(&mut self, id: &str, problem: &Problem) {
+        if let Some(action) = self.actions.get_mut(id) {
+            action.end(Status::Failed);
+        }
+        if problem.silent {
+            return;
+        }
+        let names = &self.config.errors;
+        let name = match problem.area {
+            Area::InstantAction => &names.instant_action,
+            Area::Map => &names.map,
+            Area::Localization => &names.localization,
+            Area::Load => &names.load,
+        };
+        self.warn(name.clone(), problem.references.clone(), problem.reason.clone());
+    }
+
+    fn forget_if_faulty(&mut self, id: &str) {
+        let faults = self.faults;
+        self.actions.retain(|action| {
+            let forgotten =
+                faults.has(F::FinishedActionsRemoved) || (faults.has(F::InstantActionsForgotten) && !action.of_order());
+            action.request.id != id || !forgotten
+        });
+    }
+
+    fn deed(&mut self, action: &Action) -> Outcome {
+        let Some(kind) = action.kind else { return Outcome::Open };
+        match kind.deed {
+            Deed::StartPause => self.start_pause(action),
+            Deed::StopPause => self.stop_pause(action),
+            Deed::StartCharging => self.set_charging(true),
+            Deed::StopCharging => self.set_charging(false),
+            Deed::InitPosition => self.init_position(action).into(),
+            Deed::EnableMap => {
+                let result = self
+                    .maps
+                    .enable(action.text("mapId"), action.text("mapVersion"), self.faults);
+                result.map_err(|reason| Problem::map(action, reason)).into()
+            }
+            Deed::DeleteMap => self.delete_map(action).into(),
+            Deed::StateRequest => {
+                self.report.requested = !self.faults.has(F::StateRequestUnanswered);
+                self.report.silenced = !self.report.requested;
+                Outcome::Done(None)
+            }
+            Deed::LogReport => {
+                self.logs += 1;
+                let name = format!("log-{}.txt", self.logs);
+                Outcome::Done(Some(name).filter(|_| !self.faults.has(F::LogNameMissing)))
+            }
+            Deed::Pick => self.pick(action).into(),
+            Deed::Drop => self.put_down(action).into(),
+            Deed::DetectObject => {
+                let object = if action.text("objectType").is_empty() {
+                    "object"
+                } else {
+                    action.text("objectType")
+                };
+                Outcome::Done(Some(format!("{object} detected")))
+            }
+            Deed::FactsheetRequest => {
+                if !self.faults.has(F::FactsheetRequestUnanswered) {
+                    self.publish_factsheet();
+                }
+                Outcome::Done(None)
+            }
+            Deed::FinePositioning | Deed::WaitForTrigger | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
+            Deed::CancelOrder => {
+                self.cancel_order(&action.request.id);
+                Outcome::Open
+            }
+            Deed::DownloadMap => {
+                self.begin_download(&action.request.id);
+                Outcome::Open
+            }
+        }
+    }
+
+    fn start_pause(&mut self, action: &Action) -> Outcome {
+        if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
+            return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
+        }
+        if self.faults.has(F::PauseDropsOrder) {
+            self.give_up_order();
+        }
+        self.set_holds(|holds| holds.pause = true);
+        Outcome::Done(None)
+    }
+
+    /// A pause made with the button is lifted with the button (ACT-16).
+    fn stop_pause(&mut self, action: &Action) -> Outcome {
+        if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
+            return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
+        }
+        if self.faults.has(F::PauseNotLifted) {
+            self.set_holds(|holds| holds.field |= holds.pause);
+        }
+        self.set_holds(|holds| holds.pause = false);
+        Outcome::Done(None)
+    }
+
+    /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
+    pub(super) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
+        let before = self.holds.any();
+        change(&mut self.holds);
+        let moment = self.moment();
+        match (before, self.holds.any()) {
+            (false, true) => self.actions.hold(moment, self.faults),
+            (true, false) => self.actions.resume(moment),
+            _ => {}
+        }
+    }
+
+    fn set_charging(&mut self, on: bool) -> Outcome {
+        self.charging = on && !self.faults.has(F::ChargingUnreported);
+        Outcome::Done(None)
+    }
+
+    fn init_position(&mut self, action: &Action) -> Result<(), Problem> {
+        let invalid = |reason: &str| Err(Problem::new(Area::Localization, action, reason));
+        let number = |key: &str| action.number(key).filter(|number| number.is_finite());
+        let (Some(x), Some(y), Some(theta)) = (number("x"), number("y"), number("theta")) else {
+            return invalid("the pose is not complete");
+        };
+        let unchecked = self.faults.has(F::InitPositionUnchecked);
+        if !unchecked && (x.abs() > FARTHEST || y.abs() > FARTHEST || theta.abs() > PI + 0.01) {
+            return invalid("the pose is on no map");
+        }
+        let map_id = action.text("mapId");
+        if !unchecked && !self.maps.on_board(map_id) {
+            return invalid("the map is not on board");
+        }
+        if action.origin == Origin::Instant && (!self.book.nodes.is_empty() || self.actions.order_unfinished()) {
+            return invalid("an order is active");
+        }
+        if self.faults.has(F::InitPositionWithoutEffect) {
+            return Ok(());
+        }
+        self.maps.enable_any(map_id);
+        self.motion.place(Pose {
+            x,
+            y,
+            theta: theta.clamp(-PI, PI),
+            map_id: map_id.to_owned(),
+        });
+        if !self.faults.has(F::InitPositionKeepsNode) {
+            action.text("lastNodeId").clone_into(&mut self.book.last_node);
+        }
+        Ok(())
+    }
+
+    fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
+        let here = self.motion.pose(self.moment()).map_id;
+        let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
+        let used = |map_id: &str| here == map_id || needed.iter().any(|needed| needed == map_id);
+        let result = self
+            .maps
+            .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);
+        result.map_err(|reason| Problem::map(action, reason))
+    }
+
+    fn pick(&mut self, action: &Action) -> Result<(), Problem> {
+        if !self.loads.is_empty() {
+            if self.faults.has(F::PickFailureFinished) {
+                return Ok(());
+            }
+            let problem = Problem::new(Area::Load, action, "the vehicle carries a load already");
+            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+        }
+        if !self.faults.has(F::PickWithoutLoad) {
+            let given = |key: &str, other: &str| match action.request.parameter(key).and_then(Value::as_str) {
+                Some(text) => text.to_owned(),
+                None => other.to_owned(),
+            };
+            self.loads.push(Load {
+                id: given("loadId", ""),
+                load_type: given("loadType", "EPAL"),
+                position: given("lhd", LOAD_POSITIONS[0]),
+            });
+        }
+        Ok(())
+    }
+
+    fn put_down(&mut self, action: &Action) -> Result<(), Problem> {
+        let wanted = action.text("loadId");
+        let found = self
+            .loads
+            .iter()
+            .position(|load| wanted.is_empty() || load.id == wanted);
+        let Some(found) = found else {
+            let problem = Problem::new(Area::Load, action, "the vehicle does not carry that load");
+            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+        };
+        self.loads.remove(found);
+        Ok(())
+    }
+}

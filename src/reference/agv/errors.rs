@@ -1,0 +1,121 @@
+//! The active errors of the vehicle and how long each of them is reported.
+
+use serde_json::{Value, json};
+
+use crate::clock::Moment;
+
+use super::faults::{FaultName as F, Faults};
+
+/// At most this many errors are reported; older ones give way.
+pub(super) const MAX_ERRORS: usize = 20;
+
+/// When an error ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Life {
+    /// When a new order is accepted (ORD-REJ-03, ORD-REJ-08).
+    UntilNewOrder,
+    /// At a time, or when a new order is accepted.
+    Until(Moment),
+    /// While the emergency stop is active.
+    WhileStopped,
+}
+
+/// One active error.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct ActiveError {
+    pub(super) error_type: String,
+    pub(super) fatal: bool,
+    pub(super) references: Vec<(String, String)>,
+    pub(super) description: String,
+    pub(super) life: Life,
+}
+
+/// All active errors.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Errors {
+    active: Vec<ActiveError>,
+}
+
+impl Errors {
+    /// Adds an error; one with the same type and references is replaced.
+    pub(super) fn raise(&mut self, error: ActiveError) {
+        self.active
+            .retain(|other| other.error_type != error.error_type || other.references != error.references);
+        if self.active.len() >= MAX_ERRORS {
+            self.active.remove(0);
+        }
+        self.active.push(error);
+    }
+
+    /// A new order was accepted.
+    pub(super) fn new_order(&mut self) {
+        self.active.retain(|error| error.life == Life::WhileStopped);
+    }
+
+    /// The emergency stop was released.
+    pub(super) fn released(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileStopped);
+    }
+
+    /// Drops what has run out.
+    pub(super) fn expire(&mut self, now: Moment) {
+        self.active
+            .retain(|error| !matches!(error.life, Life::Until(end) if end <= now));
+    }
+
+    /// When the next error runs out.
+    pub(super) fn next_end(&self) -> Option<Moment> {
+        let ends = self.active.iter().filter_map(|error| match error.life {
+            Life::Until(end) => Some(end),
+            _ => None,
+        });
+        ends.min()
+    }
+
+    /// Whether nothing is wrong.
+    pub(super) fn is_empty(&self) -> bool {
+        self.active.is_empty()
+    }
+
+    /// Forgets everything.
+    pub(super) fn clear(&mut self) {
+        self.active.clear();
+    }
+
+    /// The array of the state.
+    pub(super) fn picture(&self, faults: Faults) -> Value {
+        self.active.iter().map(|error| picture_of(error, faults)).collect()
+    }
+}
+
+fn picture_of(error: &ActiveError, faults: Faults) -> Value {
+    let references: Vec<Value> = error
+        .references
+        .iter()
+        .map(|(key, value)| {
+            let number = value
+                .parse::<u64>()
+                .ok()
+                .filter(|_| faults.has(F::ReferenceValueNumeric));
+            let value = number.map_or_else(|| json!(value), |number| json!(number));
+            json!({ "referenceKey": key, "referenceValue": value })
+        })
+        .collect();
+    let level = match error.fatal {
+        true => "FATAL",
+        false if faults.has(F::ErrorLevelUnknown) => "ERROR",
+        false => "WARNING",
+    };
+    let mut picture = json!({
+        "errorType": error.error_type,
+        "errorDescription": error.description,
+        "errorLevel": level,
+    });
+    if faults.has(F::ReferencesAsMap) {
+        let map = error.references.iter().map(|(key, value)| (key.clone(), json!(value)));
+        picture["errorReferences"] = Value::Object(map.collect());
+    } else {
+        picture["errorReferences"] = Value::Array(references);
+    }
+    picture
+}

@@ -1,0 +1,238 @@
+//! The factsheet, generated from the configuration and the table of actions (section 6.15).
+
+use serde_json::{Map, Value, json};
+
+use super::action_kinds::{self, ActionKind, Deed, LOAD_POSITIONS, MAX_HEIGHT};
+use super::errors::MAX_ERRORS;
+use super::faults::FaultName as F;
+use super::instant::MAX_INSTANT_ACTIONS;
+use super::{Agv, AgvConfig};
+
+/// Optional parameters the vehicle acts on.
+const OPTIONAL_PARAMETERS: [&str; 14] = [
+    "order.nodes.nodeDescription",
+    "order.nodes.nodePosition",
+    "order.nodes.nodePosition.theta",
+    "order.nodes.nodePosition.allowedDeviationXY",
+    "order.nodes.nodePosition.allowedDeviationTheta",
+    "order.nodes.nodePosition.mapDescription",
+    "order.edges.edgeDescription",
+    "order.edges.maxSpeed",
+    "order.edges.maxHeight",
+    "order.edges.orientation",
+    "order.edges.orientationType",
+    "order.edges.rotationAllowed",
+    "order.edges.maxRotationSpeed",
+    "order.edges.length",
+];
+
+impl Agv {
+    /// Publishes the factsheet.
+    pub(super) fn publish_factsheet(&mut self) {
+        if self.faults.has(F::NoFactsheet) {
+            return;
+        }
+        let Value::Object(mut body) = self.factsheet() else {
+            return;
+        };
+        if self.faults.has(F::FactsheetWithoutLimits) {
+            body.remove("protocolLimits");
+        }
+        self.publish("factsheet", body, &[]);
+    }
+
+    fn factsheet(&self) -> Value {
+        let mut factsheet = json!({
+            "typeSpecification": self.type_specification(),
+            "physicalParameters": self.physical_parameters(),
+            "protocolLimits": self.protocol_limits(),
+            "protocolFeatures": self.protocol_features(),
+            "agvGeometry": self.geometry(),
+            "loadSpecification": self.load_specification(),
+        });
+        if self.config.has("maps") {
+            let version = if self.faults.has(F::VersionsNumeric) {
+                json!(1.0)
+            } else {
+                json!(env!("CARGO_PKG_VERSION"))
+            };
+            factsheet["vehicleConfig"] = json!({ "versions": [{ "key": "softwareVersion", "value": version }] });
+        } else {
+            // Required by the elder schema, and empty for a vehicle without further parameters.
+            factsheet["localizationParameters"] = json!({});
+        }
+        factsheet
+    }
+
+    fn type_specification(&self) -> Value {
+        json!({
+            "seriesName": "Reference AGV",
+            "seriesDescription": "A simulated vehicle with two driven wheels and a lift",
+            "agvKinematic": if self.faults.has(F::FactsheetKinematicsUnknown) { "DIFFERENTIAL" } else { "DIFF" },
+            "agvClass": "CARRIER",
+            "maxLoadMass": 500.0,
+            "localizationTypes": ["NATURAL"],
+            "navigationTypes": ["VIRTUAL_LINE_GUIDED"],
+        })
+    }
+
+    fn physical_parameters(&self) -> Value {
+        let mut parameters = json!({
+            "speedMin": 0.01,
+            "speedMax": self.config.speed,
+            "angularSpeedMin": 0.01,
+            "angularSpeedMax": self.config.rotation_speed,
+            "accelerationMax": 2.0,
+            "decelerationMax": 2.0,
+            "heightMin": self.config.height.min(0.3),
+            "heightMax": self.config.height,
+        });
+        if !self.faults.has(F::FactsheetWithoutSize) {
+            parameters["width"] = json!(0.8);
+            parameters["length"] = json!(1.2);
+        }
+        parameters
+    }
+
+    fn protocol_limits(&self) -> Value {
+        let nodes = self.config.max_nodes;
+        let reported = if self.faults.has(F::OwnLimitExceeded) { 1 } else { nodes };
+        let min_state_interval = match self.config.min_state_interval.as_secs_f64() {
+            _ if self.faults.has(F::MinStateIntervalIgnored) => 5.0,
+            seconds => seconds,
+        };
+        let mut limits = json!({
+            "maxStringLens": { "msgLen": self.config.max_message, "idLen": 256, "enumLen": 256, "idNumericalOnly": false },
+            "maxArrayLens": {
+                "order.nodes": nodes,
+                "order.edges": nodes.saturating_sub(1),
+                "node.actions": self.config.max_actions,
+                "edge.actions": self.config.max_actions,
+                "instantActions": MAX_INSTANT_ACTIONS,
+                "state.nodeStates": reported,
+                "state.edgeStates": reported,
+                "state.loads": 1,
+                "state.errors": MAX_ERRORS,
+            },
+            "timing": {
+                "minOrderInterval": 0.0,
+                "minStateInterval": min_state_interval,
+                "defaultStateInterval": self.config.state_interval.as_secs_f64(),
+            },
+        });
+        if let Some(interval) = self.config.visualization_interval {
+            limits["timing"]["visualizationInterval"] = json!(interval.as_secs_f64());
+        }
+        if self.faults.has(F::FactsheetWithoutTiming)
+            && let Some(fields) = limits.as_object_mut()
+        {
+            fields.remove("timing");
+        }
+        limits
+    }
+
+    fn protocol_features(&self) -> Value {
+        let support = if self.faults.has(F::FactsheetSupportYes) {
+            "YES"
+        } else {
+            "SUPPORTED"
+        };
+        let parameters: Vec<Value> = OPTIONAL_PARAMETERS
+            .iter()
+            .map(|name| json!({ "parameter": name, "support": support }))
+            .collect();
+        let missing = self.faults.has(F::FactsheetActionMissing);
+        let actions: Vec<Value> = action_kinds::offered(&self.config)
+            .filter(|kind| !(missing && kind.deed == Deed::CancelOrder))
+            .map(|kind| self.action_picture(kind))
+            .collect();
+        json!({ "optionalParameters": parameters, "agvActions": actions })
+    }
+
+    fn action_picture(&self, kind: &ActionKind) -> Value {
+        let mut scopes: Vec<&str> = kind.scopes.iter().map(|scope| scope.literal()).collect();
+        if kind.deed == Deed::StartPause && self.faults.has(F::StartPauseOnNodes) {
+            scopes.push("NODE");
+        }
+        let lower = self.faults.has(F::FactsheetScopeLowerCase);
+        let scopes: Vec<String> = scopes
+            .into_iter()
+            .map(|scope| {
+                if lower {
+                    scope.to_ascii_lowercase()
+                } else {
+                    scope.to_owned()
+                }
+            })
+            .collect();
+        let mut picture = Map::new();
+        picture.insert("actionType".into(), json!(kind.name));
+        picture.insert("actionDescription".into(), json!(kind.description));
+        picture.insert("actionScopes".into(), json!(scopes));
+        if !kind.parameters.is_empty() {
+            let parameters = kind.parameters.iter().map(|parameter| {
+                json!({
+                    "key": parameter.key,
+                    "valueDataType": parameter.data_type,
+                    "isOptional": parameter.optional,
+                })
+            });
+            picture.insert("actionParameters".into(), parameters.collect());
+        }
+        if let Some(result) = kind.result {
+            picture.insert("resultDescription".into(), json!(result));
+        }
+        if self.config.has("maps") {
+            picture.insert("blockingTypes".into(), json!(["NONE", "SOFT", "HARD"]));
+        }
+        Value::Object(picture)
+    }
+
+    fn geometry(&self) -> Value {
+        let wheel = |y: f64| {
+            json!({
+                "type": "DRIVE",
+                "isActiveDriven": true,
+                "isActiveSteered": false,
+                "position": { "x": 0.0, "y": y },
+                "diameter": 0.2,
+                "width": 0.05,
+            })
+        };
+        let point = |x: f64, y: f64| json!({ "x": x, "y": y });
+        let mut contour = vec![point(0.6, 0.4), point(-0.6, 0.4), point(-0.6, -0.4), point(0.6, -0.4)];
+        if self.faults.has(F::PolygonCrossed) {
+            contour.swap(1, 2);
+        }
+        json!({
+            "wheelDefinitions": [wheel(0.35), wheel(-0.35)],
+            "envelopes2d": [{ "set": "contour", "polygonPoints": contour }],
+        })
+    }
+
+    fn load_specification(&self) -> Value {
+        let set = |name: &str, load_type: &str| {
+            json!({
+                "setName": name,
+                "loadType": load_type,
+                "loadPositions": LOAD_POSITIONS,
+                "maxWeight": 500.0,
+                "maxLoadhandlingHeight": MAX_HEIGHT,
+            })
+        };
+        let second = if self.faults.has(F::LoadSetTwice) {
+            "DEFAULT"
+        } else {
+            "SMALL"
+        };
+        json!({ "loadPositions": LOAD_POSITIONS, "loadSets": [set("DEFAULT", "EPAL"), set(second, "KLT")] })
+    }
+}
+
+impl AgvConfig {
+    /// The action types a vehicle of this configuration offers, as in its factsheet.
+    #[must_use]
+    pub fn action_types(&self) -> Vec<&'static str> {
+        action_kinds::offered(self).map(|kind| kind.name).collect()
+    }
+}

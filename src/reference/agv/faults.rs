@@ -1,0 +1,352 @@
+//! The registry of defects the reference AGV can be given.
+//!
+//! Each is a mistake a real vehicle could make, and a small deviation at one point of decision, found by
+//! searching for its [`FaultName`]. `breaks` names first the requirement the fault is about.
+
+use crate::reference::Fault;
+
+macro_rules! faults {
+    ($($variant:ident $name:literal [$($id:literal),+] $wrong:literal;)+) => {
+        /// A fault of the reference AGV; see [`FAULTS`] for what each does.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[expect(missing_docs, reason = "the sentence stands in FAULTS")]
+        pub enum FaultName { $($variant),+ }
+
+        /// All faults of the reference AGV.
+        pub const FAULTS: &[Fault] = &[$(Fault { name: $name, breaks: &[$($id),+], wrong: $wrong }),+];
+    };
+}
+
+faults! {
+    // Transport
+    OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
+    StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
+    HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07"] "Drives into the horizon while the link is down.";
+    StateQosOne "state-qos-1" ["MQTT-07"] "Publishes the state with QoS 1.";
+    FactsheetQosTwo "factsheet-qos-2" ["MQTT-07"] "Publishes the factsheet with QoS 2.";
+    ConnectionQosZero "connection-qos-0" ["MQTT-08"] "Publishes the connection topic with QoS 0.";
+    NeverReconnects "never-reconnects" ["MQTT-10"] "Does not connect again after a broken link.";
+    NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10"] "Sends the terminating zero byte of its string with every periodic state.";
+    MisspelledTopic "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore.";
+    TopicWithoutPrefix "topic-other-serial" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
+    NoFactsheet "no-factsheet" ["TOPIC-11", "ACT-40"] "Never publishes a factsheet.";
+    EchoesOrder "echoes-order" ["TOPIC-15"] "Publishes the accepted order back on the order topic.";
+    InstantActionsNotSubscribed "instant-actions-not-subscribed" ["TOPIC-10"] "Does not subscribe to instantActions.";
+    SerialNumberWithSpace "serial-number-with-space" ["TOPIC-05", "HDR-05"] "Writes its serial number with a space in the header.";
+
+    // Header and JSON
+    HeaderWithoutManufacturer "header-without-manufacturer" ["HDR-01", "HDR-05"] "Leaves the manufacturer out of the header of its states.";
+    HeaderNested "header-nested" ["HDR-01", "CONN-10"] "Packs the header of connection messages into an object of its own.";
+    VisualizationWithoutHeader "visualization-without-header" ["VIS-01", "HDR-01"] "Publishes the visualization without a header.";
+    HeaderIdConstant "header-id-constant" ["HDR-02"] "Sends every state with the same headerId.";
+    HeaderIdShared "header-id-shared" ["HDR-02"] "Counts one headerId over all topics.";
+    HeaderIdText "header-id-as-text" ["JSON-06", "HDR-02"] "Sends the headerId as a string.";
+    TimestampLocal "timestamp-local" ["HDR-03"] "Gives its timestamps in local time with an offset.";
+    TimestampWithoutZone "timestamp-without-zone" ["HDR-03"] "Gives its timestamps without the Z.";
+    TimestampUnix "timestamp-unix" ["HDR-03", "JSON-06"] "Gives its timestamps as seconds since 1970.";
+    VersionShort "version-short" ["HDR-04"] "Gives the protocol version without the patch number.";
+    FieldMisspelled "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore.";
+    ModeLowerCase "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case.";
+    LatinText "latin-1-text" ["JSON-03"] "Encodes the text of its periodic states in Latin-1.";
+    BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15"] "Sends charging as a word in quotes.";
+    NanVelocity "nan-velocity" ["JSON-08", "MQTT-02"] "Writes NaN as turning speed into its periodic states.";
+    ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15"] "Estimates its reach in fractions of a metre.";
+    DuplicateKey "duplicate-key" ["JSON-10"] "Repeats the key driving in its periodic states, with another value.";
+    IdWithSpace "id-with-space" ["JSON-04"] "Reports the id of its map with a space.";
+
+    // Connection
+    NoWill "no-will" ["CONN-01", "CONN-02", "CONN-03"] "Connects without a last will.";
+    WillOnStateTopic "will-on-state-topic" ["CONN-01"] "Registers its last will on the state topic.";
+    WillOffline "will-offline" ["CONN-02"] "Says OFFLINE in its last will.";
+    WillWithoutHeader "will-without-header" ["CONN-02", "HDR-01"] "Leaves the header out of its last will.";
+    WillQosZero "will-qos-0" ["CONN-03"] "Registers its last will with QoS 0.";
+    WillNotRetained "will-not-retained" ["CONN-03", "CONN-06"] "Registers its last will without the retain flag.";
+    KeepAliveOff "keep-alive-off" ["CONN-04"] "Connects with the keep-alive off.";
+    KeepAliveLong "keep-alive-long" ["CONN-04"] "Connects with a keep-alive of ten minutes.";
+    NoOnline "no-online" ["CONN-05", "CONN-11", "TOPIC-11"] "Never says that it is ONLINE.";
+    ConnectionNotRetained "connection-not-retained" ["CONN-06"] "Publishes ONLINE and OFFLINE without the retain flag.";
+    NoOffline "no-offline" ["CONN-07"] "Disconnects without saying OFFLINE.";
+    NoDisconnect "no-disconnect" ["CONN-08"] "Closes the socket after OFFLINE without a DISCONNECT.";
+    ConnectionStateUnderscore "connection-state-underscore" ["CONN-02", "CONN-10", "JSON-02"] "Spells CONNECTIONBROKEN with an underscore.";
+    ConnectionStateConnected "connection-state-connected" ["CONN-10", "CONN-05"] "Says CONNECTED instead of ONLINE.";
+    NoOnlineAfterReconnect "no-online-after-reconnect" ["CONN-11"] "Says ONLINE only the first time it connects.";
+
+    // Factsheet
+    FactsheetNotRetained "factsheet-not-retained" ["FACT-01"] "Publishes the factsheet without the retain flag.";
+    FactsheetWithoutLimits "factsheet-without-limits" ["FACT-02", "FACT-05"] "Leaves protocolLimits out of the factsheet.";
+    FactsheetKinematicsUnknown "factsheet-kinematics-unknown" ["FACT-03"] "Gives DIFFERENTIAL as its kinematics.";
+    FactsheetWithoutSize "factsheet-without-size" ["FACT-04"] "Leaves width and length out of the factsheet.";
+    FactsheetWithoutTiming "factsheet-without-timing" ["FACT-05"] "Leaves the timing out of its limits.";
+    FactsheetSupportYes "factsheet-support-yes" ["FACT-06"] "Says YES where the support of a parameter is asked for.";
+    FactsheetScopeLowerCase "factsheet-scope-lower-case" ["FACT-07", "JSON-02"] "Spells the scopes of its actions in lower case.";
+    ListedActionRefused "listed-action-refused" ["FACT-07"] "Refuses finePositioning and detectObject although its factsheet lists them.";
+    FactsheetActionMissing "factsheet-action-missing" ["FACT-07"] "Offers cancelOrder but does not list it.";
+    PolygonCrossed "polygon-crossed" ["FACT-08"] "Draws its contour as a polygon that crosses itself.";
+    LoadSetTwice "load-set-twice" ["FACT-09"] "Uses one name for two load sets.";
+    VersionsNumeric "versions-numeric" ["FACT-10"] "Gives its software version as a number.";
+    OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
+    MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
+    StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
+
+    // Order
+    NodeSkipped "node-skipped" ["ORD-01", "STATE-06", "NODE-03"] "Leaves plain nodes between others out of its reports.";
+    FirstNodeRefused "first-node-refused" ["ORD-04"] "Refuses orders that begin where it stands.";
+    DeviationIgnored "deviation-ignored" ["ORD-05", "ORD-CANCEL-16"] "Counts itself as on the first node only when it stands exactly there.";
+    StopsBeforeEndOfBase "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base.";
+    HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05"] "Drives into the horizon without waiting for its release.";
+    HorizonDemanded "horizon-demanded" ["ORD-10"] "Refuses new orders without a horizon.";
+    GraphUnchecked "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense.";
+    SingleNodeRefused "single-node-refused" ["ORD-13"] "Refuses orders with one node.";
+    DrivingAtDecisionPoint "driving-at-decision-point" ["ORD-UPD-01", "STATE-MSG-08"] "Says that it drives while it waits at the decision point.";
+    StitchingNodeOverwritten "stitching-node-overwritten" ["ORD-UPD-07"] "Takes over the actions an update brings for the stitching node.";
+    HorizonAppended "horizon-appended" ["ORD-UPD-08"] "Keeps the old horizon when an update brings a new one.";
+    HorizonKept "horizon-kept" ["ORD-UPD-09"] "Keeps the old horizon when an update has none.";
+    HorizonActionsStay "horizon-actions-stay" ["ORD-UPD-10"] "Lets the actions of a deleted horizon wait for ever.";
+    LoopConfused "loop-confused" ["ORD-UPD-13", "NODE-03"] "Reports the sequenceId of the first visit on every visit of a node.";
+    ErrorlessGapUpdate "running-update-gap-accepted" ["ORD-FLOW-08"] "Takes over an update that does not begin at the decision point.";
+    BusyIgnored "busy-ignored" ["ORD-FLOW-01", "ORD-FLOW-03"] "Takes over a new order while another one is being driven.";
+    RunningActionIgnored "running-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs.";
+    HorizonNotBusy "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point.";
+    FarOrderAccepted "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is.";
+    OldActionStatesKept "old-action-states-kept" ["ORD-FLOW-05", "STATE-MSG-11"] "Keeps the action states of the old order.";
+    HorizonNotReported "horizon-not-reported" ["ORD-FLOW-06", "STATE-12"] "Leaves the horizon out of its node and edge states.";
+    NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
+    UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
+    UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
+    CompletedUpdateGapAccepted "completed-update-gap-accepted" ["ORD-FLOW-10"] "Continues a completed order from whatever node the update begins with.";
+    CompletedNotContinued "completed-not-continued" ["ORD-FLOW-11"] "Refuses updates of a completed order.";
+    RejectionStopsOrder "rejection-stops-order" ["ORD-FLOW-12", "ORD-REJ-11"] "Stops driving when it has to refuse a message.";
+
+    // Cancel
+    CancelDrivesOn "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder.";
+    CancelLeavesWaiting "cancel-leaves-waiting" ["ORD-CANCEL-03"] "Leaves the waiting actions of a cancelled order WAITING.";
+    CancelLetsRun "cancel-lets-run" ["ORD-CANCEL-04"] "Lets interruptible actions run to their end when the order is cancelled.";
+    CancelFailsEarly "cancel-fails-early" ["ORD-CANCEL-05"] "Reports an action FAILED on cancellation and FINISHED when it ends.";
+    CancelFinishedEarly "cancel-finished-early" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while an action still runs.";
+    CancelNeverFinished "cancel-never-finished" ["ORD-CANCEL-07", "IACT-04"] "Leaves cancelOrder RUNNING for ever.";
+    CancelClearsOrderId "cancel-clears-order-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Empties the orderId when the order is cancelled.";
+    CancelKeepsNodes "cancel-keeps-nodes" ["ORD-CANCEL-09"] "Keeps all node states while it drives to the node where it stops.";
+    CancelLastNodeStale "cancel-last-node-stale" ["ORD-CANCEL-10"] "Does not report the node where it stopped after a cancellation.";
+    CancelLeavesNodes "cancel-leaves-nodes" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order.";
+    CancelDropsActions "cancel-drops-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Removes the action states of a cancelled order.";
+    DeadAfterCancel "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation.";
+    TemporaryNodeRefused "temporary-node-refused" ["ORD-CANCEL-15"] "Refuses orders that begin at a node it has never heard of.";
+    IdleCancelFinished "idle-cancel-finished" ["ORD-CANCEL-18"] "Reports cancelOrder FINISHED although there is no order.";
+    IdleCancelSilent "idle-cancel-silent" ["ORD-CANCEL-19", "ORD-CANCEL-20"] "Raises no error when there is no order to cancel.";
+    IdleCancelFatal "idle-cancel-fatal" ["ORD-CANCEL-19"] "Calls a missing order to cancel FATAL.";
+    IdleCancelUnreferenced "idle-cancel-unreferenced" ["ORD-CANCEL-20"] "Does not name the actionId when there is no order to cancel.";
+
+    // Rejection
+    MalformedTakenOver "malformed-taken-over" ["ORD-REJ-01"] "Takes over the ids of malformed orders, with defaults for what it cannot read.";
+    ValidationErrorMisspelled "validation-error-misspelled" ["ORD-REJ-02"] "Calls a malformed order validationOrder, as an old figure does.";
+    ValidationErrorFatal "validation-error-fatal" ["ORD-REJ-02"] "Reports a malformed order as FATAL.";
+    ValidationErrorDroppedEarly "validation-error-dropped-early" ["ORD-REJ-03"] "Forgets the validationError after a second.";
+    ValidationErrorLingers "validation-error-lingers" ["ORD-REJ-03"] "Keeps order errors although a new order was accepted.";
+    UnknownActionAccepted "unknown-action-accepted" ["ORD-REJ-04", "ORD-REJ-09"] "Accepts orders with unknown actions and fails the action.";
+    UnsupportedFieldIgnored "unsupported-field-ignored" ["ORD-REJ-05", "OPT-02"] "Ignores fields of an order it has no use for.";
+    OrderErrorAsValidation "order-error-as-validation" ["ORD-REJ-06"] "Reports orders it cannot perform as malformed.";
+    OrderErrorFatal "order-error-fatal" ["ORD-REJ-06"] "Reports orders it cannot perform as FATAL.";
+    OrderErrorUnreferenced "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform.";
+    OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a second.";
+    OutdatedUpdateTakenOver "outdated-update-taken-over" ["ORD-REJ-10"] "Goes back to an outdated order update.";
+    OutdatedUpdateDropsOrder "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives.";
+    OutdatedUpdateMisnamed "outdated-update-misnamed" ["ORD-REJ-12"] "Reports an outdated update as validationError.";
+    OutdatedUpdateFatal "outdated-update-fatal" ["ORD-REJ-12"] "Reports an outdated update as FATAL.";
+    DuplicateReported "duplicate-reported" ["ORD-REJ-13"] "Raises an error for an order that is sent twice.";
+    DuplicateExecuted "duplicate-executed" ["ORD-REJ-13"] "Begins an order again when it is sent twice.";
+    UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
+    MemoryUnchecked "memory-unchecked" ["ORD-REJ-15"] "Takes over orders larger than its stated limits, cut to what fits.";
+    OrientationUnchecked "orientation-unchecked" ["ORD-REJ-16"] "Accepts edges with an orientation it cannot take.";
+    RejectionSilent "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order.";
+
+    // Motion
+    ThetaIgnored "theta-ignored" ["ORD-MSG-10", "ORD-MSG-14", "NODE-01"] "Does not turn to the orientation a node asks for.";
+    MaxSpeedIgnored "max-speed-ignored" ["ORD-MSG-20", "OPT-01"] "Drives with its own speed whatever the edge permits.";
+    EdgeOrientationIgnored "edge-orientation-ignored" ["ORD-MSG-22", "OPT-01"] "Drives forwards whatever orientation the edge asks for.";
+    MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
+    TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01"] "Reports a node traversed half a metre before it is there.";
+    AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
+    DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05"] "Reports its orientation in degrees.";
+    VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
+
+    // Maps
+    MapListedTwice "map-listed-twice" ["MAP-07"] "Lists the map it uses twice.";
+    UnknownMapAccepted "unknown-map-accepted" ["MAP-08"] "Accepts orders on maps it does not have.";
+    PositionMapStale "position-map-stale" ["MAP-11"] "Names a map in its position that is not on board.";
+    MapStatusMisspelled "map-status-misspelled" ["MAP-12"] "Says ACTIVE where ENABLED is meant.";
+    DisabledMapUsed "disabled-map-used" ["MAP-13"] "Drives on maps that are disabled.";
+    MapsReportedEmpty "maps-reported-empty" ["MAP-15"] "Reports no maps although it drives on one.";
+    DownloadNeverRunning "download-never-running" ["MAP-17"] "Keeps downloadMap INITIALIZING while it downloads.";
+    DownloadFinishedEarly "download-finished-early" ["MAP-18", "MAP-21"] "Reports downloadMap FINISHED when the first byte arrives.";
+    DownloadFailureFinished "download-failure-finished" ["MAP-19"] "Reports downloadMap FINISHED when the server does not have the map.";
+    DownloadFailureSilent "download-failure-silent" ["MAP-19"] "Raises no error when a download fails.";
+    DownloadEnables "download-enables" ["MAP-20"] "Enables a map as soon as it is downloaded.";
+    MapListedWhileLoading "map-listed-while-loading" ["MAP-21"] "Lists a map when its download begins.";
+    DownloadDisablesOthers "download-disables-others" ["MAP-22"] "Disables all other maps when it downloads one.";
+    DuplicateMapAccepted "duplicate-map-accepted" ["MAP-23"] "Downloads a map again that it has.";
+    DuplicateMapSilent "duplicate-map-silent" ["MAP-23"] "Raises no error for a map it has already.";
+    TwoMapsEnabled "two-maps-enabled" ["MAP-14", "MAP-24"] "Leaves the old version of a map enabled beside the new one.";
+    EnableDisablesOtherMaps "enable-disables-other-maps" ["MAP-24"] "Disables all other maps when one is enabled, whatever their mapId.";
+    EnableWithoutEffect "enable-without-effect" ["MAP-24"] "Reports enableMap FINISHED and enables nothing.";
+    EnableUnknownFinished "enable-unknown-finished" ["MAP-25"] "Reports enableMap FINISHED for a map it does not have.";
+    ManualEnableUnreported "manual-enable-unreported" ["MAP-26", "STATE-10"] "Does not report a map enabled on the vehicle.";
+    DeleteKeepsEntry "delete-keeps-entry" ["MAP-29"] "Keeps listing a map it has deleted.";
+    StorageFullSilent "storage-full-silent" ["MAP-30", "MAP-19"] "Raises no error when there is no room for a map.";
+    StorageFullDeletes "storage-full-deletes" ["MAP-31", "MAP-22"] "Deletes another map when there is no room for a new one.";
+    UsedMapDeleted "used-map-deleted" ["MAP-32"] "Deletes the map it drives on.";
+    DeleteUnknownFinished "delete-unknown-finished" ["MAP-33"] "Reports deleteMap FINISHED for a map it does not have.";
+    HashIgnored "hash-ignored" ["MAP-34"] "Does not verify the hash of a map.";
+    LiftMapStale "lift-map-stale" ["MAP-35"] "Keeps its old mapId when it arrives on another floor.";
+
+    // Actions
+    EdgeActionOutlivesEdge "edge-action-outlives-edge" ["ACT-02", "NODE-05"] "Lets the actions of an edge run on behind its end.";
+    ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
+    PauseTwiceFails "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused.";
+    PauseDrivesOn "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses.";
+    PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
+    PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
+    PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
+    ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Reports stopPause FINISHED although the button still holds it.";
+    ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
+    ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
+    InitPositionWithoutEffect "init-position-without-effect" ["ACT-23"] "Reports initPosition FINISHED and keeps its pose.";
+    InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
+    InitPositionUnchecked "init-position-unchecked" ["ACT-25"] "Takes over a pose on a map it does not have.";
+    StateRequestUnanswered "state-request-unanswered" ["ACT-26"] "Reports stateRequest FINISHED only with the next periodic state.";
+    LogNameMissing "log-name-missing" ["ACT-27", "STATE-MSG-12"] "Does not name the log it stored.";
+    PickWithoutLoad "pick-without-load" ["ACT-28"] "Reports pick FINISHED before the load is there.";
+    PickFailureFinished "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was no room for the load.";
+    FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick or drop fails.";
+    TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
+    TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
+    FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
+    InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09"] "Performs instant actions without an action state.";
+    InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
+    InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions only when its order is complete.";
+    UnknownInstantSilent "unknown-instant-silent" ["IACT-06"] "Raises no error for an instant action it does not know.";
+    UnknownInstantFinished "unknown-instant-finished" ["IACT-06"] "Reports an instant action it does not know as FINISHED.";
+    OnlyFirstInstantAction "only-first-instant-action" ["IACT-07", "IACT-03"] "Performs only the first action of an instantActions message.";
+
+    // State
+    StateSilence "state-silence" ["STATE-02"] "Sends states only every 45 seconds when nothing happens.";
+    StatesByClock "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens.";
+    OrderWithoutState "order-without-state" ["STATE-03"] "Does not send a state when an order arrives.";
+    LoadWithoutState "load-without-state" ["STATE-04"] "Does not send a state when its load changes.";
+    ErrorWithoutState "error-without-state" ["STATE-05"] "Does not send a state when an error appears.";
+    NodeWithoutState "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node.";
+    ModeWithoutState "mode-without-state" ["STATE-07"] "Does not send a state when its operating mode changes.";
+    DrivingWithoutState "driving-without-state" ["STATE-08"] "Does not send a state when it starts or stops.";
+    ActionsWithoutState "actions-without-state" ["STATE-09"] "Does not send a state when an action proceeds.";
+    MapsWithoutState "maps-without-state" ["STATE-10"] "Does not send a state when its maps change.";
+    StateBursts "state-bursts" ["STATE-11"] "Sends every state five times.";
+    TraversedNodesListed "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last.";
+    FinishedOrderListed "finished-order-listed" ["STATE-13"] "Keeps the last node in its states when the order is complete.";
+    NewBaseRequestAlways "new-base-request-always" ["STATE-16"] "Asks for a new base all the time.";
+    SafetyStateMissing "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states.";
+    OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02"] "Empties the orderId when the order is complete.";
+    RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
+    LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
+    PositionNotInitialized "position-as-text" ["STATE-MSG-05", "JSON-06"] "Reports its coordinates as strings.";
+    LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
+    LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
+    DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
+    InstantActionsForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
+    FinishedActionsRemoved "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done.";
+    RunningInstantDropped "running-instant-dropped" ["STATE-MSG-11"] "Removes running instant actions from its states when a new order is accepted.";
+    NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13"] "Leaves the sequenceId out of its node states.";
+    HorizonReportedReleased "horizon-reported-released" ["STATE-MSG-13"] "Reports the nodes and edges of the horizon as released.";
+    StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05"] "Says DONE where FINISHED is meant.";
+    ChargeAsFraction "charge-missing" ["STATE-MSG-15"] "Leaves the charge out of its battery state.";
+    EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
+    EmergencyStopUnreported "emergency-stop-unreported" ["STATE-MSG-17"] "Does not report an emergency stop.";
+
+    // Traversal
+    TraversalSplit "traversal-split" ["NODE-03"] "Removes the node state and updates the last node in two states.";
+    LastNodeStale "last-node-stale" ["NODE-03", "STATE-MSG-04"] "Reports the new lastNodeId with the old lastNodeSequenceId.";
+    NodeActionsEarly "node-actions-early" ["NODE-04", "ASTATE-02"] "Begins the actions of a node when it sets out for it.";
+    EdgeStatesStay "edge-states-stay" ["NODE-05", "STATE-12"] "Keeps the edge it has left in its states.";
+    EdgeActionsLate "edge-actions-late" ["NODE-06", "ACT-02"] "Begins the actions of an edge at its end.";
+    EdgeActionsOnNode "edge-actions-on-node" ["NODE-07"] "Begins the actions of an edge while it is held on the node before.";
+
+    // Action life cycle and blocking
+    ActionStatesMissing "horizon-actions-missing" ["ASTATE-01"] "Lists the actions of the horizon only when they are released.";
+    RunningFromStart "running-from-start" ["ASTATE-02"] "Reports all actions RUNNING when the order is accepted.";
+    InitializingFromStart "initializing-from-start" ["ASTATE-03", "ASTATE-02"] "Reports all actions INITIALIZING when the order is accepted.";
+    PausedWithoutPause "paused-without-pause" ["ASTATE-04"] "Reports actions PAUSED that only wait for others.";
+    PauseToWaiting "pause-to-waiting" ["ASTATE-05"] "Puts running actions back to WAITING in a pause.";
+    FailsAfterFinished "fails-after-finished" ["ASTATE-06"] "Reports finished actions FAILED when their order is cancelled.";
+    ListReversed "list-reversed" ["BLOCK-01"] "Performs the actions of a node from the last to the first.";
+    NoneStops "none-stops" ["BLOCK-02"] "Does not drive while an action of type NONE runs.";
+    SoftDrives "soft-drives" ["BLOCK-03"] "Drives while a SOFT action runs.";
+    HardDrives "hard-drives" ["BLOCK-04"] "Drives while a HARD action runs.";
+    HardOverlaps "hard-overlaps" ["BLOCK-05"] "Performs HARD actions beside others.";
+    AllSequential "all-sequential" ["BLOCK-06"] "Performs one action after the other, whatever their type.";
+    StuckAfterBlocking "stuck-after-blocking" ["BLOCK-07"] "Does not drive on after a blocking action.";
+
+    // Errors and modes
+    ErrorsOmitted "errors-omitted" ["STATE-MSG-01", "ERR-01"] "Leaves the errors array out when there is no error.";
+    ErrorLevelUnknown "error-level-unknown" ["ERR-02"] "Reports warnings with the level ERROR.";
+    WarningBlocks "warning-blocks" ["ERR-03"] "Does not drive while it reports a warning.";
+    EmergencyStopWarning "emergency-stop-warning" ["ERR-04"] "Reports the emergency stop as a WARNING.";
+    ReferenceValueNumeric "reference-value-numeric" ["ERR-05"] "Gives numbers as reference values of errors.";
+    ReferencesAsMap "references-as-map" ["BP-04", "ERR-05"] "Gives the references of errors as one object.";
+    InfoLevelWarning "info-level-warning" ["INFO-01"] "Reports an information with the level WARNING.";
+    SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
+    ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
+    SemiautomaticFaster "semiautomatic-faster" ["MODE-03"] "Drives faster in SEMIAUTOMATIC.";
+    VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";
+}
+
+/// The fault of that name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Fault> {
+    FAULTS.iter().find(|fault| fault.name == name)
+}
+
+/// A set of faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Faults([u128; 3]);
+
+impl Faults {
+    /// The set of the named faults; `Err` with the first unknown name.
+    pub(super) fn named(names: &[&str]) -> Result<Self, String> {
+        let mut set = Self::default();
+        for name in names {
+            let position = FAULTS.iter().position(|fault| fault.name == *name);
+            let index = position.ok_or_else(|| (*name).to_owned())?;
+            set.0[index / 128] |= 1 << (index % 128);
+        }
+        Ok(set)
+    }
+
+    /// Whether the fault is on.
+    pub(super) fn has(self, fault: FaultName) -> bool {
+        let index = fault as usize;
+        self.0[index / 128] & (1 << (index % 128)) != 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_name_is_kebab_case_and_unique() {
+        let mut names: Vec<_> = FAULTS.iter().map(|fault| fault.name).collect();
+        assert!(names.iter().all(|name| {
+            name.chars()
+                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
+        }));
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), FAULTS.len());
+    }
+
+    #[test]
+    fn a_set_holds_exactly_the_faults_it_was_named() {
+        let set = Faults::named(&["no-will", "visualization-slow"]).unwrap_or_default();
+        assert!(set.has(FaultName::NoWill) && set.has(FaultName::VisualizationSlow));
+        assert!(!set.has(FaultName::WillOffline));
+        assert_eq!(Faults::named(&["no-such"]), Err("no-such".to_owned()));
+    }
+}

@@ -1,0 +1,159 @@
+//! Instant actions: read one by one, represented in the action states, performed at once (section 6.9).
+
+use serde_json::Value;
+
+use super::Agv;
+use super::action_kinds::{self, Scope};
+use super::actions::{Action, Origin, Status};
+use super::deeds::Problem;
+use super::errors::{ActiveError, Life};
+use super::faults::FaultName as F;
+use super::order_message::{ActionRequest, Blocking, read_parameters};
+use super::read::{Defect, Fields};
+
+/// At most this many actions of one message are taken.
+pub(super) const MAX_INSTANT_ACTIONS: usize = 50;
+
+/// At most this many instant actions are remembered between two orders; the oldest that have ended give way.
+const MAX_REMEMBERED: usize = 500;
+
+impl Agv {
+    /// Takes an instantActions message.
+    pub(super) fn instant_actions_received(&mut self, payload: &[u8]) {
+        let too_long = payload.len() > self.config.max_message;
+        let message = if too_long {
+            None
+        } else {
+            serde_json::from_slice::<Value>(payload).ok()
+        };
+        let Some(message) = message else {
+            self.malformed("the message is not JSON or too long");
+            return;
+        };
+        let elements = Fields::open(&message, "")
+            .ok()
+            .and_then(|fields| fields.raw("actions"))
+            .and_then(Value::as_array);
+        let Some(elements) = elements else {
+            self.malformed("the message has no array of actions");
+            return;
+        };
+        let limit = if self.faults.has(F::OnlyFirstInstantAction) {
+            1
+        } else {
+            MAX_INSTANT_ACTIONS
+        };
+        for element in elements.iter().take(limit) {
+            self.instant_action(element);
+        }
+    }
+
+    fn malformed(&mut self, reason: &str) {
+        self.errors.raise(ActiveError {
+            error_type: self.config.errors.validation.clone(),
+            fatal: false,
+            references: vec![("topic".into(), "instantActions".into())],
+            description: reason.to_owned(),
+            life: Life::UntilNewOrder,
+        });
+    }
+
+    fn instant_action(&mut self, element: &Value) {
+        let Ok(fields) = Fields::open(element, "actions[]") else {
+            self.malformed("an action is not an object");
+            return;
+        };
+        let Ok(id) = fields.id("actionId") else {
+            self.malformed("an action has no actionId");
+            return;
+        };
+        if self.actions.get(&id).is_some() {
+            // Delivered twice; it is done once.
+            return;
+        }
+        let (request, defect) = read_leniently(&fields, id.clone());
+        let kind = action_kinds::find(&self.config, &request.action_type);
+        let fit = kind.filter(|kind| kind.scopes.contains(&Scope::Instant));
+        let refusal = match (&defect, fit) {
+            (Some(defect), _) => Some(format!("{} {}", defect.path, defect.reason)),
+            (None, None) => Some("the vehicle does not offer the action as an instant action".to_owned()),
+            (None, Some(kind)) => {
+                action_kinds::refusal(kind, &request, false).map(|(key, reason)| format!("{key}: {reason}"))
+            }
+        };
+        self.make_room();
+        let action = Action::waiting(request, kind, Origin::Instant);
+        self.actions.push(action.clone());
+        match refusal {
+            Some(_) if self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
+            Some(reason) => {
+                let silent = self.faults.has(F::UnknownInstantSilent);
+                self.fail(&id, &Problem::unable(&action, &reason).silent_if(silent));
+            }
+            None if self.faults.has(F::InstantActionDeferred) => {}
+            None => self.begin_instant(&id),
+        }
+    }
+
+    fn make_room(&mut self) {
+        let remembered = self.actions.iter().filter(|action| !action.of_order()).count();
+        if remembered < MAX_REMEMBERED {
+            return;
+        }
+        let ended = self
+            .actions
+            .iter()
+            .find(|action| !action.of_order() && action.status.is_terminal());
+        if let Some(oldest) = ended.map(|action| action.request.id.clone()) {
+            self.actions.retain(|action| action.request.id != oldest);
+        }
+    }
+
+    fn begin_instant(&mut self, id: &str) {
+        let lasting = self
+            .actions
+            .get(id)
+            .and_then(|action| action.kind)
+            .is_some_and(|kind| kind.lasting);
+        if lasting {
+            self.run_action(id)
+        } else {
+            self.complete(id)
+        }
+    }
+
+    /// `instant-action-deferred`: begins what had to wait for the end of the order.
+    pub(super) fn begin_deferred(&mut self) -> bool {
+        if !self.faults.has(F::InstantActionDeferred) || self.is_busy() {
+            return false;
+        }
+        let waits = |action: &&Action| !action.of_order() && action.status == Status::Waiting;
+        let next = self.actions.iter().find(waits).map(|action| action.request.id.clone());
+        if let Some(id) = &next {
+            self.begin_instant(id);
+        }
+        next.is_some()
+    }
+}
+
+/// Reads an instant action whose id is known; what cannot be read is left empty, with the first defect.
+fn read_leniently(fields: &Fields<'_>, id: String) -> (ActionRequest, Option<Defect>) {
+    let mut request = ActionRequest {
+        path: fields.at("actionType"),
+        action_type: String::new(),
+        id,
+        blocking: Blocking::None,
+        parameters: Vec::new(),
+    };
+    let defect = fields
+        .id("actionType")
+        .map(|action_type| request.action_type = action_type)
+        .and_then(|()| {
+            fields.optional("blockingType", |fields, key| {
+                fields.literal(key, &["NONE", "SOFT", "HARD"])
+            })
+        })
+        .and_then(|_| read_parameters(fields))
+        .map(|parameters| request.parameters = parameters);
+    (request, defect.err())
+}

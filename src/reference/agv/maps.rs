@@ -1,0 +1,207 @@
+//! The maps on board: stored, enabled, deleted (section 6.7).
+
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+use super::config::OnboardMap;
+use super::faults::{FaultName as F, Faults};
+
+/// Why something with a map did not work.
+pub(super) type Refusal = &'static str;
+
+/// All maps on board.
+#[derive(Clone, Debug)]
+pub(super) struct Maps {
+    all: Vec<OnboardMap>,
+    capacity: usize,
+}
+
+impl Maps {
+    pub(super) fn new(all: Vec<OnboardMap>, capacity: usize) -> Self {
+        Self { all, capacity }
+    }
+
+    fn position(&self, map_id: &str, version: &str) -> Option<usize> {
+        self.all
+            .iter()
+            .position(|map| map.map_id == map_id && map.map_version == version)
+    }
+
+    /// Whether any version is on board.
+    pub(super) fn on_board(&self, map_id: &str) -> bool {
+        self.all.iter().any(|map| map.map_id == map_id)
+    }
+
+    /// Whether a version is enabled.
+    pub(super) fn enabled(&self, map_id: &str) -> bool {
+        self.all.iter().any(|map| map.map_id == map_id && map.enabled)
+    }
+
+    /// Whether a map can be stored (MAP-23, MAP-30).
+    pub(super) fn room_for(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
+        if self.position(map_id, version).is_some() && !faults.has(F::DuplicateMapAccepted) {
+            return Err("the map is on board already");
+        }
+        if self.all.len() < self.capacity {
+            return Ok(());
+        }
+        if faults.has(F::StorageFullDeletes) {
+            if let Some(oldest) = self.all.iter().position(|map| !map.enabled) {
+                self.all.remove(oldest);
+            }
+            return Ok(());
+        }
+        Err("there is no room for another map")
+    }
+
+    /// Stores a map that was downloaded: disabled (MAP-20).
+    pub(super) fn store(&mut self, map_id: &str, version: &str, faults: Faults) {
+        if faults.has(F::DownloadDisablesOthers) {
+            self.all.iter_mut().for_each(|map| map.enabled = false);
+        }
+        if self.position(map_id, version).is_some() {
+            return;
+        }
+        self.all.push(OnboardMap {
+            map_id: map_id.to_owned(),
+            map_version: version.to_owned(),
+            enabled: faults.has(F::DownloadEnables),
+        });
+    }
+
+    /// Enables a version, and disables the others of that mapId (MAP-24).
+    pub(super) fn enable(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
+        if self.position(map_id, version).is_none() {
+            return if faults.has(F::EnableUnknownFinished) {
+                Ok(())
+            } else {
+                Err("the map is not on board")
+            };
+        }
+        if faults.has(F::EnableWithoutEffect) {
+            return Ok(());
+        }
+        for map in &mut self.all {
+            if map.map_id == map_id {
+                map.enabled = map.map_version == version || (faults.has(F::TwoMapsEnabled) && map.enabled);
+            } else if faults.has(F::EnableDisablesOtherMaps) {
+                map.enabled = false;
+            }
+        }
+        Ok(())
+    }
+
+    /// Enables some version of a mapId if none is (for a new pose on it).
+    pub(super) fn enable_any(&mut self, map_id: &str) {
+        if !self.enabled(map_id)
+            && let Some(map) = self.all.iter_mut().rev().find(|map| map.map_id == map_id)
+        {
+            map.enabled = true;
+        }
+    }
+
+    /// Removes a map; `used` says which mapIds are needed now (MAP-29, MAP-32, MAP-33).
+    pub(super) fn delete(
+        &mut self,
+        map_id: &str,
+        version: &str,
+        used: impl Fn(&str) -> bool,
+        faults: Faults,
+    ) -> Result<(), Refusal> {
+        let Some(index) = self.position(map_id, version) else {
+            return if faults.has(F::DeleteUnknownFinished) {
+                Ok(())
+            } else {
+                Err("the map is not on board")
+            };
+        };
+        if self.all[index].enabled && used(map_id) && !faults.has(F::UsedMapDeleted) {
+            return Err("the map is in use");
+        }
+        if !faults.has(F::DeleteKeepsEntry) {
+            self.all.remove(index);
+        }
+        Ok(())
+    }
+
+    /// The array of the state.
+    pub(super) fn picture(&self, faults: Faults) -> Value {
+        if faults.has(F::MapsReportedEmpty) {
+            return json!([]);
+        }
+        let mut pictures: Vec<Value> = self
+            .all
+            .iter()
+            .map(|map| {
+                let status = match map.enabled {
+                    true if faults.has(F::MapStatusMisspelled) => "ACTIVE",
+                    true => "ENABLED",
+                    false => "DISABLED",
+                };
+                json!({ "mapId": map.map_id, "mapVersion": map.map_version, "mapStatus": status })
+            })
+            .collect();
+        if faults.has(F::MapListedTwice) {
+            pictures.extend(pictures.first().cloned());
+        }
+        Value::Array(pictures)
+    }
+}
+
+/// Whether the file has the announced SHA-256, in hexadecimal; no announcement fits every file (MAP-34).
+pub(super) fn hash_fits(file: &[u8], announced: &str) -> bool {
+    let digest = Sha256::digest(file);
+    let hexadecimal: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    announced.is_empty() || announced.eq_ignore_ascii_case(&hexadecimal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn maps(entries: &[(&str, &str, bool)]) -> Maps {
+        let all = entries
+            .iter()
+            .map(|(id, version, enabled)| OnboardMap {
+                map_id: (*id).into(),
+                map_version: (*version).into(),
+                enabled: *enabled,
+            })
+            .collect();
+        Maps::new(all, 3)
+    }
+
+    #[test]
+    fn enabling_disables_other_versions_and_no_other_map() {
+        let mut maps = maps(&[("a", "1", true), ("a", "2", false), ("b", "1", true)]);
+        assert_eq!(maps.enable("a", "2", Faults::default()), Ok(()));
+        let statuses: Vec<_> = maps.all.iter().map(|map| map.enabled).collect();
+        assert_eq!(statuses, [false, true, true]);
+    }
+
+    #[test]
+    fn a_full_store_refuses_and_a_known_map_is_refused() {
+        let mut maps = maps(&[("a", "1", true), ("a", "2", false)]);
+        assert!(maps.room_for("a", "2", Faults::default()).is_err());
+        assert!(maps.room_for("a", "3", Faults::default()).is_ok());
+        maps.store("a", "3", Faults::default());
+        assert!(maps.room_for("a", "4", Faults::default()).is_err());
+        assert_eq!(maps.all.len(), 3);
+        assert!(!maps.all[2].enabled);
+    }
+
+    #[test]
+    fn a_used_map_is_not_deleted_but_its_disabled_version_is() {
+        let mut maps = maps(&[("a", "1", true), ("a", "2", false)]);
+        assert!(maps.delete("a", "1", |id| id == "a", Faults::default()).is_err());
+        assert!(maps.delete("a", "2", |id| id == "a", Faults::default()).is_ok());
+        assert!(maps.delete("a", "2", |id| id == "a", Faults::default()).is_err());
+    }
+
+    #[test]
+    fn the_hash_is_compared_without_regard_to_case() {
+        let empty = "E3B0C44298FC1C149AFBF4C8996FB92427AE41E4649B934CA495991B7852B855";
+        assert!(hash_fits(b"", empty) && hash_fits(b"x", ""));
+        assert!(!hash_fits(b"x", empty));
+    }
+}

@@ -1,0 +1,277 @@
+//! The reference AGV: a complete vehicle as a sans-IO state machine, "the best-behaved vehicle there is".
+//!
+//! Written from the standard. The parts, by idea: [`acceptance`] decides about orders (figure 8), [`book`] holds
+//! the order, [`progress`] drives it, [`cancel`] ends it (figure 9); [`actions`] knows when an action runs and
+//! [`deeds`] what it does; [`instant`] takes instant actions, [`commands`] what people do to the vehicle;
+//! [`connection`] and [`report`] speak to the broker. Every deviation from good behaviour is in [`faults`].
+
+mod acceptance;
+mod action_kinds;
+mod actions;
+mod book;
+mod cancel;
+mod commands;
+mod config;
+mod connection;
+mod deeds;
+mod downloads;
+mod errors;
+mod factsheet;
+pub mod faults;
+mod instant;
+mod maps;
+mod motion;
+mod order_message;
+mod progress;
+mod read;
+mod report;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use crate::clock::{Moment, Stamp};
+use crate::reference::{ConnectOptions, Device, Input, Output};
+
+pub use commands::COMMANDS;
+pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
+pub use faults::{FAULTS, FaultName, find};
+
+use actions::Actions;
+use book::Book;
+use connection::Connection;
+use downloads::Downloads;
+use errors::{ActiveError, Errors, Life};
+use faults::Faults;
+use maps::Maps;
+use motion::{Motion, Pose};
+use report::Report;
+
+/// A fault that is not in [`FAULTS`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the reference AGV has no fault `{0}`")]
+pub struct UnknownFault(pub String);
+
+/// operatingMode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Automatic,
+    Semiautomatic,
+    Manual,
+    Service,
+    Teachin,
+}
+
+impl Mode {
+    /// Whether master control commands the vehicle (MODE-02).
+    fn takes_orders(self) -> bool {
+        matches!(self, Self::Automatic | Self::Semiautomatic)
+    }
+}
+
+/// What keeps the vehicle from moving.
+#[derive(Clone, Copy, Debug, Default)]
+struct Holds {
+    /// startPause.
+    pause: bool,
+    /// The pause button on the vehicle.
+    button: bool,
+    /// The emergency stop.
+    emergency: bool,
+    /// Something stands in the protective field.
+    field: bool,
+}
+
+impl Holds {
+    fn any(self) -> bool {
+        self.pause || self.button || self.emergency || self.field
+    }
+}
+
+/// A load on the vehicle.
+#[derive(Clone, Debug, PartialEq)]
+struct Load {
+    id: String,
+    load_type: String,
+    position: String,
+}
+
+/// The reference AGV.
+#[derive(Clone, Debug)]
+pub struct Agv {
+    config: AgvConfig,
+    faults: Faults,
+    /// The time of what is happening.
+    now: Stamp,
+    book: Book,
+    motion: Motion,
+    actions: Actions,
+    maps: Maps,
+    downloads: Downloads,
+    errors: Errors,
+    holds: Holds,
+    mode: Mode,
+    loads: Vec<Load>,
+    charging: bool,
+    connection: Connection,
+    report: Report,
+    /// Counts logs.
+    logs: u32,
+    /// What was decided and is still to be handed to the driver.
+    pending: Vec<Output>,
+}
+
+impl Agv {
+    /// A vehicle with some of [`FAULTS`], by name; without any it is faultless.
+    ///
+    /// It stands on its start node, is switched on, and asks for its connection at the first [`Input::Time`]
+    /// (a driver may also connect it unasked).
+    pub fn new(config: AgvConfig, faults: &[&str]) -> Result<Self, UnknownFault> {
+        let faults = Faults::named(faults).map_err(UnknownFault)?;
+        let pose = config.node(&config.start_node).map_or_else(
+            || Pose {
+                x: 0.0,
+                y: 0.0,
+                theta: 0.0,
+                map_id: config.maps.first().map_or_else(String::new, |map| map.map_id.clone()),
+            },
+            |node| Pose {
+                x: node.x,
+                y: node.y,
+                theta: node.theta.unwrap_or(0.0),
+                map_id: node.map_id.clone(),
+            },
+        );
+        let start = if config.node(&config.start_node).is_some() {
+            config.start_node.clone()
+        } else {
+            String::new()
+        };
+        let maps = Maps::new(config.maps.clone(), config.map_capacity);
+        Ok(Self {
+            faults,
+            now: Stamp {
+                moment: Moment::START,
+                utc: jiff::Timestamp::UNIX_EPOCH,
+            },
+            book: Book::empty(start),
+            motion: Motion::at(pose),
+            actions: Actions::default(),
+            maps,
+            downloads: Downloads::default(),
+            errors: Errors::default(),
+            holds: Holds::default(),
+            mode: Mode::Automatic,
+            loads: Vec::new(),
+            charging: false,
+            connection: Connection::new(),
+            report: Report::default(),
+            logs: 0,
+            pending: Vec::new(),
+            config,
+        })
+    }
+
+    /// The present moment.
+    fn moment(&self) -> Moment {
+        self.now.moment
+    }
+
+    /// Reports a warning that has no rule for its end.
+    fn warn(&mut self, error_type: String, references: Vec<(String, String)>, description: String) {
+        let life = Life::Until(self.moment() + self.config.error_duration);
+        self.errors.raise(ActiveError {
+            error_type,
+            fatal: false,
+            references,
+            description,
+            life,
+        });
+    }
+
+    /// When something happens next by itself.
+    fn next_event(&self) -> Option<Moment> {
+        let events = [
+            self.motion.end(),
+            self.actions.next_end(),
+            self.errors.next_end(),
+            self.connection.next_attempt(),
+            self.next_report(),
+        ];
+        events.into_iter().flatten().min()
+    }
+
+    /// Lives through everything that happens by itself up to `now`, each at its own time.
+    fn advance(&mut self, now: Stamp) {
+        // A driver that was away for hours gets a bounded number of events, then the rest at once.
+        for _ in 0..10_000 {
+            let Some(event) = self.next_event().filter(|event| *event <= now.moment) else {
+                break;
+            };
+            self.now = now.at(event.max(self.now.moment));
+            self.step();
+        }
+        self.now = now;
+    }
+
+    /// What is due at the present moment.
+    fn step(&mut self) {
+        let moment = self.moment();
+        if let Some(rolled) = self.motion.finish(moment) {
+            self.leg_finished(rolled);
+        }
+        while let Some(id) = self.actions.due(moment) {
+            self.stage_finished(&id);
+        }
+        self.errors.expire(moment);
+        self.attempt_connection();
+        self.settle();
+        self.flush();
+    }
+}
+
+impl Device for Agv {
+    fn connect_options(&mut self, now: Stamp) -> ConnectOptions {
+        self.options(now)
+    }
+
+    fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {
+        self.advance(now);
+        match input {
+            Input::Connected => self.connected(),
+            Input::ConnectionLost => self.connection_lost(),
+            Input::Message { topic, payload } => self.message(&topic, &payload),
+            Input::Time => {}
+            Input::Download { token, progress } => self.download_progress(token, progress),
+            Input::Command(name, arguments) => self.command(&name, &arguments),
+        }
+        self.step();
+        out.append(&mut self.pending);
+    }
+
+    fn wake_up(&self) -> Option<Moment> {
+        self.next_event()
+    }
+}
+
+impl Agv {
+    fn message(&mut self, topic: &str, payload: &[u8]) {
+        if self.config.topic("order") == Some(topic) {
+            self.order_received(payload);
+        } else if self.config.topic("instantActions") == Some(topic) {
+            self.instant_actions_received(payload);
+        }
+    }
+
+    /// How long an action runs.
+    fn duration_of(&self, action: &actions::Action) -> Duration {
+        let asked = action
+            .number("duration")
+            .filter(|seconds| (0.0..=86_400.0).contains(seconds));
+        if let Some(seconds) = asked {
+            return Duration::from_secs_f64(seconds);
+        }
+        let by_type = self.config.action_durations.get(&action.request.action_type);
+        by_type.copied().unwrap_or(self.config.action_duration)
+    }
+}

@@ -1,0 +1,283 @@
+//! The order message as the vehicle understands it, read from JSON (flow step 1: format and types).
+
+use serde_json::Value;
+
+use super::read::{Defect, Fields};
+
+/// Slack for angles written with few digits, such as 3.1416.
+const ANGLE: f64 = std::f64::consts::PI + 0.01;
+
+/// What may go on beside an action (section 6.12).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Blocking {
+    /// Driving and other actions.
+    None,
+    /// Other actions, no driving.
+    Soft,
+    /// Nothing.
+    Hard,
+}
+
+/// An action that was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ActionRequest {
+    pub(super) path: String,
+    pub(super) action_type: String,
+    pub(super) id: String,
+    pub(super) blocking: Blocking,
+    pub(super) parameters: Vec<(String, Value)>,
+}
+
+impl ActionRequest {
+    /// The value of a parameter.
+    pub(super) fn parameter(&self, key: &str) -> Option<&Value> {
+        self.parameters
+            .iter()
+            .find(|(name, _)| name == key)
+            .map(|(_, value)| value)
+    }
+
+    /// Reads an action of an order, where every required field must be right.
+    pub(super) fn read(fields: &Fields<'_>) -> Result<Self, Defect> {
+        let blocking = match fields.literal("blockingType", &["NONE", "SOFT", "HARD"])? {
+            0 => Blocking::None,
+            1 => Blocking::Soft,
+            _ => Blocking::Hard,
+        };
+        Ok(Self {
+            path: fields.at("actionType"),
+            action_type: fields.id("actionType")?,
+            id: fields.id("actionId")?,
+            blocking,
+            parameters: read_parameters(fields)?,
+        })
+    }
+}
+
+/// Reads the optional list of key and value objects.
+pub(super) fn read_parameters(fields: &Fields<'_>) -> Result<Vec<(String, Value)>, Defect> {
+    if !fields.has("actionParameters") {
+        return Ok(Vec::new());
+    }
+    let mut parameters = Vec::new();
+    for parameter in fields.objects("actionParameters")? {
+        let value = match parameter.raw("value") {
+            Some(value) if !value.is_null() => value.clone(),
+            _ => {
+                return Err(Defect {
+                    path: parameter.at("value"),
+                    reason: "is missing",
+                });
+            }
+        };
+        parameters.push((parameter.id("key")?, value));
+    }
+    Ok(parameters)
+}
+
+/// nodePosition.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Position {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) theta: Option<f64>,
+    pub(super) allowed_deviation: Option<f64>,
+    pub(super) allowed_deviation_theta: Option<f64>,
+    pub(super) map_id: String,
+}
+
+impl Position {
+    fn read(value: &Value, path: &str) -> Result<Self, Defect> {
+        let fields = Fields::open(value, path)?;
+        fields.optional("mapDescription", |fields, key| fields.text(key))?;
+        Ok(Self {
+            x: fields.number("x")?,
+            y: fields.number("y")?,
+            theta: fields.optional("theta", |fields, key| fields.number_in(key, -ANGLE, ANGLE))?,
+            allowed_deviation: fields
+                .optional("allowedDeviationXY", |fields, key| fields.number_in(key, 0.0, f64::MAX))?,
+            allowed_deviation_theta: fields
+                .optional("allowedDeviationTheta", |fields, key| fields.number_in(key, 0.0, ANGLE))?,
+            map_id: fields.id("mapId")?,
+        })
+    }
+}
+
+/// A node of an order.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Node {
+    pub(super) path: String,
+    pub(super) id: String,
+    pub(super) sequence_id: u32,
+    pub(super) released: bool,
+    pub(super) position: Option<Position>,
+    /// nodePosition as it was sent, to be repeated in the state.
+    pub(super) sent_position: Option<Value>,
+    pub(super) actions: Vec<ActionRequest>,
+}
+
+/// An edge of an order.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Edge {
+    pub(super) path: String,
+    pub(super) id: String,
+    pub(super) sequence_id: u32,
+    pub(super) released: bool,
+    pub(super) start: String,
+    pub(super) end: String,
+    pub(super) max_speed: Option<f64>,
+    pub(super) max_height: Option<f64>,
+    pub(super) max_rotation_speed: Option<f64>,
+    pub(super) orientation: Option<f64>,
+    /// orientationType GLOBAL.
+    pub(super) global: bool,
+    pub(super) rotation_allowed: Option<bool>,
+    pub(super) actions: Vec<ActionRequest>,
+}
+
+/// An order message of right format.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Order {
+    pub(super) id: String,
+    pub(super) update_id: u32,
+    pub(super) nodes: Vec<Node>,
+    pub(super) edges: Vec<Edge>,
+    /// Paths of optional fields this vehicle has no use for (OPT-02).
+    pub(super) unsupported: Vec<String>,
+}
+
+/// Optional fields of an edge that the vehicle cannot use.
+const UNSUPPORTED_EDGE_FIELDS: [&str; 4] = ["trajectory", "corridor", "direction", "minHeight"];
+
+impl Order {
+    /// Reads an order; `Err` if its format or a type is wrong (ORD-REJ-01).
+    pub(super) fn read(message: &Value) -> Result<Self, Defect> {
+        let fields = Fields::open(message, "")?;
+        read_header(&fields)?;
+        let mut unsupported = Vec::new();
+        if fields.optional("zoneSetId", |fields, key| fields.text(key))?.is_some() {
+            unsupported.push("zoneSetId".to_owned());
+        }
+        let nodes = fields
+            .objects("nodes")?
+            .iter()
+            .map(read_node)
+            .collect::<Result<Vec<_>, _>>()?;
+        let edges = fields
+            .objects("edges")?
+            .iter()
+            .map(|edge| read_edge(edge, &mut unsupported))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self {
+            id: fields.id("orderId")?,
+            update_id: fields.uint32("orderUpdateId")?,
+            nodes,
+            edges,
+            unsupported,
+        })
+    }
+
+    /// The rules between the elements: counts, numbering, neighbours and releases (ORD-11).
+    pub(super) fn graph_defect(&self) -> Option<Defect> {
+        let defect = |path: String, reason| Some(Defect { path, reason });
+        let Some(first) = self.nodes.first() else {
+            return defect("nodes".into(), "is empty");
+        };
+        if self.edges.len() + 1 != self.nodes.len() {
+            return defect("edges".into(), "are not one less than the nodes");
+        }
+        if !first.released {
+            return defect(format!("{}.released", first.path), "is false on the first node");
+        }
+        for (index, edge) in self.edges.iter().enumerate() {
+            let (from, to) = (&self.nodes[index], &self.nodes[index + 1]);
+            if Some(edge.sequence_id) != from.sequence_id.checked_add(1) {
+                return defect(format!("{}.sequenceId", edge.path), "does not follow its start node");
+            }
+            if Some(to.sequence_id) != edge.sequence_id.checked_add(1) {
+                return defect(format!("{}.sequenceId", to.path), "does not follow the edge before");
+            }
+            if edge.start != from.id {
+                return defect(format!("{}.startNodeId", edge.path), "is not the node before");
+            }
+            if edge.end != to.id {
+                return defect(format!("{}.endNodeId", edge.path), "is not the node behind");
+            }
+            if edge.released != to.released {
+                return defect(format!("{}.released", edge.path), "differs from its end node");
+            }
+            if to.released && !from.released {
+                return defect(format!("{}.released", to.path), "is true behind the horizon's begin");
+            }
+        }
+        None
+    }
+
+    /// All actions of nodes and edges.
+    pub(super) fn actions(&self) -> impl Iterator<Item = &ActionRequest> {
+        let nodes = self.nodes.iter().flat_map(|node| &node.actions);
+        nodes.chain(self.edges.iter().flat_map(|edge| &edge.actions))
+    }
+}
+
+/// The header must be there and typed; whom it names is not judged (a fleet may bridge names).
+fn read_header(fields: &Fields<'_>) -> Result<(), Defect> {
+    fields.uint32("headerId")?;
+    for key in ["timestamp", "version", "manufacturer", "serialNumber"] {
+        fields.text(key)?;
+    }
+    Ok(())
+}
+
+fn read_actions(fields: &Fields<'_>) -> Result<Vec<ActionRequest>, Defect> {
+    fields.objects("actions")?.iter().map(ActionRequest::read).collect()
+}
+
+fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
+    fields.optional("nodeDescription", |fields, key| fields.text(key))?;
+    let sent_position = fields.raw("nodePosition").cloned();
+    let position = fields
+        .raw("nodePosition")
+        .map(|value| Position::read(value, &fields.at("nodePosition")))
+        .transpose()?;
+    Ok(Node {
+        path: fields.at("").trim_end_matches('.').to_owned(),
+        id: fields.id("nodeId")?,
+        sequence_id: fields.uint32("sequenceId")?,
+        released: fields.boolean("released")?,
+        position,
+        sent_position,
+        actions: read_actions(fields)?,
+    })
+}
+
+fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge, Defect> {
+    fields.optional("edgeDescription", |fields, key| fields.text(key))?;
+    fields.optional("length", |fields, key| fields.number(key))?;
+    for key in UNSUPPORTED_EDGE_FIELDS {
+        if fields.has(key) {
+            unsupported.push(fields.at(key));
+        }
+    }
+    let global = fields
+        .optional("orientationType", |fields, key| {
+            fields.literal(key, &["TANGENTIAL", "GLOBAL"])
+        })?
+        .is_some_and(|index| index == 1);
+    let limit = |fields: &Fields<'_>, key: &str| fields.number_in(key, 0.0, f64::MAX);
+    Ok(Edge {
+        path: fields.at("").trim_end_matches('.').to_owned(),
+        id: fields.id("edgeId")?,
+        sequence_id: fields.uint32("sequenceId")?,
+        released: fields.boolean("released")?,
+        start: fields.id("startNodeId")?,
+        end: fields.id("endNodeId")?,
+        max_speed: fields.optional("maxSpeed", limit)?,
+        max_height: fields.optional("maxHeight", limit)?,
+        max_rotation_speed: fields.optional("maxRotationSpeed", limit)?,
+        orientation: fields.optional("orientation", |fields, key| fields.number(key))?,
+        global,
+        rotation_allowed: fields.optional("rotationAllowed", |fields, key| fields.boolean(key))?,
+        actions: read_actions(fields)?,
+    })
+}

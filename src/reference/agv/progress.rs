@@ -1,0 +1,302 @@
+//! Driving the order: setting out, arriving, traversing, and beginning actions (sections 6.10.2 and 6.12).
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::action_kinds::Deed;
+use super::actions::Origin;
+use super::book::Stop;
+use super::faults::FaultName as F;
+use super::order_message::{Blocking, Edge};
+use super::{Agv, Mode, motion};
+
+/// An orientation is right within this, in radians.
+const ALIGNED: f64 = 1e-3;
+
+/// How far onto an edge the vehicle rolls out before an action that stops it begins, in metres.
+const BRAKING: f64 = 0.3;
+
+impl Agv {
+    /// Draws all consequences that need no time.
+    pub(super) fn settle(&mut self) {
+        for _ in 0..10_000 {
+            let progress = self.begin_deferred() | self.begin_triggered() | self.drive() | self.settle_cancel();
+            if !progress {
+                break;
+            }
+        }
+    }
+
+    /// Begins actions of the order whose turn it is. A held vehicle begins nothing.
+    fn begin_triggered(&mut self) -> bool {
+        if self.holds.any() {
+            return false;
+        }
+        let ids = self.actions.startable();
+        for id in &ids {
+            self.begin_action(id);
+        }
+        !ids.is_empty()
+    }
+
+    /// Whether anything forbids driving now.
+    fn may_drive(&self) -> bool {
+        let rolling_out = self.faults.has(F::PauseDrivesOn) && self.book.entered && !self.motion.reached;
+        let held = self.holds.any() && !(rolling_out && self.holds.pause);
+        let cancelled = match &self.book.cancel {
+            Some(cancel) => !cancel.to_node && !self.faults.has(F::CancelDrivesOn),
+            None => self.book.cancelled,
+        };
+        let offline = !self.connection.online && self.faults.has(F::StopsOnLinkLoss);
+        let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
+        let warned = self.faults.has(F::WarningBlocks) && !self.errors.is_empty();
+        self.mode.takes_orders()
+            && !held
+            && !cancelled
+            && !offline
+            && !stuck
+            && !warned
+            && !self.actions.block_driving(self.faults)
+    }
+
+    fn blocking_action_ended(&self) -> bool {
+        let here = Origin::Node(self.book.last_sequence);
+        let mut actions = self.actions.iter().filter(|action| action.origin == here);
+        actions.any(|action| action.request.blocking != Blocking::None && action.status.is_terminal())
+    }
+
+    /// Whether the next node may be driven to (ORD-07).
+    fn is_released(&self, stop: &Stop) -> bool {
+        let ignored =
+            self.faults.has(F::HorizonDriven) || (self.faults.has(F::HorizonDrivenOffline) && !self.connection.online);
+        stop.node.released || ignored
+    }
+
+    /// The next thing the vehicle does on its way, if it may; whether it did something.
+    fn drive(&mut self) -> bool {
+        let moment = self.moment();
+        if !self.may_drive() {
+            let moving = self.motion.is_moving();
+            if moving {
+                self.motion.halt(moment);
+            }
+            return moving;
+        }
+        if self.motion.is_moving() {
+            return false;
+        }
+        let Some(stop) = self.book.nodes.front().filter(|stop| self.is_released(stop)).cloned() else {
+            return false;
+        };
+        if self.motion.reached {
+            self.arrive(&stop)
+        } else {
+            self.set_out(&stop)
+        }
+    }
+
+    /// Goes on towards the next node.
+    fn set_out(&mut self, stop: &Stop) -> bool {
+        let early_end = stop.node.sequence_id == self.book.base_end.1 && self.faults.has(F::StopsBeforeEndOfBase);
+        if early_end || self.faults.has(F::NeverStarts) {
+            return false;
+        }
+        let moment = self.moment();
+        let edge = self.book.edge_ahead().cloned();
+        let pose = self.motion.pose(moment);
+        let distance = pose.distance(stop.place.x, stop.place.y);
+        let (theta, backwards) = self.course(edge.as_ref(), stop);
+        let aligned = distance < 1e-6 || motion::wrapped(theta - pose.theta).abs() <= ALIGNED;
+        let turns_before = edge.as_ref().is_some_and(|edge| edge.rotation_allowed == Some(false));
+        self.charging = false;
+        if !aligned && turns_before && !self.book.entered {
+            self.motion.turn(moment, theta, self.rotation_speed(edge.as_ref()));
+            return true;
+        }
+        if let Some(edge) = edge.as_ref().filter(|_| !self.book.entered) {
+            self.enter(edge, stop);
+        }
+        if distance < 1e-6 {
+            self.motion.reached = true;
+        } else if aligned {
+            self.roll(edge.as_ref(), stop, distance, backwards);
+        } else {
+            self.motion.turn(moment, theta, self.rotation_speed(edge.as_ref()));
+        }
+        true
+    }
+
+    /// Enters an edge; its actions are triggered, at once if they do not stop the vehicle (NODE-06, NODE-07).
+    fn enter(&mut self, edge: &Edge, stop: &Stop) {
+        self.book.entered = true;
+        if !self.actions.edge_stops(edge.sequence_id) && !self.faults.has(F::EdgeActionsLate) {
+            self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
+        }
+        if self.faults.has(F::NodeActionsEarly) {
+            self.actions.trigger(Origin::Node(stop.node.sequence_id), self.faults);
+        }
+    }
+
+    fn roll(&mut self, edge: Option<&Edge>, stop: &Stop, distance: f64, backwards: bool) {
+        let moment = self.moment();
+        let pose = self.motion.pose(moment);
+        let stops = edge.is_some_and(|edge| self.actions.edge_stops(edge.sequence_id));
+        let way = match stops && !self.faults.has(F::EdgeActionsLate) {
+            true => BRAKING.min(distance / 4.0),
+            false if self.faults.has(F::TraversedEarly) => (distance - 0.5).max(distance / 2.0),
+            false => distance,
+        };
+        let part = way / distance;
+        let to = (
+            pose.x + (stop.place.x - pose.x) * part,
+            pose.y + (stop.place.y - pose.y) * part,
+        );
+        let to = if part < 1.0 { to } else { (stop.place.x, stop.place.y) };
+        let permitted = edge
+            .and_then(|edge| edge.max_speed)
+            .filter(|_| !self.faults.has(F::MaxSpeedIgnored));
+        let own = match self.mode {
+            Mode::Semiautomatic if self.faults.has(F::SemiautomaticFaster) => self.config.speed * 2.0,
+            Mode::Semiautomatic => self.config.speed / 2.0,
+            _ => self.config.speed,
+        };
+        self.motion.roll(
+            moment,
+            to,
+            permitted.map_or(own, |permitted| permitted.min(own)),
+            backwards,
+            !stops,
+        );
+    }
+
+    fn rotation_speed(&self, edge: Option<&Edge>) -> f64 {
+        let permitted = edge.and_then(|edge| edge.max_rotation_speed);
+        let permitted = permitted.filter(|_| !self.faults.has(F::MaxRotationSpeedIgnored));
+        permitted.map_or(self.config.rotation_speed, |permitted| {
+            permitted.min(self.config.rotation_speed)
+        })
+    }
+
+    /// The orientation on the way to a node, and whether it drives backwards (ORD-MSG-22).
+    fn course(&self, edge: Option<&Edge>, stop: &Stop) -> (f64, bool) {
+        let pose = self.motion.pose(self.moment());
+        let heading = (stop.place.y - pose.y).atan2(stop.place.x - pose.x);
+        let wanted = edge.filter(|_| !self.faults.has(F::EdgeOrientationIgnored));
+        let relative = wanted.and_then(|edge| {
+            edge.orientation.map(|orientation| {
+                if edge.global {
+                    orientation - heading
+                } else {
+                    orientation
+                }
+            })
+        });
+        let backwards = relative.is_some_and(|relative| motion::wrapped(relative).abs() > FRAC_PI_2);
+        let theta = if backwards {
+            heading + std::f64::consts::PI
+        } else {
+            heading
+        };
+        (motion::wrapped(theta), backwards)
+    }
+
+    /// A leg has ended: on an edge with actions that stop the vehicle, they begin now.
+    pub(super) fn leg_finished(&mut self, rolled: bool) {
+        if !rolled || self.motion.reached || !self.book.entered {
+            return;
+        }
+        let Some(sequence_id) = self.book.edge_ahead().map(|edge| edge.sequence_id) else {
+            return;
+        };
+        if self.actions.edge_stops(sequence_id) {
+            self.actions.trigger(Origin::Edge(sequence_id), self.faults);
+        }
+    }
+
+    /// At the position of a node: turns to its orientation, then counts it as traversed (NODE-01).
+    fn arrive(&mut self, stop: &Stop) -> bool {
+        let position = stop.node.position.as_ref();
+        if let Some(theta) = position
+            .and_then(|position| position.theta)
+            .filter(|_| !self.faults.has(F::ThetaIgnored))
+        {
+            let allowed = position
+                .and_then(|position| position.allowed_deviation_theta)
+                .unwrap_or(0.0);
+            let allowed = if allowed > 0.0 {
+                allowed
+            } else {
+                self.config.tolerance_theta
+            };
+            let off = motion::wrapped(theta - self.motion.pose(self.moment()).theta).abs();
+            if off > allowed {
+                let edge = self.book.edge_ahead().cloned();
+                self.motion
+                    .turn(self.moment(), theta, self.rotation_speed(edge.as_ref()));
+                return true;
+            }
+        }
+        self.traverse();
+        true
+    }
+
+    /// Reports a node traversed, leaves the edge, and triggers the node's actions (NODE-03, NODE-04, NODE-05).
+    fn traverse(&mut self) {
+        let Some(stop) = self.book.nodes.pop_front() else {
+            return;
+        };
+        let sequence_id = stop.node.sequence_id;
+        self.motion.reached = false;
+        self.book.entered = false;
+        while let Some(edge) = self.book.edges.pop_front_if(|edge| edge.sequence_id < sequence_id) {
+            if self.faults.has(F::EdgeActionsLate) {
+                self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
+            } else if !self.faults.has(F::EdgeActionOutlivesEdge) {
+                self.actions.leave_edge(edge.sequence_id);
+            }
+            self.book.left.1 = Some(edge);
+        }
+        if !self.faults.has(F::LiftMapStale) {
+            self.motion.set_map(stop.place.map_id.clone());
+        }
+        if self.faults.has(F::TraversalSplit) {
+            self.flush();
+        }
+        self.update_last_node(&stop);
+        if self.book.cancel.is_none() {
+            self.actions.trigger(Origin::Node(sequence_id), self.faults);
+            let ahead = self.book.edge_ahead().map(|edge| edge.sequence_id);
+            if let Some(ahead) = ahead.filter(|_| self.faults.has(F::EdgeActionsOnNode)) {
+                self.actions.trigger(Origin::Edge(ahead), self.faults);
+            }
+        }
+        self.book.left.0 = Some(stop);
+    }
+
+    fn update_last_node(&mut self, stop: &Stop) {
+        let plain = stop.node.actions.is_empty() && stop.node.sequence_id > 0;
+        let between = self.book.nodes.front().is_some_and(|next| next.node.released);
+        let stale = self.book.cancel.is_some() && self.faults.has(F::CancelLastNodeStale);
+        if stale || (self.faults.has(F::NodeSkipped) && plain && between) {
+            return;
+        }
+        self.book.last_node.clone_from(&stop.node.id);
+        if self.faults.has(F::LoopConfused) {
+            let first = self
+                .book
+                .visits
+                .entry(stop.node.id.clone())
+                .or_insert(stop.node.sequence_id);
+            self.book.last_sequence = *first;
+        } else if !self.faults.has(F::LastNodeStale) {
+            self.book.last_sequence = stop.node.sequence_id;
+        }
+    }
+
+    /// Whether the vehicle is lifting.
+    pub(super) fn is_lifting(&self) -> bool {
+        let lifts = |deed| matches!(deed, Deed::Pick | Deed::Drop);
+        self.actions
+            .iter()
+            .any(|action| action.status.is_active() && action.kind.is_some_and(|kind| lifts(kind.deed)))
+    }
+}

@@ -1,0 +1,223 @@
+//! The state message: when it is sent, and the visualization beside it (sections 6.10 and 6.13).
+//!
+//! A state is due when it differs from the last one in anything but position, speed and battery charge. So no
+//! part of the vehicle has to remember to announce what it changed, and changes of one instant share a state.
+
+mod picture;
+
+use std::time::Duration;
+
+use serde_json::{Map, Value, json};
+
+use crate::clock::Moment;
+
+use super::Agv;
+use super::faults::FaultName as F;
+
+/// What has been reported.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Report {
+    /// An order message arrived (STATE-03).
+    pub(super) order_received: bool,
+    /// A state was asked for (ACT-26).
+    pub(super) requested: bool,
+    /// No state before the next periodic one (`state-request-unanswered`).
+    pub(super) silenced: bool,
+    /// The last state, without its header, and when it was sent.
+    last: Option<(Moment, Map<String, Value>)>,
+    /// A state is due and only waits for the minimum interval.
+    delayed: bool,
+    next_visualization: Option<Moment>,
+}
+
+/// Members that change without being an event.
+const SILENT: [&str; 3] = ["agvPosition", "velocity", "batteryState"];
+
+/// What differs between two states.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Changes {
+    order: bool,
+    load: bool,
+    error: bool,
+    node: bool,
+    mode: bool,
+    driving: bool,
+    actions: bool,
+    maps: bool,
+    other: bool,
+}
+
+impl Changes {
+    fn between(old: &Map<String, Value>, new: &Map<String, Value>) -> Self {
+        let mut changes = Self::default();
+        let keys = new.keys().chain(old.keys().filter(|key| !new.contains_key(*key)));
+        for key in keys.filter(|key| !SILENT.contains(&key.as_str()) && old.get(*key) != new.get(*key)) {
+            match key.as_str() {
+                "loads" => changes.load = true,
+                "errors" => changes.error = true,
+                "lastNodeId" | "lastNodeSequenceId" => changes.node = true,
+                "operatingMode" => changes.mode = true,
+                "driving" => changes.driving = true,
+                "actionStates" => changes.actions = true,
+                "maps" => changes.maps = true,
+                _ => changes.other = true,
+            }
+        }
+        let charging = |state: &Map<String, Value>| {
+            state
+                .get("batteryState")
+                .and_then(|state| state.get("charging"))
+                .cloned()
+        };
+        let map = |state: &Map<String, Value>| state.get("agvPosition").and_then(|pose| pose.get("mapId")).cloned();
+        changes.other |= charging(old) != charging(new) || map(old) != map(new);
+        changes
+    }
+
+    fn any(self) -> bool {
+        self != Self::default()
+    }
+}
+
+impl Agv {
+    /// Begins to report on a new connection.
+    pub(super) fn start_reporting(&mut self) {
+        self.report.last = None;
+        self.report.requested = true;
+        self.report.next_visualization = self.visualization_interval().map(|_| self.moment());
+    }
+
+    fn state_interval(&self) -> Duration {
+        if self.faults.has(F::StateSilence) {
+            Duration::from_secs(45)
+        } else {
+            self.config.state_interval
+        }
+    }
+
+    fn visualization_interval(&self) -> Option<Duration> {
+        let factor = if self.faults.has(F::VisualizationSlow) { 3 } else { 1 };
+        self.config.visualization_interval.map(|interval| interval * factor)
+    }
+
+    /// When the next message goes out by the clock.
+    pub(super) fn next_report(&self) -> Option<Moment> {
+        if !self.connection.online {
+            return None;
+        }
+        let last = self.report.last.as_ref().map(|(sent, _)| *sent)?;
+        let state = if self.report.delayed {
+            self.config.min_state_interval
+        } else {
+            self.state_interval()
+        };
+        Some((last + state).min(self.report.next_visualization.unwrap_or(last + state)))
+    }
+
+    /// Publishes what is due.
+    pub(super) fn flush(&mut self) {
+        if !self.connection.online {
+            self.report.order_received = false;
+            self.report.requested = false;
+            return;
+        }
+        self.flush_state();
+        let moment = self.moment();
+        if let Some(interval) = self.visualization_interval()
+            && self.report.next_visualization.is_some_and(|next| next <= moment)
+        {
+            let next = self.report.next_visualization.map_or(moment, |next| next + interval);
+            self.report.next_visualization = Some(if next > moment { next } else { moment + interval });
+            self.publish_visualization();
+        }
+    }
+
+    fn flush_state(&mut self) {
+        let moment = self.moment();
+        let body = self.state_picture();
+        let Some((sent, last)) = &self.report.last else {
+            self.send_state(body, false);
+            return;
+        };
+        let periodic = *sent + self.state_interval() <= moment;
+        let mut changes = Changes::between(last, &body);
+        changes.order = self.report.order_received;
+        let requested = self.report.requested;
+        let too_soon = *sent + self.config.min_state_interval > moment;
+        if periodic {
+            self.send_state(body, true);
+        } else if (changes.any() || requested) && !self.suppressed(changes, requested, &body) {
+            if too_soon {
+                self.report.delayed = true;
+            } else {
+                self.send_state(body, false);
+            }
+        }
+    }
+
+    /// Whether a faulty vehicle keeps an event to itself. What it swallows is never told on its own.
+    fn suppressed(&mut self, changes: Changes, requested: bool, body: &Map<String, Value>) -> bool {
+        let event = |change: bool, fault: F| change && self.faults.has(fault);
+        let held = self.report.silenced
+            || (self.faults.has(F::StatesByClock) && !requested)
+            || event(changes.order, F::OrderWithoutState)
+            || event(changes.load, F::LoadWithoutState)
+            || event(changes.error, F::ErrorWithoutState)
+            || event(changes.mode, F::ModeWithoutState)
+            || event(changes.maps, F::MapsWithoutState);
+        let swallowed = !changes.order
+            && (event(changes.node, F::NodeWithoutState)
+                || event(changes.driving, F::DrivingWithoutState)
+                || event(changes.actions && !changes.node, F::ActionsWithoutState));
+        if swallowed
+            && !held
+            && let Some((_, last)) = &mut self.report.last
+        {
+            last.clone_from(body);
+        }
+        held || swallowed
+    }
+
+    fn send_state(&mut self, mut body: Map<String, Value>, periodic: bool) {
+        let kept = body.clone();
+        let mut mangle: Vec<(&str, &[u8])> = Vec::new();
+        if periodic && self.faults.has(F::LatinText) {
+            let information = json!([{ "infoType": "place", "infoDescription": "Lagerpl@tz", "infoLevel": "INFO" }]);
+            body.insert("information".into(), information);
+            mangle.push(("Lagerpl@tz", b"Lagerpl\xe4tz"));
+        }
+        if periodic && self.faults.has(F::NanVelocity) {
+            body.insert("velocity".into(), json!({ "vx": 0.0, "vy": 0.0, "omega": "@" }));
+            mangle.push(("\"@\"", b"NaN"));
+        }
+        if periodic && self.faults.has(F::DuplicateKey) {
+            let other: &[u8] = if self.motion.is_moving() {
+                b"{\"driving\":false,"
+            } else {
+                b"{\"driving\":true,"
+            };
+            mangle.push(("{", other));
+        }
+        if periodic && self.faults.has(F::NulAfterJson) {
+            body.insert("end".into(), json!("@"));
+            mangle.push((",\"end\":\"@\"}", b"}\0"));
+        }
+        let times = if self.faults.has(F::StateBursts) { 5 } else { 1 };
+        for _ in 0..times {
+            self.publish("state", body.clone(), &mangle);
+        }
+        let next_visualization = self.report.next_visualization;
+        self.report = Report {
+            last: Some((self.moment(), kept)),
+            next_visualization,
+            ..Report::default()
+        };
+    }
+
+    fn publish_visualization(&mut self) {
+        let mut body = Map::new();
+        body.insert("agvPosition".into(), self.position_picture());
+        body.insert("velocity".into(), self.velocity_picture());
+        self.publish("visualization", body, &[]);
+    }
+}

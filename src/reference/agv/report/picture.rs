@@ -1,0 +1,285 @@
+//! The body of the state message, part by part.
+
+use serde_json::{Map, Value, json};
+
+use crate::reference::agv::action_kinds::MAX_HEIGHT;
+use crate::reference::agv::actions::{Action, Origin, Status};
+use crate::reference::agv::book::Stop;
+use crate::reference::agv::faults::FaultName as F;
+use crate::reference::agv::order_message::Edge;
+use crate::reference::agv::{Agv, Load, Mode};
+
+impl Agv {
+    /// The state now, without header (STATE-MSG-01).
+    pub(in crate::reference::agv) fn state_picture(&self) -> Map<String, Value> {
+        let has = |fault: F| self.faults.has(fault);
+        let complete = self.book.nodes.is_empty() && !self.actions.order_unfinished();
+        let order_id = if complete && has(F::OrderIdResetWhenDone) {
+            ""
+        } else {
+            &self.book.order_id
+        };
+        let last_node = if complete && has(F::LastNodeClearedWhenDone) {
+            ""
+        } else {
+            &self.book.last_node
+        };
+        let mut state = Map::new();
+        let mut set = |key: &str, value: Value| state.insert(key.to_owned(), value);
+        if self.config.has("maps") {
+            set("maps", self.maps.picture(self.faults));
+        }
+        set("orderId", json!(order_id));
+        set("orderUpdateId", json!(self.book.update_id));
+        set("lastNodeId", json!(last_node));
+        set("lastNodeSequenceId", json!(self.book.last_sequence));
+        set("nodeStates", self.node_states(complete));
+        set("edgeStates", self.edge_states());
+        set("agvPosition", self.position_picture());
+        set("velocity", self.velocity_picture());
+        set("loads", self.loads_picture());
+        set("driving", json!(self.shows_driving()));
+        if !has(F::PauseFlagMissing) {
+            let button = self.holds.button && !has(F::ButtonPauseUnreported);
+            set("paused", json!(self.holds.pause || button || self.holds.emergency));
+        }
+        set(
+            "newBaseRequest",
+            json!(self.book.base_runs_low() || has(F::NewBaseRequestAlways)),
+        );
+        set(
+            "actionStates",
+            self.actions
+                .iter()
+                .filter_map(|action| self.action_state(action))
+                .collect(),
+        );
+        set("batteryState", self.battery());
+        let key = if has(F::FieldMisspelled) {
+            "operating_mode"
+        } else {
+            "operatingMode"
+        };
+        set(key, json!(self.mode_literal()));
+        if !(has(F::ErrorsOmitted) && self.errors.is_empty()) {
+            set("errors", self.errors.picture(self.faults));
+        }
+        if has(F::InfoLevelWarning) {
+            set(
+                "information",
+                json!([{ "infoType": "service", "infoLevel": "WARNING" }]),
+            );
+        } else {
+            set("information", json!([]));
+        }
+        if !has(F::SafetyStateMissing) {
+            set("safetyState", self.safety());
+        }
+        state
+    }
+
+    fn shows_driving(&self) -> bool {
+        let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
+        self.motion.is_moving()
+            || (waits && self.faults.has(F::DrivingAtDecisionPoint))
+            || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
+    }
+
+    fn node_states(&self, complete: bool) -> Value {
+        let left = self.book.left.0.as_ref().filter(|_| {
+            self.faults.has(F::TraversedNodesListed)
+                || (complete && self.book.has_order() && self.faults.has(F::FinishedOrderListed))
+        });
+        let shown = self
+            .book
+            .nodes
+            .iter()
+            .filter(|stop| stop.node.released || !self.faults.has(F::HorizonNotReported));
+        left.into_iter()
+            .chain(shown)
+            .map(|stop| self.node_state(stop))
+            .collect()
+    }
+
+    fn node_state(&self, stop: &Stop) -> Value {
+        let node = &stop.node;
+        let mut picture = json!({
+            "nodeId": node.id,
+            "sequenceId": node.sequence_id,
+            "released": node.released || self.faults.has(F::HorizonReportedReleased),
+        });
+        if let Some(position) = &node.sent_position {
+            picture["nodePosition"] = position.clone();
+        }
+        if self.faults.has(F::NodeStatesWithoutSequence)
+            && let Some(fields) = picture.as_object_mut()
+        {
+            fields.remove("sequenceId");
+        }
+        picture
+    }
+
+    fn edge_states(&self) -> Value {
+        let left = self.book.left.1.as_ref().filter(|_| self.faults.has(F::EdgeStatesStay));
+        let shown = self
+            .book
+            .edges
+            .iter()
+            .filter(|edge| edge.released || !self.faults.has(F::HorizonNotReported));
+        let picture = |edge: &Edge| {
+            json!({
+                "edgeId": edge.id,
+                "sequenceId": edge.sequence_id,
+                "released": edge.released || self.faults.has(F::HorizonReportedReleased),
+            })
+        };
+        left.into_iter().chain(shown).map(picture).collect()
+    }
+
+    fn action_state(&self, action: &Action) -> Option<Value> {
+        let of_horizon = match action.origin {
+            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => sequence_id > self.book.base_end.1,
+            Origin::Instant => false,
+        };
+        let hidden = (of_horizon && self.faults.has(F::ActionStatesMissing))
+            || (!action.of_order() && self.faults.has(F::InstantActionUnlisted));
+        if hidden {
+            return None;
+        }
+        let waits_here = action.origin == Origin::Node(self.book.last_sequence) && !self.holds.any();
+        let status = match action.masked.unwrap_or(action.status) {
+            Status::Waiting if self.faults.has(F::RunningFromStart) => "RUNNING",
+            Status::Waiting if self.faults.has(F::InitializingFromStart) => "INITIALIZING",
+            Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
+            Status::Finished if self.faults.has(F::StatusDone) => "DONE",
+            status => status.literal(),
+        };
+        let mut picture = json!({
+            "actionId": action.request.id,
+            "actionType": action.request.action_type,
+            "actionStatus": status,
+        });
+        if let Some(result) = &action.result {
+            picture["resultDescription"] = json!(result);
+        }
+        Some(picture)
+    }
+
+    /// agvPosition, also for the visualization (STATE-MSG-05).
+    pub(super) fn position_picture(&self) -> Value {
+        let pose = self.motion.pose(self.moment());
+        let theta = if self.faults.has(F::DegreesReported) {
+            pose.theta.to_degrees() + 180.0
+        } else {
+            pose.theta
+        };
+        let y = if self.faults.has(F::AxesMirrored) {
+            -pose.y
+        } else {
+            pose.y
+        };
+        let map_id = match () {
+            () if self.faults.has(F::PositionMapStale) => "factory-default".to_owned(),
+            () if self.faults.has(F::IdWithSpace) => format!("{} 1", pose.map_id),
+            () => pose.map_id,
+        };
+        let number = |value: f64| {
+            if self.faults.has(F::PositionNotInitialized) {
+                json!(value.to_string())
+            } else {
+                json!(value)
+            }
+        };
+        json!({
+            "positionInitialized": true,
+            "localizationScore": 0.98,
+            "x": number(pose.x),
+            "y": number(y),
+            "theta": theta,
+            "mapId": map_id,
+        })
+    }
+
+    /// velocity, also for the visualization.
+    pub(super) fn velocity_picture(&self) -> Value {
+        let velocity = self.motion.velocity();
+        let vx = if self.faults.has(F::VelocityMirrored) {
+            -velocity.vx
+        } else {
+            velocity.vx
+        };
+        json!({ "vx": vx, "vy": 0.0, "omega": velocity.omega })
+    }
+
+    fn loads_picture(&self) -> Value {
+        if self.faults.has(F::LoadsAlwaysEmpty) {
+            return json!([]);
+        }
+        let weight = if self.faults.has(F::LoadWeightNegative) {
+            -1.0
+        } else {
+            100.0
+        };
+        let picture = |load: &Load| {
+            json!({
+                "loadId": load.id,
+                "loadType": load.load_type,
+                "loadPosition": load.position,
+                "boundingBoxReference": { "x": 0.0, "y": 0.0, "z": 0.0 },
+                "loadDimensions": { "length": 1.2, "width": 0.8, "height": MAX_HEIGHT / 2.0 },
+                "weight": weight,
+            })
+        };
+        self.loads.iter().map(picture).collect()
+    }
+
+    fn battery(&self) -> Value {
+        let mut battery = Map::new();
+        if !self.faults.has(F::ChargeAsFraction) {
+            battery.insert("batteryCharge".into(), json!(87.5));
+        }
+        battery.insert("batteryVoltage".into(), json!(48.2));
+        battery.insert("batteryHealth".into(), json!(96));
+        let charging = if self.faults.has(F::BooleanAsText) {
+            json!(self.charging.to_string())
+        } else {
+            json!(self.charging)
+        };
+        battery.insert("charging".into(), charging);
+        battery.insert(
+            "reach".into(),
+            if self.faults.has(F::ReachFractional) {
+                json!(8_000.5)
+            } else {
+                json!(8_000)
+            },
+        );
+        Value::Object(battery)
+    }
+
+    fn mode_literal(&self) -> String {
+        let literal = match self.mode {
+            Mode::Automatic => "AUTOMATIC",
+            Mode::Semiautomatic => "SEMIAUTOMATIC",
+            Mode::Manual => "MANUAL",
+            Mode::Service => "SERVICE",
+            Mode::Teachin => "TEACHIN",
+        };
+        if self.faults.has(F::ModeLowerCase) {
+            literal.to_ascii_lowercase()
+        } else {
+            literal.to_owned()
+        }
+    }
+
+    fn safety(&self) -> Value {
+        let stopped = self.holds.emergency && !self.faults.has(F::EmergencyStopUnreported);
+        let emergency_stop = match () {
+            () if stopped => "MANUAL",
+            () if self.holds.field => "AUTOACK",
+            () if self.faults.has(F::EmergencyStopSpelled) => "Off",
+            () => "NONE",
+        };
+        json!({ "eStop": emergency_stop, "fieldViolation": self.holds.field })
+    }
+}
