@@ -17,7 +17,7 @@ use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::link::memory::{MemoryLink, MemoryOptions};
-use crate::link::{Link, Vantage};
+use crate::link::{Link, LinkError, Vantage};
 use crate::pack::Pack;
 use crate::reference::agv::Agv;
 use crate::report::result::RunResult;
@@ -115,7 +115,7 @@ pub async fn run_virtually(
         utc: request.begun,
     };
     let faults: Vec<&str> = request.faults.iter().map(String::as_str).collect();
-    let agv = Agv::new(device.config.clone(), &faults);
+    let agv = Agv::new(device.config.clone(), &faults).map_err(|error| LinkError::Setup(error.to_string()))?;
     let options = MemoryOptions {
         device_topics: device.subject.published(pack),
         jitter: request.jitter,
