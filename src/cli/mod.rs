@@ -1,1 +1,65 @@
-//! The command line.
+//! The command line: parse, call, map the outcome to an exit code. One file per command.
+
+pub mod args;
+pub mod exit;
+mod list;
+mod problem;
+mod qualify;
+mod report;
+mod run;
+mod screen;
+mod select;
+mod simulate;
+mod validate;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Parser as _;
+
+use crate::diagnostic::Diagnostic;
+use crate::pack::Pack;
+use crate::run::Library;
+use args::{Cli, Command};
+use list::print;
+use problem::Problem;
+
+/// The program.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are no mistakes; a reader that has gone away is none either.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let outcome = match &cli.command {
+        Command::Run(arguments) => run::run_command(arguments),
+        Command::Certify(arguments) => run::certify_command(arguments),
+        Command::List(arguments) => list::list(arguments),
+        Command::Explain(arguments) => list::explain(arguments),
+        Command::Validate(arguments) => validate::validate(arguments),
+        Command::Simulate(arguments) => simulate::simulate(arguments),
+        Command::Report(arguments) => report::report(arguments),
+        Command::Qualify(arguments) => qualify::qualify(arguments),
+    };
+    let exit = outcome.unwrap_or_else(|problem| {
+        let color = console::colors_enabled_stderr();
+        eprintln!("{}", problem.render(color));
+        problem.exit()
+    });
+    ExitCode::from(exit.code())
+}
+
+/// The pack of a version; the newest one unless said.
+fn pack(library: &Library, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
+    let packs = &library.rules.packs;
+    let Some(wanted) = protocol else { return Ok(Arc::clone(packs.latest())) };
+    packs.get(wanted).cloned().ok_or_else(|| {
+        let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
+        let diagnostic = Diagnostic::whole("unknown-version", format!("there is no protocol version {wanted}"));
+        diagnostic.hint(format!("known versions: {}", known.join(", "))).into()
+    })
+}

@@ -1,0 +1,279 @@
+//! `list` and `explain`: what there is, what decides what, and why.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use serde_json::json;
+
+use super::args::{Explain, Format, List, Listing};
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::checks;
+use crate::diagnostic::{self, Diagnostic};
+use crate::pack::{Pack, Requirement, Role};
+use crate::profile::HOOKS;
+use crate::reference::agv::FAULTS;
+use crate::report::coverage;
+use crate::run::{Library, sources};
+use crate::suite::model::{Monitor, Rule, Test, Verb};
+use crate::ui::{self, Output};
+
+/// `list`.
+pub fn list(arguments: &List) -> Result<Exit, Problem> {
+    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let pack = super::pack(&library, arguments.protocol.as_deref())?;
+    let roles: Vec<Role> = arguments.role.map_or_else(|| vec![Role::Agv, Role::MasterControl], |role| vec![role]);
+    let text = match (arguments.what, arguments.format) {
+        (Listing::Tests, Format::Text) => roles.iter().map(|role| tests(&library, &pack, *role)).collect(),
+        (Listing::Tests, Format::Json) => {
+            let all = roles.iter().flat_map(|role| library.tests(*role, &pack.id)).map(|test| {
+                json!({ "id": test.id, "title": test.title, "role": test.device.word(), "moves": test.moves, "requirements": test.requirements() })
+            });
+            lines(all)
+        }
+        (Listing::Requirements, Format::Text) => requirements(&library, &pack, &roles),
+        (Listing::Requirements, Format::Json) => lines(of_roles(&library, &pack, &roles).map(|requirement| {
+            json!({ "id": requirement.id, "text": requirement.text, "role": requirement.role.word(),
+                "mood": requirement.in_version(&pack).map(|note| note.mood.word()) })
+        })),
+        (Listing::Monitors, Format::Text) => monitors(&library, &pack, &roles),
+        (Listing::Monitors, Format::Json) => lines(of_version(&library, &pack, &roles).map(|monitor| {
+            let decides: Vec<&str> = monitor.checks.iter().map(|binding| binding.requirement.as_str()).collect();
+            json!({ "id": monitor.id, "title": monitor.title, "requirements": decides })
+        })),
+        (Listing::Coverage, format) => {
+            let sources = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+            let mut text = String::new();
+            for role in roles {
+                let all = coverage::coverage(&sources, role);
+                match format {
+                    Format::Text => {
+                        let _ = writeln!(text, "{role}, VDA 5050 {}\n\n{}", pack.version, all.text());
+                    }
+                    Format::Json => {
+                        let total = all.total();
+                        let uncovered: Vec<&str> = all.uncovered.iter().map(|one| one.id.as_str()).collect();
+                        let line = json!({ "role": role.word(), "decided": total.decided, "operator": total.operator,
+                            "notTestable": total.not_testable, "uncovered": uncovered });
+                        let _ = writeln!(text, "{line}");
+                    }
+                }
+            }
+            text
+        }
+        (Listing::Faults, Format::Text) => ui::faults(FAULTS),
+        (Listing::Faults, Format::Json) => {
+            lines(FAULTS.iter().map(|fault| json!({ "name": fault.name, "breaks": fault.breaks, "wrong": fault.wrong })))
+        }
+        (Listing::Hooks, Format::Text) => ui::hooks(HOOKS),
+        (Listing::Hooks, Format::Json) => lines(HOOKS.iter().map(|hook| {
+            json!({ "name": hook.name, "role": hook.role.word(), "parameters": hook.parameters, "doc": hook.doc })
+        })),
+    };
+    super::print(&text)
+}
+
+fn lines(all: impl Iterator<Item = serde_json::Value>) -> String {
+    all.fold(String::new(), |mut text, one| {
+        let _ = writeln!(text, "{one}");
+        text
+    })
+}
+
+fn tests(library: &Library, pack: &Pack, role: Role) -> String {
+    let all = library.tests(role, &pack.id);
+    let mut text = String::new();
+    let mut group = "";
+    for test in &all {
+        if test.group != group {
+            group = &test.group;
+            let _ = writeln!(text, "{}{role}: {group}", if text.is_empty() { "" } else { "\n" });
+        }
+        let mut notes = Vec::new();
+        if test.moves {
+            notes.push("moves".to_owned());
+        }
+        for (_, steps) in test.sections() {
+            for step in steps {
+                if let Verb::Operator(operator) = &step.verb {
+                    notes.push(format!("hook {}", operator.hook));
+                }
+            }
+        }
+        notes.dedup();
+        let notes = if notes.is_empty() { String::new() } else { format!("  ({})", notes.join(", ")) };
+        let _ = writeln!(text, "  {}\n      {}{notes}", test.id, test.title);
+    }
+    let moving = all.iter().filter(|test| test.moves).count();
+    if !all.is_empty() {
+        let _ = writeln!(text, "\n{} tests for role {role}, {moving} of them move the vehicle\n", all.len());
+    }
+    text
+}
+
+fn of_roles<'a>(library: &'a Library, pack: &'a Pack, roles: &'a [Role]) -> impl Iterator<Item = &'a Requirement> {
+    let concerns = |requirement: &&Requirement| roles.iter().any(|role| requirement.role.concerns(*role));
+    library.rules.catalogue.all().filter(concerns).filter(|requirement| requirement.in_version(pack).is_some())
+}
+
+fn requirements(library: &Library, pack: &Pack, roles: &[Role]) -> String {
+    let mut text = String::new();
+    let mut chapter = "";
+    for requirement in of_roles(library, pack, roles) {
+        if requirement.chapter != chapter {
+            chapter = &requirement.chapter;
+            let _ = writeln!(text, "{}{chapter}", if text.is_empty() { "" } else { "\n" });
+        }
+        let mood = requirement.in_version(pack).map_or("", |note| note.mood.word());
+        let _ = writeln!(text, "  {:<14} {mood:<6} {}", requirement.id, requirement.text);
+    }
+    text
+}
+
+fn of_version<'a>(library: &'a Library, pack: &'a Pack, roles: &'a [Role]) -> impl Iterator<Item = &'a Arc<Monitor>> {
+    let monitors = library.rules.suites.monitors.iter().filter(|monitor| monitor.spec.contains(pack.version));
+    monitors.filter(|monitor| monitor.device.is_none_or(|device| roles.contains(&device)))
+}
+
+fn monitors(library: &Library, pack: &Pack, roles: &[Role]) -> String {
+    of_version(library, pack, roles).fold(String::new(), |mut text, monitor| {
+        let decides: Vec<&str> = monitor.checks.iter().map(|binding| binding.requirement.as_str()).collect();
+        let _ = writeln!(text, "{}\n    {}\n    decides {}", monitor.id, monitor.title, decides.join(", "));
+        text
+    })
+}
+
+/// `explain`.
+pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
+    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let pack = super::pack(&library, arguments.protocol.as_deref())?;
+    let id = arguments.id.as_str();
+    let suites = &library.rules.suites;
+    let mut text = String::new();
+    if let Some(requirement) = library.rules.catalogue.get(id) {
+        text.push_str(&about_requirement(requirement, &library, &pack));
+    }
+    let table = |test: &&Arc<Test>| test.id == id || test.id.split('[').next() == Some(id);
+    let cases: Vec<_> = suites.tests.iter().filter(table).collect();
+    if let Some(test) = cases.first() {
+        text.push_str(&about_test(test, cases.len()));
+    }
+    if let Some(monitor) = suites.monitors.iter().find(|monitor| monitor.id == id) {
+        text.push_str(&about_monitor(monitor));
+    }
+    if let Some(check) = checks::find(id) {
+        let _ = writeln!(text, "check {id}\n\n{}\n\ncan decide {}", check.doc, check.decides.join(", "));
+    }
+    for hook in HOOKS.iter().filter(|hook| hook.name == id) {
+        let _ = writeln!(text, "hook {id} (role {})\n\n{}", hook.role, hook.doc);
+        if !hook.parameters.is_empty() {
+            let _ = writeln!(text, "parameters: {}", hook.parameters.join(", "));
+        }
+    }
+    if let Some(fault) = FAULTS.iter().find(|fault| fault.name == id) {
+        let _ = writeln!(
+            text,
+            "fault {id} of the reference AGV\n\n{}\n\nbreaks {}\ntry    vda5050-tck run --virtual --fault {id}",
+            fault.wrong,
+            fault.breaks.join(", ")
+        );
+    }
+    if text.is_empty() {
+        let known: Vec<&str> = library
+            .rules
+            .catalogue
+            .all()
+            .map(|requirement| requirement.id.as_str())
+            .chain(suites.tests.iter().map(|test| test.id.as_str()))
+            .chain(suites.monitors.iter().map(|monitor| monitor.id.as_str()))
+            .chain(checks::registry().iter().map(|check| check.name))
+            .chain(HOOKS.iter().map(|hook| hook.name))
+            .chain(FAULTS.iter().map(|fault| fault.name))
+            .collect();
+        let hint = match diagnostic::closest(id, known) {
+            Some(close) => format!("did you mean `{close}`?"),
+            None => "`vda5050-tck list` shows what there is".to_owned(),
+        };
+        return Err(Diagnostic::whole("unknown-id", format!("nothing is called `{id}`")).hint(hint).into());
+    }
+    super::print(&text)
+}
+
+fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) -> String {
+    let mut text = format!("{}  {}\n\n{}\n\n", requirement.id, requirement.chapter, requirement.text);
+    let _ = writeln!(text, "concerns       {}", requirement.role.word());
+    for (version, note) in &requirement.versions {
+        let _ = writeln!(text, "VDA 5050 {version:<5} section {}, {}", note.section, note.mood.word());
+    }
+    if requirement.in_version(pack).is_none() {
+        let _ = writeln!(text, "VDA 5050 {:<5} does not have it", pack.id);
+    }
+    for (name, content) in [("stimulus", &requirement.stimulus), ("observation", &requirement.observe)] {
+        if !content.is_empty() {
+            let _ = writeln!(text, "{name:<14} {content}");
+        }
+    }
+    if let Some(ruling) = &requirement.interpretation {
+        let _ = writeln!(text, "ruling         {ruling}");
+    }
+    let _ = writeln!(text, "decided        {}", requirement.decided.word());
+    let id = requirement.id.as_str();
+    let mut deciders = Vec::new();
+    for test in &library.rules.suites.tests {
+        for step in &test.steps {
+            deciders.extend(step.clauses().into_iter().filter(|(other, _)| other.as_str() == id).map(|(_, clause)| format!("{} {clause}", test.id)));
+        }
+    }
+    for monitor in &library.rules.suites.monitors {
+        if monitor.checks.iter().any(|binding| binding.requirement.as_str() == id) {
+            deciders.push(format!("monitor {}", monitor.id));
+        }
+    }
+    let _ = writeln!(text, "by             {}", if deciders.is_empty() { "nothing" } else { deciders[0].as_str() });
+    for decider in deciders.iter().skip(1) {
+        let _ = writeln!(text, "               {decider}");
+    }
+    let breaking: Vec<&str> = FAULTS.iter().filter(|fault| fault.breaks.contains(&id)).map(|fault| fault.name).collect();
+    if !breaking.is_empty() {
+        let _ = writeln!(text, "proved with    {}", breaking.join(", "));
+    }
+    text
+}
+
+fn about_test(test: &Test, cases: usize) -> String {
+    let mut text = format!("test {}\n\n{}\n\n{}\n\n", test.id, test.title, test.why.trim());
+    let _ = writeln!(text, "file           {}", test.source.name);
+    let _ = writeln!(text, "for            {}, VDA 5050 {}", test.device, test.spec);
+    let _ = writeln!(text, "vehicle        {}", if test.moves { "drives" } else { "stays where it is" });
+    if cases > 1 {
+        let _ = writeln!(text, "cases          {cases}");
+    }
+    for step in &test.steps {
+        for (requirement, clause) in step.clauses() {
+            let _ = writeln!(text, "decides        {requirement:<14} {clause}");
+        }
+    }
+    let _ = writeln!(text, "\n{}", test.source.text.trim_end());
+    text
+}
+
+fn about_monitor(monitor: &Monitor) -> String {
+    let decides: Vec<&str> = monitor.checks.iter().map(|binding| binding.requirement.as_str()).collect();
+    let mut text = format!("monitor {}\n\n{}\n\n{}\n\n", monitor.id, monitor.title, monitor.why.trim());
+    let _ = writeln!(text, "file           {}", monitor.source.name);
+    let _ = writeln!(text, "decides        {}", decides.join(", "));
+    if let Rule::Check(check) = &monitor.rule
+        && let Some(definition) = checks::find(&check.name)
+    {
+        let _ = writeln!(text, "check          {}: {}", check.name, definition.doc);
+    }
+    text
+}
+
+/// Prints to standard output; a reader that has gone away is no failure.
+pub(super) fn print(text: &str) -> Result<Exit, Problem> {
+    match Output::stdout().text(text) {
+        Ok(()) => Ok(Exit::Conforms),
+        Err(error) => Err(Problem::Environment(format!("cannot write to standard output: {error}"))),
+    }
+}

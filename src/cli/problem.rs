@@ -1,0 +1,56 @@
+//! Why a command could not do what it was asked, and which exit code that is.
+
+use crate::diagnostic::Diagnostic;
+
+use super::exit::Exit;
+
+/// What went wrong, by who can put it right.
+#[derive(Debug)]
+pub enum Problem {
+    /// The user: flags, profile, suite, capture.
+    Usage(Vec<Diagnostic>),
+    /// The selection: nothing is left to do.
+    NothingToDo(String),
+    /// The world: ports, broker, disk, device.
+    Environment(String),
+}
+
+impl Problem {
+    /// The exit code.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Usage(_) => Exit::Usage,
+            Self::NothingToDo(_) => Exit::NothingToDo,
+            Self::Environment(_) => Exit::Broken,
+        }
+    }
+
+    /// The message for standard error.
+    #[must_use]
+    pub fn render(&self, color: bool) -> String {
+        match self {
+            Self::Usage(all) => {
+                let shown: Vec<String> = all.iter().take(20).map(|one| one.render(color)).collect();
+                let mut text = shown.join("\n\n");
+                if all.len() > 20 {
+                    text.push_str(&format!("\n\n… and {} more", all.len() - 20));
+                }
+                text
+            }
+            Self::NothingToDo(text) | Self::Environment(text) => format!("error: {}", crate::ui::escaped(text)),
+        }
+    }
+}
+
+impl From<Vec<Diagnostic>> for Problem {
+    fn from(all: Vec<Diagnostic>) -> Self {
+        Self::Usage(all)
+    }
+}
+
+impl From<Diagnostic> for Problem {
+    fn from(one: Diagnostic) -> Self {
+        Self::Usage(vec![one])
+    }
+}

@@ -1,0 +1,519 @@
+//! `run` and `certify`: test a device, write the evidence, say the verdict.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tokio::sync::watch;
+
+use super::args;
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::clock::WallClock;
+use crate::course::Layout;
+use crate::diagnostic::{Diagnostic, Source};
+use crate::engine::{Composer, Engine, HookOutcome, Operator, Recorder};
+use crate::journal::event::{Event, Occurrence, Setting};
+use crate::judge::RunJudge;
+use crate::link::mqtt::endpoint::Credentials;
+use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
+use crate::link::{Link, LinkError, Vantage};
+use crate::pack::Pack;
+use crate::profile::{self, Effective, LayoutSource, Profile, Surroundings, TimeLimits};
+use crate::reference::agv::Agv;
+use crate::report::text::{self, Color};
+use crate::run::device_driver::{DeviceCommand, DeviceHandle, drive_device};
+use crate::run::hooks::{DeviceProcess, ProfileHooks};
+use crate::run::{
+    Bundle, Capabilities, End, Finished, HeaderParts, Library, ReferenceAgv, Setup, Subject, VirtualRun, run,
+    run_virtually, sources, write_all, write_result,
+};
+use crate::suite::model::Test;
+use crate::ui::Terminal;
+use crate::verdict::Verdict;
+
+/// What `run` and `certify` have in common.
+struct Job {
+    library: Library,
+    pack: Arc<Pack>,
+    effective: Effective,
+    tests: Vec<Arc<Test>>,
+    complete: bool,
+    output: args::OutputArgs,
+    command: Vec<String>,
+    run: String,
+    no_motion: bool,
+}
+
+/// `run`.
+pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
+    let surroundings = Surroundings::of_process();
+    let effective = profile::load(arguments.device.profile.as_deref(), &arguments.device.settings(), &surroundings)?;
+    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let pack = pack_of(&library, &effective)?;
+    let role = effective.profile.device.role;
+    let all = library.tests(role, &pack.id);
+    let mut tests = super::select::select(&all, &arguments.tests)?;
+    if let Some(shard) = arguments.shard {
+        let mut place = 0;
+        tests.retain(|_| {
+            place += 1;
+            shard.takes(place - 1)
+        });
+    }
+    if tests.is_empty() {
+        return Err(Problem::NothingToDo("no test was selected".to_owned()));
+    }
+    let run = match arguments.seed {
+        Some(seed) => format!("seed{seed}"),
+        None => uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
+    };
+    let device = &effective.profile.device;
+    let built_in = arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
+    if !built_in && !arguments.fault.is_empty() {
+        let title = "`--fault` gives the built-in reference AGV a defect, and another device is tested here";
+        return Err(Diagnostic::whole("usage", title).into());
+    }
+    check_faults(&arguments.fault)?;
+    let job = Job {
+        complete: tests.len() == all.len(),
+        library,
+        pack,
+        effective,
+        tests,
+        output: arguments.output.clone(),
+        command: std::env::args().collect(),
+        run,
+        no_motion: arguments.device.no_motion,
+    };
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
+    let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
+    let outcome = runtime.block_on(async {
+        let interrupt = interrupts();
+        if arguments.in_virtual_time {
+            job.virtually(arguments, interrupt).await
+        } else if built_in {
+            job.built_in(arguments, interrupt).await
+        } else {
+            job.device(arguments, interrupt, &surroundings).await
+        }
+    });
+    // Sockets of a silent peer must not keep the process from ending.
+    runtime.shutdown_background();
+    outcome
+}
+
+/// `certify`: the same with nothing left to choose.
+pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
+    let surroundings = Surroundings::of_process();
+    if let Some(profile) = &arguments.profile {
+        let effective = profile::load(Some(profile), &[], &surroundings)?;
+        let contract = effective.profile.time.contract();
+        if let Some(changed) = contract.first() {
+            let diagnostic = Diagnostic::whole("certify", format!("a certificate is given for default timings, and {changed}"));
+            return Err(diagnostic.hint("take the section [time] out of the profile, or use `run`").into());
+        }
+    }
+    run_command(&args::Run {
+        device: args::DeviceArgs {
+            profile: arguments.profile.clone(),
+            ..args::DeviceArgs::default()
+        },
+        output: arguments.output.clone(),
+        ..args::Run::default()
+    })
+}
+
+fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Problem> {
+    let packs = &library.rules.packs;
+    let Some(wanted) = &effective.profile.device.protocol else {
+        return Ok(Arc::clone(packs.latest()));
+    };
+    packs.get(wanted).cloned().ok_or_else(|| {
+        let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
+        let title = format!("there is no protocol version {wanted}");
+        let diagnostic = effective.complain("device.protocol", "unknown-version", title, "this version");
+        diagnostic.hint(format!("known versions: {}", known.join(", "))).into()
+    })
+}
+
+fn check_faults(faults: &[String]) -> Result<(), Problem> {
+    use crate::reference::agv::FAULTS;
+    for fault in faults {
+        if !FAULTS.iter().any(|known| known.name == fault) {
+            let names = FAULTS.iter().map(|known| known.name);
+            let hint = match crate::diagnostic::closest(fault, names) {
+                Some(close) => format!("did you mean `{close}`?"),
+                None => "`vda5050-tck list faults` shows them all".to_owned(),
+            };
+            return Err(Diagnostic::whole("unknown-fault", format!("the reference AGV has no fault `{fault}`")).hint(hint).into());
+        }
+    }
+    Ok(())
+}
+
+/// Ctrl-C once ends the run in good order, twice at once.
+fn interrupts() -> watch::Receiver<bool> {
+    let (sender, receiver) = watch::channel(false);
+    tokio::spawn(async move {
+        let mut times = 0;
+        while tokio::signal::ctrl_c().await.is_ok() {
+            times += 1;
+            if times > 1 {
+                std::process::exit(i32::from(Exit::Interrupted.code()));
+            }
+            let _ = sender.send(true);
+        }
+        // The sender stays alive as long as the process.
+        std::future::pending::<()>().await;
+    });
+    receiver
+}
+
+impl Job {
+    fn bundle(&self, subject: &Subject, utc: jiff::Timestamp) -> Result<Bundle, Problem> {
+        let bundle = Bundle::create(&self.output.out, &subject.manufacturer, &subject.serial_number, utc, &self.run);
+        bundle.map_err(|error| Problem::Environment(error.to_string()))
+    }
+
+    async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
+        let device = ReferenceAgv::new(&self.pack);
+        let utc = WallClock::start().now().utc;
+        let bundle = self.bundle(&device.subject, utc)?;
+        let writer = bundle.journal().map_err(|error| Problem::Environment(error.to_string()))?;
+        let mut request = VirtualRun::of(&self.library, &self.pack);
+        request.device = device;
+        request.faults.clone_from(&arguments.fault);
+        request.tests.clone_from(&self.tests);
+        request.complete = self.complete;
+        request.seed = arguments.seed.unwrap_or(1);
+        request.begun = utc;
+        request.run.clone_from(&self.run);
+        request.command.clone_from(&self.command);
+        let mut terminal = Terminal::new(self.output.verbose);
+        let mut saved = |judge: &RunJudge| drop(write_result(&bundle, &judge.result()));
+        let finished = run_virtually(
+            &self.library,
+            &self.pack,
+            request,
+            Some(writer),
+            interrupt,
+            &mut terminal,
+            &mut saved,
+        )
+        .await;
+        let finished = finished.map_err(|error| Problem::Environment(error.to_string()))?;
+        self.conclude(&bundle, finished, terminal)
+    }
+
+    async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
+        let device = ReferenceAgv::new(&self.pack);
+        let mut options = BenchOptions::loopback(device.subject.published(&self.pack));
+        let bench = &self.effective.profile.bench;
+        if arguments.device.listen.is_some() {
+            options.listen.clone_from(&bench.listen);
+        }
+        options.broker = broker_choice(bench.broker.as_deref(), &self.effective.profile, None)?;
+        let clock = options.clock;
+        let bundle = self.bundle(&device.subject, clock.origin_stamp().utc)?;
+        let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
+        let faults: Vec<&str> = arguments.fault.iter().map(String::as_str).collect();
+        let handle = drive_device(Agv::new(device.config.clone(), &faults), &info.device_address, clock);
+        let operator = Commands(handle);
+        let capabilities = Capabilities {
+            factsheet: None,
+            statements: device.statements(),
+            claims: BTreeMap::new(),
+            vantage: Vantage::Tap,
+            hooks: operator.hooks(),
+            maps: true,
+            motion: if self.no_motion { Err(NO_MOTION.to_owned()) } else { Ok(()) },
+        };
+        let session = SessionParts {
+            subject: device.subject.clone(),
+            time: device.time.clone(),
+            device: device.device_bindings(),
+            layout: Some(device.layout.clone()),
+            capabilities,
+            limits: vec!["The device is the built-in reference AGV.".to_owned()],
+            deviations: BTreeMap::new(),
+        };
+        self.carry_out(session, &bundle, link, operator, clock, interrupt).await
+    }
+
+    async fn device(self, arguments: &args::Run, interrupt: watch::Receiver<bool>, surroundings: &Surroundings) -> Result<Exit, Problem> {
+        let profile = self.effective.profile.clone();
+        let subject = self.subject(&profile)?;
+        let layout = layout_of(&profile)?;
+        let password = profile.bench.password.password(surroundings);
+        let password = password.map_err(|error| Problem::from(Diagnostic::whole("password", error.to_string())))?;
+        let credentials = profile.bench.username.clone().map(|username| Credentials {
+            username,
+            password: password.map(|password| password.reveal().to_owned()).unwrap_or_default(),
+        });
+        let mut options = BenchOptions::loopback(subject.published(&self.pack));
+        options.listen.clone_from(&profile.bench.listen);
+        options.tap = profile.bench.tap;
+        options.maps_listen.clone_from(&profile.bench.maps_listen);
+        options.tls = match (&profile.bench.tls_cert, &profile.bench.tls_key) {
+            (Some(certificate), Some(key)) => Some(crate::tap::tls::TlsFiles {
+                certificate: certificate.clone(),
+                key: key.clone(),
+            }),
+            _ => None,
+        };
+        options.broker = broker_choice(profile.bench.broker.as_deref(), &profile, credentials)?;
+        let clock = options.clock;
+        let tap = options.tap;
+        let bundle = self.bundle(&subject, clock.origin_stamp().utc)?;
+        let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
+        let folder = arguments.device.profile.as_deref().and_then(Path::parent).map_or_else(PathBuf::new, Path::to_path_buf);
+        let operator = self.hooks(&profile, &info, &bundle, &folder)?;
+        if !self.output.quietly() {
+            eprintln!("the device is expected at mqtt://{}", info.device_address);
+        }
+        let motion = match (self.no_motion, profile.motion.allowed) {
+            (true, _) => Err(NO_MOTION.to_owned()),
+            (false, false) => Err("the profile does not allow motion ([motion] allowed = true)".to_owned()),
+            (false, true) => Ok(()),
+        };
+        let mut limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
+        if let Err(why) = &motion {
+            limits.push(format!("No test that moves the vehicle was run: {why}."));
+        }
+        let capabilities = Capabilities {
+            factsheet: None,
+            statements: profile.device.statements.clone(),
+            claims: profile.device.claims.iter().map(|claim| (claim.name(), claim.claimed())).collect(),
+            vantage: if tap { Vantage::Tap } else { Vantage::Subscriber },
+            hooks: operator.hooks(),
+            maps: true,
+            motion,
+        };
+        let session = SessionParts {
+            subject,
+            time: profile.time.clone(),
+            device: profile.device.bindings.clone(),
+            layout,
+            capabilities,
+            limits,
+            deviations: profile
+                .deviations
+                .iter()
+                .map(|deviation| (deviation.requirement.as_str().to_owned(), deviation.reason.clone()))
+                .collect(),
+        };
+        self.carry_out(session, &bundle, link, operator, clock, interrupt).await
+    }
+
+    fn subject(&self, profile: &Profile) -> Result<Subject, Problem> {
+        let missing = |setting: &str, flag: &str| -> Problem {
+            let title = format!("the device is not named: `{setting}` is missing");
+            let diagnostic = Diagnostic::whole("missing-setting", title);
+            diagnostic.hint(format!("set it in the profile, or with {flag}")).into()
+        };
+        let device = &profile.device;
+        Ok(Subject {
+            role: device.role,
+            manufacturer: device.manufacturer.clone().ok_or_else(|| missing("device.manufacturer", "--manufacturer"))?,
+            serial_number: device.serial_number.clone().ok_or_else(|| missing("device.serial-number", "--serial"))?,
+            topic_template: device.topic_template.clone(),
+        })
+    }
+
+    fn hooks(&self, profile: &Profile, info: &BenchInfo, bundle: &Bundle, folder: &Path) -> Result<ProfileHooks, Problem> {
+        let (host, port) = info.device_address.rsplit_once(':').unwrap_or((&info.device_address, "1883"));
+        let device = &profile.device;
+        let common: BTreeMap<String, String> = [
+            ("broker-host", host.to_owned()),
+            ("broker-port", port.to_owned()),
+            ("manufacturer", device.manufacturer.clone().unwrap_or_default()),
+            ("serial-number", device.serial_number.clone().unwrap_or_default()),
+        ]
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), value))
+        .collect();
+        let mut process = device.command.as_ref().map(|command| {
+            let filled = command.iter().map(|word| profile::fill(word, &common, str::to_owned)).collect();
+            DeviceProcess::new(filled, folder.to_owned(), Some(bundle.folder().join("device.log")))
+        });
+        if let Some(process) = &mut process {
+            process.start().map_err(|error| Problem::Environment(error.to_string()))?;
+        }
+        let attended = console::user_attended();
+        Ok(ProfileHooks::new(profile.hooks.clone(), common, folder.to_owned(), process, attended))
+    }
+
+    async fn carry_out<O: Operator>(
+        self,
+        session: SessionParts,
+        bundle: &Bundle,
+        link: MqttLink,
+        operator: O,
+        clock: WallClock,
+        interrupt: watch::Receiver<bool>,
+    ) -> Result<Exit, Problem> {
+        let header = HeaderParts {
+            subject: &session.subject,
+            pack: &self.pack,
+            run: &self.run,
+            vantage: session.capabilities.vantage,
+            suites: &self.library.rules.sha256,
+            modified: self.library.assets.modified(),
+            time: session.time.bindings(),
+            device: session.device,
+            settings: settings(&self.effective),
+            command: self.command.clone(),
+        };
+        let first = Occurrence::harness(
+            clock.now(),
+            Event::RunBegun {
+                header: Box::new(header.header()),
+            },
+        );
+        let writer = bundle.journal().map_err(|error| Problem::Environment(error.to_string()))?;
+        let recorder = Recorder::begin(&self.library.rules, Some(writer), first);
+        let recorder = recorder.map_err(|error| Problem::Environment(error.to_string()))?;
+        let mut engine = Engine::new(link, operator, recorder, Composer::new(&self.run), interrupt);
+        let setup = Setup {
+            tests: self.tests.clone(),
+            complete: self.complete,
+            capabilities: session.capabilities,
+            layout: session.layout,
+            deviations: session.deviations,
+            limits: session.limits,
+            run: self.run.clone(),
+        };
+        let mut terminal = Terminal::new(self.output.verbose);
+        let mut saved = |judge: &RunJudge| drop(write_result(bundle, &judge.result()));
+        let end = run(&mut engine, setup, &mut terminal, &mut saved).await;
+        let Engine { link, recorder, .. } = engine;
+        link.stop().await;
+        let finished = Finished {
+            result: recorder.judge().result(),
+            end,
+            recorder,
+        };
+        self.conclude(bundle, finished, terminal)
+    }
+
+    /// Writes the bundle and says the verdict.
+    fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Terminal) -> Result<Exit, Problem> {
+        let Finished { end, result, recorder } = finished;
+        let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
+        let root = write_all(bundle, &result, &quoted, recorder.journal());
+        let root = root.map_err(|error| Problem::Environment(error.to_string()))?;
+        terminal.finish();
+        let shown = bundle.folder().display().to_string();
+        match self.output.format {
+            args::Format::Json => {
+                let text = crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
+                crate::ui::print(&text);
+            }
+            args::Format::Text => {
+                let color = Color::stdout();
+                let mut page = String::new();
+                for test in result.tests.iter().filter(|test| test.verdict.is_some_and(|verdict| verdict > Verdict::Pass)) {
+                    page.push_str(&text::test(test, &quoted, Some(recorder.journal()), color));
+                    page.push('\n');
+                }
+                for monitor in result.monitors.iter().filter(|monitor| !monitor.findings.is_empty()) {
+                    page.push_str(&text::monitor(monitor, color));
+                    page.push('\n');
+                }
+                page.push_str(&text::summary(
+                    &result,
+                    text::Bundle {
+                        report: &format!("{shown}/report.html"),
+                        root: &root,
+                    },
+                    color,
+                ));
+                crate::ui::print(&page);
+            }
+        }
+        match end {
+            End::Completed => Ok(Exit::of(result.verdict)),
+            End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
+            End::NoDevice(why) => Err(Problem::Environment(format!("{why}; the partial report is in {shown}"))),
+            End::Broken(error) => Err(Problem::Environment(format!("{error}; the partial report is in {shown}"))),
+        }
+    }
+}
+
+const NO_MOTION: &str = "motion was ruled out by --no-motion";
+
+/// What differs between the built-in device and one of a profile.
+struct SessionParts {
+    subject: Subject,
+    time: TimeLimits,
+    device: serde_json::Map<String, serde_json::Value>,
+    layout: Option<Layout>,
+    capabilities: Capabilities,
+    limits: Vec<String>,
+    deviations: BTreeMap<String, String>,
+}
+
+fn settings(effective: &Effective) -> Vec<Setting> {
+    effective.settings.clone()
+}
+
+fn link_problem(error: LinkError) -> Problem {
+    Problem::Environment(error.to_string())
+}
+
+fn broker_choice(url: Option<&str>, profile: &Profile, credentials: Option<Credentials>) -> Result<BrokerChoice, Problem> {
+    Ok(match url {
+        None => BrokerChoice::Embedded,
+        Some(url) => BrokerChoice::External {
+            url: url.to_owned(),
+            authority: profile.bench.tls_ca.clone(),
+            credentials,
+        },
+    })
+}
+
+fn layout_of(profile: &Profile) -> Result<Option<Layout>, Problem> {
+    let layout = match &profile.layout.source {
+        LayoutSource::None => return Ok(None),
+        LayoutSource::List(list) => Layout::from_list(list),
+        LayoutSource::Lif { file, vehicle_type } => {
+            let text = std::fs::read_to_string(file).map_err(|error| {
+                let title = format!("the layout {} cannot be read: {error}", file.display());
+                Problem::from(Diagnostic::whole("unreadable", title))
+            })?;
+            Layout::from_lif(&Source::new(file.display().to_string(), text), vehicle_type.as_deref())?
+        }
+    };
+    let layout = match &profile.layout.allow_list {
+        None => layout,
+        Some(allowed) => layout.only(allowed).map_err(|error| Problem::from(Diagnostic::whole("layout", error.to_string())))?,
+    };
+    Ok(Some(match profile.motion.max_speed {
+        Some(cap) => layout.slower_than(cap),
+        None => layout,
+    }))
+}
+
+/// Hooks of the built-in device: commands to its driver.
+struct Commands(DeviceHandle);
+
+impl Operator for Commands {
+    fn hooks(&self) -> Vec<String> {
+        ReferenceAgv::HOOKS.map(str::to_owned).to_vec()
+    }
+
+    async fn run(&mut self, hook: &str, parameters: serde_json::Map<String, serde_json::Value>) -> HookOutcome {
+        if !ReferenceAgv::HOOKS.contains(&hook) {
+            return HookOutcome::Missing;
+        }
+        let command = DeviceCommand {
+            name: hook.to_owned(),
+            parameters: serde_json::Value::Object(parameters),
+        };
+        match self.0.command(command).await {
+            Ok(()) => HookOutcome::Done("done by the built-in device".to_owned()),
+            Err(error) => HookOutcome::Failed(error),
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Shows a run on the terminal.
+
+use std::io;
+use std::time::Duration;
+
+use crate::engine::Watcher;
+use crate::journal::event::{Gate, Plan};
+use crate::report::result::TestResult;
+use crate::run;
+use crate::suite::model::{Step, Test, Verb};
+use crate::ui::{Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};
+use crate::verdict::{Outcome, Verdict};
+
+/// The progress of a run, for a person.
+pub struct Screen {
+    terminal: Terminal<io::Stdout, io::Stderr>,
+    title: RunTitle,
+}
+
+impl Screen {
+    /// A screen for a device; `results` is false when standard output is for data only.
+    #[must_use]
+    pub fn new(device: String, protocol: String, results: bool) -> Self {
+        let options = TerminalOptions {
+            results,
+            ..TerminalOptions::of_process()
+        };
+        Self {
+            terminal: Terminal::stdout(options),
+            title: RunTitle {
+                device,
+                protocol,
+                tests: 0,
+                not_applicable: 0,
+            },
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&mut self) {
+        self.terminal.clear();
+    }
+}
+
+impl Watcher for Screen {
+    fn waiting(&mut self, step: &Step) {
+        let what = match &step.verb {
+            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_) => step.verb_span.text(),
+            _ => return,
+        };
+        let what = step.title.as_deref().unwrap_or(what);
+        self.terminal.waiting(what, Duration::ZERO);
+    }
+}
+
+impl run::Progress for Screen {
+    fn planned(&mut self, plan: &Plan) {
+        self.title.tests = plan.tests.iter().filter(|test| test.gate == Gate::Runs).count();
+        self.title.not_applicable = plan.tests.iter().filter(|test| matches!(test.gate, Gate::NotApplicable(_))).count();
+        self.terminal.run_begun(&self.title);
+    }
+
+    fn test_begun(&mut self, test: &Test, _number: usize, _of: usize) {
+        self.terminal.test_begun(&test.id, &test.title);
+    }
+
+    fn test_ended(&mut self, result: &TestResult) {
+        self.terminal.test_ended(&TestLine {
+            id: result.id.clone(),
+            outcome: Outcome::Judged(result.verdict.unwrap_or(Verdict::Error)),
+            elapsed: Duration::from_secs_f64(result.seconds.clamp(0.0, 1e6)),
+            reason: result.reason.clone(),
+        });
+    }
+
+    fn note(&mut self, text: &str) {
+        self.terminal.note(text);
+    }
+}
