@@ -114,7 +114,11 @@ impl<'a> Fill<'a> {
                     format!("unknown variable `${{{}.{name}}}`", self.root),
                     "no value of this name",
                 )
-                .hint(did_you_mean(first, names)),
+                .hint(match (names.is_empty(), self.root) {
+                    (false, _) => did_you_mean(first, names),
+                    (true, "case") => "this test has no `cases:`".to_owned(),
+                    (true, _) => "the `use:` of this state does not say it under `with:`".to_owned(),
+                }),
             );
         }
         value

@@ -42,6 +42,13 @@ impl Problems {
 
     /// Notes a value of the wrong type.
     pub(super) fn wrong_type(&mut self, node: &Node, wanted: &str) {
+        // A variable that could not be filled in has been noted, and might have had the right type.
+        if node
+            .text()
+            .is_some_and(|text| text.starts_with("${case.") || text.starts_with("${with."))
+        {
+            return;
+        }
         self.at(
             "wrong-type",
             &node.span,

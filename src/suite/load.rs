@@ -284,6 +284,7 @@ fn read_test(
     known: &[CheckInfo],
     problems: &mut Problems,
 ) -> Vec<Test> {
+    let before = problems.len();
     let Some(root) = parse(source, problems) else {
         return Vec::new();
     };
@@ -298,17 +299,25 @@ fn read_test(
         fields.need_text("test", &at, problems);
     }
     let role = place.and_then(|(_, role)| role);
-    let mut reader = TestReader {
+    let reader = TestReader {
         source,
         states,
         vocabulary,
         known,
         role,
+        before,
     };
+    let nothing: &[(Node, Node)] = &[];
     let Some(cases) = fields.get("cases", problems) else {
+        let root = Fill::new("case", nothing).apply(&root, problems);
+        let root = Fill::new("with", nothing).apply(&root, problems);
         return reader.read(&root, None, problems).into_iter().collect();
     };
+    let before_rows = problems.len();
     let rows = rows(cases, problems);
+    if problems.len() > before_rows {
+        return Vec::new();
+    }
     let without_cases = Node {
         kind: Kind::Map(
             fields
@@ -325,6 +334,7 @@ fn read_test(
     for (name, values) in &rows {
         let mut fill = Fill::new("case", values);
         let filled = fill.apply(&without_cases, problems);
+        let filled = Fill::new("with", nothing).apply(&filled, problems);
         for ((key, _), is_used) in values.iter().zip(&fill.used) {
             used.entry(key.text().unwrap_or_default())
                 .or_insert((false, &key.span))
@@ -406,10 +416,12 @@ struct TestReader<'a> {
     vocabulary: &'a dyn Vocabulary,
     known: &'a [CheckInfo],
     role: Option<Role>,
+    /// How many problems there were before this file.
+    before: usize,
 }
 
 impl TestReader<'_> {
-    fn read(&mut self, root: &Node, case: Option<&str>, problems: &mut Problems) -> Option<Test> {
+    fn read(&self, root: &Node, case: Option<&str>, problems: &mut Problems) -> Option<Test> {
         let fields = Fields::of(root, problems)?;
         let at = start(root);
         let header = header(&fields, &at, problems);
@@ -470,6 +482,7 @@ impl TestReader<'_> {
             spec: value_place("spec"),
             moves: value_place("moves"),
             needs: need_places,
+            complete: problems.len() == self.before,
         };
         lint::test(&test, &places, self.vocabulary, self.known, problems);
         Some(test)
@@ -521,6 +534,7 @@ fn read_monitor(
         start: at,
         moves: None,
         needs: need_places,
+        complete: true,
     };
     let topic_place = fields
         .get("topic", &mut Problems::default())

@@ -20,9 +20,10 @@ mod visit;
 
 use std::sync::Arc;
 
-pub use lint::{HookFacts, PathShape, RequirementFacts, Vocabulary};
+pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
 
 use crate::diagnostic::Diagnostic;
+use crate::pack::{Assets, Catalogue, Packs};
 use model::{Monitor, Test};
 
 /// What the linter has to know of a named check.
@@ -46,10 +47,51 @@ pub struct Suites {
 }
 
 impl Suites {
-    /// Loads every file below `suites/`, given by path (`suites/agv/…`) and text, against any vocabulary.
+    /// Loads every suite of `assets`. `checks` are the named checks there are, `hooks` the hooks a profile can have.
     ///
     /// # Errors
     /// Everything that is wrong with any of the files, by file and place.
+    pub fn load(
+        assets: &Assets,
+        packs: &Packs,
+        catalogue: &Catalogue,
+        checks: &[CheckInfo],
+        hooks: &[HookFacts],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        let vocabulary = PackVocabulary {
+            packs,
+            catalogue,
+            hooks,
+        };
+        load::load(files(assets), &vocabulary, checks)
+    }
+
+    /// Loads the text of one test, state or monitor, told apart by content, wherever it lies. The states it uses
+    /// are those of `assets`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn load_test_text(
+        name: &str,
+        text: &str,
+        assets: &Assets,
+        packs: &Packs,
+        catalogue: &Catalogue,
+        checks: &[CheckInfo],
+        hooks: &[HookFacts],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        let vocabulary = PackVocabulary {
+            packs,
+            catalogue,
+            hooks,
+        };
+        load::load_text(name, text, files(assets), &vocabulary, checks)
+    }
+
+    /// Loads files given by path (`suites/agv/…`) and text against any vocabulary.
+    ///
+    /// # Errors
+    /// As [`Suites::load`].
     pub fn load_files<'a>(
         files: impl Iterator<Item = (&'a str, &'a str)>,
         vocabulary: &dyn Vocabulary,
@@ -57,19 +99,10 @@ impl Suites {
     ) -> Result<Self, Vec<Diagnostic>> {
         load::load(files, vocabulary, checks)
     }
+}
 
-    /// Loads the text of one test, state or monitor, told apart by content, wherever it lies. `files` are
-    /// searched for the states it uses.
-    ///
-    /// # Errors
-    /// Everything that is wrong with it.
-    pub fn load_one<'a>(
-        name: &str,
-        text: &str,
-        files: impl Iterator<Item = (&'a str, &'a str)>,
-        vocabulary: &dyn Vocabulary,
-        checks: &[CheckInfo],
-    ) -> Result<Self, Vec<Diagnostic>> {
-        load::load_text(name, text, files, vocabulary, checks)
-    }
+fn files(assets: &Assets) -> impl Iterator<Item = (&str, &str)> {
+    assets
+        .under("suites/")
+        .map(|file| (file.path.as_str(), file.text.as_str()))
 }

@@ -12,7 +12,7 @@ mod vocabulary;
 
 use std::collections::BTreeSet;
 
-pub use vocabulary::{HookFacts, PathShape, RequirementFacts, Vocabulary};
+pub use vocabulary::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
 
 use self::paths::Topic;
 use self::scope::Scope;
@@ -33,6 +33,8 @@ pub(super) struct HeaderPlaces {
     pub(super) moves: Option<Span>,
     /// The entries of `needs`, as many as the model has.
     pub(super) needs: Vec<Span>,
+    /// Whether all of the file could be read. Otherwise nothing is said about what seems to be missing.
+    pub(super) complete: bool,
 }
 
 /// What all rules about one file share.
@@ -66,7 +68,7 @@ pub(super) fn test(
         return;
     }
     let all = || test.sections().into_iter().flat_map(|(_, steps)| steps);
-    let mut scope = Scope::of_test(vocabulary, all());
+    let mut scope = Scope::of_test(vocabulary, all(), places.complete);
     for (section, steps) in test.sections() {
         for step in steps {
             let packs = packs_in(vocabulary, &test.spec, step.spec.as_ref());
@@ -79,6 +81,9 @@ pub(super) fn test(
             linter.step(step, section, &packs, &scope);
             scope.leave(step, linter.problems);
         }
+    }
+    if !places.complete {
+        return;
     }
     if !test.steps.is_empty() && test.requirements().is_empty() {
         linter.problems.add(

@@ -3,8 +3,9 @@
 use serde_json::Value;
 
 use super::pictures;
-use super::vocabulary::{PathShape, Vocabulary};
+use super::vocabulary::Vocabulary;
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
+use crate::pack::Shape;
 use crate::pattern::{Pattern, PatternKind, Piece, Term, TermKind};
 
 /// One topic in one pack.
@@ -15,7 +16,7 @@ pub(super) struct Topic<'a> {
 }
 
 impl Topic<'_> {
-    fn shape(&self, path: &[&str]) -> Option<PathShape> {
+    fn shape(&self, path: &[&str]) -> Option<Shape> {
         if pictures::has(self.name) {
             return pictures::shape(self.name, path);
         }
@@ -162,7 +163,7 @@ impl Topic<'_> {
         }
     }
 
-    fn term(&self, term: &Term, shape: &PathShape, place: &Place<'_>, found: &mut Vec<Diagnostic>) {
+    fn term(&self, term: &Term, shape: &Shape, place: &Place<'_>, found: &mut Vec<Diagnostic>) {
         if let Some(value) = self.value(term) {
             self.value_fits(&value, &term.span, shape, &owned(place), found);
         }
@@ -199,7 +200,7 @@ impl Topic<'_> {
         &self,
         value: &Value,
         span: &Span,
-        shape: &PathShape,
+        shape: &Shape,
         place: &(Vec<String>, bool),
         found: &mut Vec<Diagnostic>,
     ) {
@@ -297,7 +298,7 @@ fn owned(place: &Place<'_>) -> (Vec<String>, bool) {
     )
 }
 
-fn kinds(shape: &PathShape) -> String {
+fn kinds(shape: &Shape) -> String {
     shape
         .kinds
         .iter()

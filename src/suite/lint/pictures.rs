@@ -1,7 +1,7 @@
 //! What can be seen on the topics of the harness itself, such as `mqtt/connect`: the members of
 //! [`Event::picture`](crate::journal::event::Event::picture).
 
-use super::vocabulary::PathShape;
+use crate::pack::Shape;
 
 /// Kind `any` is open: whatever the device put there.
 type Members = &'static [(&'static str, &'static str)];
@@ -100,11 +100,12 @@ pub(super) fn has(topic: &str) -> bool {
 }
 
 /// What stands at a path.
-pub(super) fn shape(topic: &str, path: &[&str]) -> Option<PathShape> {
+pub(super) fn shape(topic: &str, path: &[&str]) -> Option<Shape> {
     let members = members_of(topic)?;
-    let open = |kinds: Vec<&'static str>, open, array| PathShape {
+    let open = |kinds: Vec<&'static str>, open, array| Shape {
         kinds,
         literals: None,
+        required: false,
         open,
         array,
     };

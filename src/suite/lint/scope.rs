@@ -43,11 +43,17 @@ pub(super) struct Scope<'a> {
     served: Vec<String>,
     /// Names that some step of the test defines, to tell "too early" from "never".
     later: Vec<String>,
+    /// Whether every step could be read; otherwise a name may come from one that could not.
+    pub(super) complete: bool,
 }
 
 impl<'a> Scope<'a> {
     /// The scope at the start of a test with these steps.
-    pub(super) fn of_test<'s>(vocabulary: &'a dyn Vocabulary, steps: impl Iterator<Item = &'s Step>) -> Self {
+    pub(super) fn of_test<'s>(
+        vocabulary: &'a dyn Vocabulary,
+        steps: impl Iterator<Item = &'s Step>,
+        complete: bool,
+    ) -> Self {
         let mut later = Vec::new();
         for step in steps {
             later.extend(definitions(step).into_iter().map(|(name, _, _)| name));
@@ -61,6 +67,7 @@ impl<'a> Scope<'a> {
             names: BTreeMap::new(),
             served: Vec::new(),
             later,
+            complete,
         }
     }
 
@@ -68,7 +75,7 @@ impl<'a> Scope<'a> {
     pub(super) fn of_monitor(vocabulary: &'a dyn Vocabulary) -> Self {
         Self {
             in_test: false,
-            ..Self::of_test(vocabulary, std::iter::empty())
+            ..Self::of_test(vocabulary, std::iter::empty(), true)
         }
     }
 
@@ -161,8 +168,8 @@ impl<'a> Scope<'a> {
             ),
             "run" => only_in_tests(!rest.is_empty(), "write such as `${run.order}`".to_owned()),
             "serve" => self.served(name, rest, span),
-            "case" => unknown("this test has no `cases:`".to_owned()),
-            "with" => unknown("the `use:` of this state does not say it under `with:`".to_owned()),
+            // Filled in, or noted, before the steps were read.
+            "case" | "with" if self.in_test => None,
             _ if !self.in_test => only_in_tests(false, String::new()),
             _ => match self.names.get(root_name) {
                 Some(Origin::Saved) => None,
@@ -176,6 +183,9 @@ impl<'a> Scope<'a> {
     fn undefined(&self, name: &str, root: &str, span: &Span) -> Option<Diagnostic> {
         if self.comes_later(root) {
             return Some(too_early(name, span));
+        }
+        if !self.complete {
+            return None;
         }
         let known: Vec<&str> = self
             .names
@@ -202,6 +212,8 @@ impl<'a> Scope<'a> {
             }
         } else if self.comes_later(&format!("serve.{offer}")) {
             return Some(too_early(name, span));
+        } else if !self.complete {
+            return None;
         }
         Some(
             Diagnostic::new(

@@ -48,7 +48,7 @@ impl Linter<'_> {
                             format!("the action `{}` has not been sent yet", action.name),
                             "a later step sends it",
                         );
-                    } else {
+                    } else if scope.complete {
                         self.problems
                             .unknown("unknown-action-name", at, "action", &action.name, scope.actions());
                     }
