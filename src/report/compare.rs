@@ -93,8 +93,14 @@ pub fn compare(before: &RunResult, after: &RunResult) -> Comparison {
         notes: notes(before, after),
         verdict: (before.verdict != after.verdict).then_some((before.verdict, after.verdict)),
         requirements: changes(
-            before.requirements.iter().map(|entry| (entry.id.as_str(), entry.verdict)),
-            after.requirements.iter().map(|entry| (entry.id.as_str(), entry.verdict)),
+            before
+                .requirements
+                .iter()
+                .map(|entry| (entry.id.as_str(), entry.verdict)),
+            after
+                .requirements
+                .iter()
+                .map(|entry| (entry.id.as_str(), entry.verdict)),
         ),
         tests: changes(
             before.tests.iter().map(|entry| (entry.id.as_str(), entry.verdict)),
@@ -141,7 +147,11 @@ fn changes<'a>(
         let before = earlier.remove(id).unwrap_or(Standing::Absent);
         let after = Standing::of(verdict);
         if before != after {
-            all.push(Change { id: id.to_owned(), before, after });
+            all.push(Change {
+                id: id.to_owned(),
+                before,
+                after,
+            });
         }
     }
     for (id, _) in order {
@@ -186,7 +196,11 @@ impl Comparison {
                 continue;
             }
             text.push_str(&format!("\n{} changed\n", many(changes.len(), title)));
-            for (trend, word) in [(Trend::Worse, "worse"), (Trend::Better, "better"), (Trend::Other, "other")] {
+            for (trend, word) in [
+                (Trend::Worse, "worse"),
+                (Trend::Better, "better"),
+                (Trend::Other, "other"),
+            ] {
                 for change in changes.iter().filter(|change| change.trend() == trend) {
                     let steps = format!("{} -> {}", change.before.word(), change.after.word());
                     text.push_str(&format!("  {word:<7} {steps:<28} {}\n", line(&change.id)));

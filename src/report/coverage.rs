@@ -100,8 +100,15 @@ fn concerns(requirement: &RequirementText, role: Role) -> bool {
 #[must_use]
 pub fn coverage(sources: &Sources, role: Role) -> Coverage {
     let mut all = Coverage::default();
-    for requirement in sources.requirements.iter().filter(|requirement| concerns(requirement, role)) {
-        let at = all.chapters.iter().position(|chapter| chapter.title == requirement.chapter);
+    for requirement in sources
+        .requirements
+        .iter()
+        .filter(|requirement| concerns(requirement, role))
+    {
+        let at = all
+            .chapters
+            .iter()
+            .position(|chapter| chapter.title == requirement.chapter);
         let at = at.unwrap_or_else(|| {
             all.chapters.push(Chapter {
                 title: requirement.chapter.clone(),
@@ -149,7 +156,12 @@ impl Coverage {
     pub fn text(&self) -> String {
         let total = self.total();
         let rows = self.chapters.iter().chain([&total]);
-        let width = rows.clone().map(|row| line(&row.title).chars().count()).max().unwrap_or(0).max(7);
+        let width = rows
+            .clone()
+            .map(|row| line(&row.title).chars().count())
+            .max()
+            .unwrap_or(0)
+            .max(7);
         let mut text = format!(
             "{:<width$}  total  decided  operator  not testable  uncovered\n",
             "chapter"
@@ -175,9 +187,24 @@ impl Coverage {
             return text;
         }
         text.push_str("\nDecided by nothing\n");
-        let width = self.uncovered.iter().map(|entry| line(&entry.id).chars().count()).max().unwrap_or(0);
-        for Uncovered { id, mood, text: sentence } in &self.uncovered {
-            text.push_str(&format!("  {:<width$}  {:<6}  {}\n", line(id), line(mood), line(sentence)));
+        let width = self
+            .uncovered
+            .iter()
+            .map(|entry| line(&entry.id).chars().count())
+            .max()
+            .unwrap_or(0);
+        for Uncovered {
+            id,
+            mood,
+            text: sentence,
+        } in &self.uncovered
+        {
+            text.push_str(&format!(
+                "  {:<width$}  {:<6}  {}\n",
+                line(id),
+                line(mood),
+                line(sentence)
+            ));
         }
         text
     }

@@ -71,9 +71,13 @@ pub fn packet_name(packet: &Packet) -> &str {
 /// what changed among the actions is named.
 #[must_use]
 pub fn headline(entry: &Entry, before: Option<&Value>) -> String {
-    let Some(payload) = entry.payload() else { return String::new() };
+    let Some(payload) = entry.payload() else {
+        return String::new();
+    };
     let Some(message) = entry.json() else {
-        let problem = entry.parsed().and_then(|parsed| parsed.problems().first().map(ToString::to_string));
+        let problem = entry
+            .parsed()
+            .and_then(|parsed| parsed.problems().first().map(ToString::to_string));
         let problem = problem.unwrap_or_else(|| "not JSON".to_owned());
         return short(&line(&format!("{} bytes: {problem}", payload.len())), 90).into_owned();
     };
@@ -86,7 +90,11 @@ pub fn headline(entry: &Entry, before: Option<&Value>) -> String {
         Some("factsheet") => vec![value(message.pointer("/typeSpecification/seriesName"))],
         _ => vec![format!("{} bytes", payload.len())],
     };
-    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" · ")
+    parts
+        .into_iter()
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(" · ")
 }
 
 /// A scalar as it stands there; nothing for `null` and for what is absent.
@@ -118,7 +126,11 @@ fn order_name(message: &Value) -> String {
 fn named(names: impl ExactSizeIterator<Item = String>) -> String {
     let total = names.len();
     let shown: Vec<String> = names.take(MEMBERS).collect();
-    let more = if total > MEMBERS { format!(" +{}", total - MEMBERS) } else { String::new() };
+    let more = if total > MEMBERS {
+        format!(" +{}", total - MEMBERS)
+    } else {
+        String::new()
+    };
     shown.join(", ") + &more
 }
 
@@ -129,7 +141,11 @@ fn order(message: &Value) -> Vec<String> {
         .filter(|node| node.get("released") == Some(&Value::Bool(true)))
         .count();
     let horizon = nodes.len() - released;
-    let ahead = if horizon > 0 { format!(", {horizon} in the horizon") } else { String::new() };
+    let ahead = if horizon > 0 {
+        format!(", {horizon} in the horizon")
+    } else {
+        String::new()
+    };
     vec![order_name(message), format!("{released} nodes released{ahead}")]
 }
 
@@ -142,7 +158,11 @@ fn instant_actions(message: &Value) -> Vec<String> {
 
 fn state(message: &Value, before: Option<&Value>) -> Vec<String> {
     let flag = |name: &str, word: &str| {
-        if message.get(name) == Some(&Value::Bool(true)) { word.to_owned() } else { String::new() }
+        if message.get(name) == Some(&Value::Bool(true)) {
+            word.to_owned()
+        } else {
+            String::new()
+        }
     };
     let node = match value(message.get("lastNodeId")).as_str() {
         "" => String::new(),
@@ -156,7 +176,10 @@ fn state(message: &Value, before: Option<&Value>) -> Vec<String> {
     let errors = match errors.len() {
         0 => String::new(),
         1 => format!("1 error: {}", value(errors[0].get("errorType"))),
-        many => format!("{many} errors: {}", named(errors.iter().map(|error| value(error.get("errorType"))))),
+        many => format!(
+            "{many} errors: {}",
+            named(errors.iter().map(|error| value(error.get("errorType"))))
+        ),
     };
     vec![
         order_name(message),

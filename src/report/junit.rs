@@ -66,7 +66,11 @@ fn cdata(text: &str) -> String {
 
 /// Sums of these are made by the writer, which must not overflow.
 fn duration(seconds: f64) -> Duration {
-    let seconds = if seconds.is_finite() { seconds.clamp(0.0, 1e9) } else { 0.0 };
+    let seconds = if seconds.is_finite() {
+        seconds.clamp(0.0, 1e9)
+    } else {
+        0.0
+    };
     // Whole milliseconds: what is finer is noise, and reads badly.
     #[expect(clippy::cast_possible_truncation, reason = "clamped above")]
     Duration::milliseconds((seconds * 1000.0).round() as i64)
@@ -140,7 +144,12 @@ fn outcome(verdict: Option<Verdict>, kind: &str, message: &str, cause: &str) -> 
 
 fn run_case(result: &RunResult) -> TestCase {
     let trouble = match (result.partial, result.verdict) {
-        (true, _) => Some(result.partial_reason.as_deref().unwrap_or("the run ended before its plan did")),
+        (true, _) => Some(
+            result
+                .partial_reason
+                .as_deref()
+                .unwrap_or("the run ended before its plan did"),
+        ),
         (false, None) => Some("nothing was decided"),
         (false, Some(_)) => None,
     };
@@ -160,7 +169,11 @@ fn run_case(result: &RunResult) -> TestCase {
 
 fn test_case(test: &TestResult) -> TestCase {
     let verdict = statement::test_verdict(test);
-    let worst = test.decisions.iter().filter(|decision| Some(decision.verdict) == verdict).collect::<Vec<_>>();
+    let worst = test
+        .decisions
+        .iter()
+        .filter(|decision| Some(decision.verdict) == verdict)
+        .collect::<Vec<_>>();
     let kind = worst.first().map_or("", |decision| decision.requirement.as_str());
     let message = match (&test.not_applicable, &test.reason, worst.first()) {
         (Some(why), _, _) if verdict.is_none() => why.as_str(),
@@ -170,7 +183,11 @@ fn test_case(test: &TestResult) -> TestCase {
     };
     let mut findings: Vec<&Decision> = test.decisions.iter().filter(|d| d.verdict != Verdict::Pass).collect();
     findings.sort_by_key(|decision| std::cmp::Reverse(decision.verdict));
-    let text = findings.iter().map(|decision| finding(decision)).collect::<Vec<_>>().join("\n\n");
+    let text = findings
+        .iter()
+        .map(|decision| finding(decision))
+        .collect::<Vec<_>>()
+        .join("\n\n");
     let place = findings.first().map(|decision| decision.place.as_str());
     Case {
         name: &test.id,
@@ -184,7 +201,14 @@ fn test_case(test: &TestResult) -> TestCase {
 }
 
 fn finding(decision: &Decision) -> String {
-    let Decision { verdict, requirement, clause, place, message, .. } = decision;
+    let Decision {
+        verdict,
+        requirement,
+        clause,
+        place,
+        message,
+        ..
+    } = decision;
     let mut text = format!("{verdict}: {requirement}: {message}\n{clause} at {place}");
     if let Some(witness) = decision.witness {
         text.push_str(&format!("\ndecided by message #{witness}"));
@@ -214,7 +238,12 @@ fn monitor_case(monitor: &MonitorResult) -> TestCase {
     let text = findings
         .iter()
         .map(|finding| {
-            let first = finding.first.iter().map(|seq| format!("#{seq}")).collect::<Vec<_>>().join(", ");
+            let first = finding
+                .first
+                .iter()
+                .map(|seq| format!("#{seq}"))
+                .collect::<Vec<_>>()
+                .join(", ");
             format!(
                 "{}: {}: {} ({} times; first at {first})",
                 finding.verdict, finding.requirement, finding.message, finding.count

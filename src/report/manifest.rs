@@ -94,8 +94,16 @@ impl Verification {
         if !self.root_holds {
             lines.push("the root hash does not follow from the files of the manifest".to_owned());
         }
-        for (what, files) in [("changed", &self.changed), ("missing", &self.missing), ("extra", &self.extra)] {
-            lines.extend(files.iter().map(|file| format!("{what:<8} {}", super::clean::line(file))));
+        for (what, files) in [
+            ("changed", &self.changed),
+            ("missing", &self.missing),
+            ("extra", &self.extra),
+        ] {
+            lines.extend(
+                files
+                    .iter()
+                    .map(|file| format!("{what:<8} {}", super::clean::line(file))),
+            );
         }
         let verdict = if self.holds() { "intact" } else { "not intact" };
         lines.push(format!("{verdict}: root {}", super::clean::line(&self.root)));
@@ -170,7 +178,10 @@ impl Manifest {
         let mut names = Vec::new();
         walk(dir, "", &mut names)?;
         names.sort();
-        let files = names.iter().map(|name| hash(dir, name)).collect::<Result<Vec<_>, _>>()?;
+        let files = names
+            .iter()
+            .map(|name| hash(dir, name))
+            .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             format: FORMAT.to_owned(),
             root: root(&files),
@@ -234,7 +245,9 @@ impl Manifest {
             }
         }
         found.extra = there;
-        found.extra.retain(|name| !manifest.files.iter().any(|file| file.path == *name));
+        found
+            .extra
+            .retain(|name| !manifest.files.iter().any(|file| file.path == *name));
         Ok(found)
     }
 }
@@ -302,9 +315,15 @@ mod tests {
         let dir = bundle();
         assert!(matches!(Manifest::read(dir.path()), Err(ManifestError::Io { .. })));
         std::fs::write(dir.path().join(NAME), "{}").expect("write");
-        assert!(matches!(Manifest::read(dir.path()), Err(ManifestError::Malformed { .. })));
+        assert!(matches!(
+            Manifest::read(dir.path()),
+            Err(ManifestError::Malformed { .. })
+        ));
         let other = r#"{"format":"vda5050-tck.manifest/9","files":[],"root":""}"#;
         std::fs::write(dir.path().join(NAME), other).expect("write");
-        assert!(matches!(Manifest::read(dir.path()), Err(ManifestError::Malformed { .. })));
+        assert!(matches!(
+            Manifest::read(dir.path()),
+            Err(ManifestError::Malformed { .. })
+        ));
     }
 }

@@ -4,7 +4,7 @@
 //! than was decided: a pass speaks of the requirements that were decided and names how many were not.
 
 use super::clean::line;
-use super::result::{RunResult, TestResult};
+use super::result::{RequirementResult, RunResult, TestResult};
 use crate::verdict::Verdict;
 
 /// How many of something got which verdict.
@@ -95,6 +95,40 @@ pub fn requirements(result: &RunResult) -> Counts {
     Counts::of(result.requirements.iter().map(|requirement| requirement.verdict))
 }
 
+/// Why a requirement has no verdict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gap {
+    /// The device declares that it lacks what the requirement is about.
+    NotApplicable,
+    /// The catalogue says that no test can decide it.
+    NotTestable,
+    /// Nothing decided it.
+    NotDecided,
+}
+
+/// Why a requirement has no verdict; `None` when it has one.
+#[must_use]
+pub fn gap(requirement: &RequirementResult) -> Option<Gap> {
+    let why = requirement.not_decided.as_deref().unwrap_or_default();
+    match requirement.verdict {
+        Some(_) => None,
+        None if why.starts_with("not applicable") => Some(Gap::NotApplicable),
+        None if why.starts_with("not testable") => Some(Gap::NotTestable),
+        None => Some(Gap::NotDecided),
+    }
+}
+
+/// How many requirements apply and were not decided one way or the other.
+fn undecided(result: &RunResult) -> usize {
+    let counts = requirements(result);
+    let apart = result
+        .requirements
+        .iter()
+        .filter(|entry| gap(entry) == Some(Gap::NotApplicable))
+        .count();
+    counts.total() - counts.decided() - apart
+}
+
 /// `1 requirement`, `2 requirements`.
 #[must_use]
 pub fn many(count: usize, one: &str) -> String {
@@ -131,22 +165,26 @@ pub fn statement(result: &RunResult) -> String {
     let who = device(result);
     let counts = requirements(result);
     let decided = counts.decided();
-    let open = counts.total() - decided;
+    let open = undecided(result);
     let partial = if result.partial { "This run ended early. " } else { "" };
     let standard = format!("VDA 5050 {}", line(&result.protocol));
-    let role = line(role(result));
+    let role = match role(result) {
+        "AGV" => "an AGV".to_owned(),
+        other => format!("a {}", line(other)),
+    };
     let of_decided = format!("{} decided", many(decided, "requirement"));
     let rest = match open {
         0 => String::new(),
-        1 => "; 1 more was not decided".to_owned(),
-        _ => format!("; {open} more were not decided"),
+        1 => "; 1 more applies and was not decided".to_owned(),
+        _ => format!("; {open} more apply and were not decided"),
     };
     let sentence = match result.verdict {
         Some(Verdict::Fail) => {
             let broken = match counts.fail {
                 0 => "a test or monitor failed".to_owned(),
-                1 => format!("1 of {of_decided} is broken"),
-                count => format!("{count} of {of_decided} are broken"),
+                1 if decided == 1 => "the only requirement decided is broken".to_owned(),
+                1 => format!("1 of the {of_decided} is broken"),
+                count => format!("{count} of the {of_decided} are broken"),
             };
             format!("{who} does not conform to {standard} as {role}: {broken}{rest}.")
         }
@@ -161,7 +199,9 @@ pub fn statement(result: &RunResult) -> String {
             "{who} broke no binding requirement of {standard} as {role}, with {}: {of_decided}{rest}.",
             many(counts.warning, "remark"),
         ),
-        Some(Verdict::Pass) => format!("{who} conforms to {standard} as {role} in all it was tested for: {of_decided}, none broken{rest}."),
+        Some(Verdict::Pass) => {
+            format!("{who} conforms to {standard} as {role} in all it was tested for: {of_decided}, none broken{rest}.")
+        }
         None => format!("Nothing was decided about {who} and {standard}."),
     };
     format!("{partial}{sentence}")
@@ -174,7 +214,10 @@ pub fn limits(result: &RunResult) -> Vec<String> {
     let mut all = Vec::new();
     if result.partial {
         all.push(match &result.partial_reason {
-            Some(reason) => format!("The run ended before its plan did: {}.", line(reason.trim_end_matches('.'))),
+            Some(reason) => format!(
+                "The run ended before its plan did: {}.",
+                line(reason.trim_end_matches('.'))
+            ),
             None => "The run ended before its plan did.".to_owned(),
         });
     }
@@ -187,14 +230,12 @@ pub fn limits(result: &RunResult) -> Vec<String> {
                 .to_owned(),
         );
     }
-    let open = requirements(result);
-    let open = open.total() - open.decided();
-    if open > 0 {
-        all.push(format!(
-            "Nothing is said about {} that {} not decided; the matrix below shows which, and why.",
-            many(open, "requirement"),
-            if open == 1 { "was" } else { "were" },
-        ));
+    match undecided(result) {
+        0 => {}
+        1 => all.push("Nothing is said about 1 requirement that applies and was not decided.".to_owned()),
+        open => all.push(format!(
+            "Nothing is said about {open} requirements that apply and were not decided."
+        )),
     }
     let young = result
         .tests

@@ -124,9 +124,17 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
         text.push_str(&format!("{lead} {name:<8} {value}\n"));
     };
     let find = |seq| journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
-    if let Some(Waited { seconds: time, since, messages }) = decision.waited {
+    if let Some(Waited {
+        seconds: time,
+        since,
+        messages,
+    }) = decision.waited
+    {
         let came = many(usize::try_from(messages).unwrap_or(usize::MAX), "message");
-        note("waited", format!("{} after {}; {came} came", seconds(time), reference(find(since), since)));
+        note(
+            "waited",
+            format!("{} after {}; {came} came", seconds(time), reference(find(since), since)),
+        );
     }
     if let Some(witness) = decision.witness {
         note("decided", format!("by {}", reference(find(witness), witness)));
@@ -134,7 +142,9 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
     if let Some(nearest) = &decision.nearest {
         let since = decision.waited.as_ref().and_then(|waited| find(waited.since));
         let after = match (since, find(nearest.seq)) {
-            (Some(since), Some(near)) => format!(", +{}", seconds((near.at().moment - since.at().moment).as_secs_f64())),
+            (Some(since), Some(near)) => {
+                format!(", +{}", seconds((near.at().moment - since.at().moment).as_secs_f64()))
+            }
             _ => String::new(),
         };
         let kind = find(nearest.seq).map_or(String::new(), |entry| format!(" {}", super::headline::kind(entry)));
@@ -196,7 +206,9 @@ pub fn monitor(monitor: &MonitorResult, color: Color) -> String {
     for finding in &monitor.findings {
         let first: Vec<String> = finding.first.iter().take(5).map(|seq| format!("#{seq}")).collect();
         let times = many(usize::try_from(finding.count).unwrap_or(usize::MAX), "time");
-        let id = color.verdict(Some(finding.verdict)).apply_to(line(&finding.requirement));
+        let id = color
+            .verdict(Some(finding.verdict))
+            .apply_to(line(&finding.requirement));
         text.push_str(&format!("      {id}  {times}, first at {}\n", first.join(", ")));
         text.push_str(&format!("      {}\n", short(&line(&finding.message), 400)));
     }
@@ -225,10 +237,19 @@ pub fn summary(result: &RunResult, bundle: Bundle<'_>, color: Color) -> String {
         text.push_str(&format!("{name:<13} {}\n", numbers(counts, without, color)));
     }
     let style = color.verdict(result.verdict);
-    let word = result.verdict.map_or("NOTHING DECIDED".to_owned(), |verdict| verdict.word().to_uppercase());
-    text.push_str(&format!("\n{}  {}\n", style.apply_to(word), statement::statement(result)));
+    let word = result
+        .verdict
+        .map_or("NOTHING DECIDED".to_owned(), |verdict| verdict.word().to_uppercase());
+    text.push_str(&format!(
+        "\n{}  {}\n",
+        style.apply_to(word),
+        statement::statement(result)
+    ));
     if result.partial {
-        let reason = result.partial_reason.as_deref().unwrap_or("the run ended before its plan did");
+        let reason = result
+            .partial_reason
+            .as_deref()
+            .unwrap_or("the run ended before its plan did");
         let style = color.verdict(Some(Verdict::Error));
         text.push_str(&format!("{}  {}\n", style.apply_to("PARTIAL"), line(reason)));
     }

@@ -46,11 +46,20 @@ pub fn chapters(result: &RunResult, sources: &Sources, anchors: &Anchors) -> Vec
             Some(chapter) => chapter.rows.push(row),
             None => {
                 let anchor = format!("chapter-{}", chapters.len() + 1);
-                chapters.push(ChapterView { anchor, title, decided: 0, total: 0, open: false, rows: vec![row] });
+                chapters.push(ChapterView {
+                    anchor,
+                    title,
+                    decided: 0,
+                    total: 0,
+                    open: false,
+                    rows: vec![row],
+                });
             }
         }
         let verdict = requirement.verdict;
-        let at = chapters.iter_mut().find(|chapter| chapter.rows.iter().any(|row| row.id == requirement.id));
+        let at = chapters
+            .iter_mut()
+            .find(|chapter| chapter.rows.iter().any(|row| row.id == requirement.id));
         if let Some(chapter) = at {
             chapter.total += 1;
             chapter.decided += Counts::of([verdict]).decided();
@@ -74,13 +83,10 @@ fn row(
     result: &RunResult,
     anchors: &Anchors,
 ) -> RequirementView {
-    let gap = requirement.not_decided.clone().filter(|_| requirement.verdict.is_none());
-    let badge = match (requirement.verdict, gap.as_deref()) {
-        (Some(verdict), _) => Badge::of(Some(verdict)),
-        (None, Some(why)) if why.starts_with("not applicable") => Badge::NOT_APPLICABLE,
-        (None, Some(why)) if why.starts_with("not testable") => Badge::NOT_TESTABLE,
-        (None, _) => Badge::NOT_DECIDED,
-    };
+    let gap = requirement
+        .not_decided
+        .clone()
+        .filter(|_| requirement.verdict.is_none());
     // The reason of the catalogue is the better one where the result only has the word.
     let reason = match known.map(|known| &known.decided) {
         Some(HowDecided::NotTestable(why)) if gap.as_deref() == Some("not testable") => {
@@ -90,7 +96,7 @@ fn row(
     };
     RequirementView {
         anchor: anchors.requirement(&requirement.id).unwrap_or_default(),
-        badge,
+        badge: Badge::of_requirement(requirement),
         id: requirement.id.clone(),
         section: known.map(|known| known.section.clone()).unwrap_or_default(),
         mood: known.map(|known| known.mood.clone()).unwrap_or_default(),

@@ -45,7 +45,11 @@ pub struct Gallery<'a> {
 
 impl<'a> Gallery<'a> {
     pub fn new(journal: Option<&'a Journal>) -> Self {
-        Self { journal, shown: BTreeSet::new(), waiting: Vec::new() }
+        Self {
+            journal,
+            shown: BTreeSet::new(),
+            waiting: Vec::new(),
+        }
     }
 
     pub fn journal(&self) -> Option<&'a Journal> {
@@ -66,14 +70,16 @@ impl<'a> Gallery<'a> {
         &self.shown
     }
 
-    /// Asks for a record; `place` is what a verdict says about it. Gives back whether the page shows it.
-    pub fn show(&mut self, seq: u64, role: &str, place: Option<&str>) -> bool {
+    /// Asks for a record; `places` is what verdicts say about it. Gives back whether the page shows it.
+    pub fn show(&mut self, seq: u64, role: &str, places: &[&str]) -> bool {
         if self.shown.contains(&seq) {
             return true;
         }
-        let Some(entry) = self.entry(seq).filter(|_| self.shown.len() < PAGE_LIMIT) else { return false };
+        let Some(entry) = self.entry(seq).filter(|_| self.shown.len() < PAGE_LIMIT) else {
+            return false;
+        };
         self.shown.insert(seq);
-        self.waiting.push(view(entry, role, place));
+        self.waiting.push(view(entry, role, places));
         true
     }
 
@@ -85,22 +91,28 @@ impl<'a> Gallery<'a> {
     }
 }
 
-fn view(entry: &Entry, role: &str, place: Option<&str>) -> MessageView {
+fn view(entry: &Entry, role: &str, places: &[&str]) -> MessageView {
     let mut cut = None;
     let lines = match entry.payload() {
         None => {
             let picture = entry.subject().map(|picture| picture.to_string()).unwrap_or_default();
-            pretty::json(&picture, place)
+            pretty::json(&picture, places)
         }
         Some(payload) => {
             let bytes = payload.bytes();
             if let Payload::Cut { sha256, length, prefix } = payload {
-                cut = Some(format!("the first {} of {length} bytes; SHA-256 of all of them {sha256}", prefix.len()));
+                cut = Some(format!(
+                    "the first {} of {length} bytes; SHA-256 of all of them {sha256}",
+                    prefix.len()
+                ));
             } else if bytes.len() > PAYLOAD_LIMIT {
-                cut = Some(format!("the beginning of {} bytes; the journal has all of them", bytes.len()));
+                cut = Some(format!(
+                    "the beginning of {} bytes; the journal has all of them",
+                    bytes.len()
+                ));
             }
             match std::str::from_utf8(bytes) {
-                Ok(text) if entry.json().is_some() && bytes.len() <= PAYLOAD_LIMIT => pretty::json(text, place),
+                Ok(text) if entry.json().is_some() && bytes.len() <= PAYLOAD_LIMIT => pretty::json(text, places),
                 _ => pretty::other(&bytes[..bytes.len().min(PAYLOAD_LIMIT)]),
             }
         }
@@ -108,10 +120,21 @@ fn view(entry: &Entry, role: &str, place: Option<&str>) -> MessageView {
     let (topic, delivery) = match entry.event() {
         Event::Message { topic, qos, retain, .. }
         | Event::Sent { topic, qos, retain, .. }
-        | Event::Retained { topic, qos, retain, .. } => {
-            (topic.as_str(), format!("QoS {qos}{}", if *retain { ", RETAIN" } else { "" }))
-        }
-        Event::Packet { packet: crate::journal::Packet::Publish { topic, qos, retain, dup, .. }, .. } => {
+        | Event::Retained { topic, qos, retain, .. } => (
+            topic.as_str(),
+            format!("QoS {qos}{}", if *retain { ", RETAIN" } else { "" }),
+        ),
+        Event::Packet {
+            packet:
+                crate::journal::Packet::Publish {
+                    topic,
+                    qos,
+                    retain,
+                    dup,
+                    ..
+                },
+            ..
+        } => {
             let flags = [(*retain, ", RETAIN"), (*dup, ", DUP")];
             let flags: String = flags.iter().filter(|(set, _)| *set).map(|(_, word)| *word).collect();
             (topic.as_str(), format!("QoS {qos}{flags}"))
@@ -135,7 +158,7 @@ fn view(entry: &Entry, role: &str, place: Option<&str>) -> MessageView {
             .unwrap_or_default(),
         cut,
         lines,
-        open: place.is_some(),
+        open: !places.is_empty(),
     }
 }
 
@@ -144,7 +167,9 @@ fn way(entry: &Entry) -> &'static str {
         (Event::Message { .. }, _) => "delivered to the harness",
         (Event::Sent { .. }, _) => "sent by the harness",
         (Event::Retained { .. }, _) => "delivered to a fresh subscriber",
-        (Event::Packet { .. } | Event::Undecodable { .. }, Some(Direction::ToDevice)) => "seen at the tap, to the device",
+        (Event::Packet { .. } | Event::Undecodable { .. }, Some(Direction::ToDevice)) => {
+            "seen at the tap, to the device"
+        }
         (Event::Packet { .. } | Event::Undecodable { .. }, _) => "seen at the tap, from the device",
         _ => "recorded by the harness",
     }

@@ -1,6 +1,6 @@
 //! `report.html`: one file without network and without scripts, for screen and paper.
 //!
-//! The templates under `templates/report/` hold the words and the layout, [`view`], [`matrix`], [`tests`] and
+//! The templates under `templates/report/` hold the words and the layout, [`view`], [`matrix`], [`test_view`] and
 //! [`messages`] prepare what they show. Every value passes [`Escape`]; nothing here marks a text as safe except
 //! the sequence diagrams, which are templates of their own.
 
@@ -8,7 +8,7 @@ mod escape;
 mod matrix;
 mod messages;
 mod pretty;
-mod tests;
+mod test_view;
 mod view;
 
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ use crate::journal::event::Setting;
 use crate::journal::{Event, Journal};
 use matrix::ChapterView;
 use messages::{Gallery, MessageView};
-use tests::TestView;
+use test_view::TestView;
 use view::{Badge, CountRow, MonitorView};
 
 /// The result as one HTML page. Without a journal it has no messages and no sequence diagrams.
@@ -34,7 +34,7 @@ use view::{Badge, CountRow, MonitorView};
 pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) -> Result<String, askama::Error> {
     let anchors = Anchors::of(result);
     let mut gallery = Gallery::new(journal);
-    let tests = tests::views(result, sources, &anchors, &mut gallery)?;
+    let tests = test_view::views(result, sources, &anchors, &mut gallery)?;
     let monitors = view::monitors(result, sources, &anchors, &mut gallery);
     let monitor_messages = gallery.take();
     let shown_tests = tests.iter().filter(|test| !test.not_applicable).count();
@@ -120,14 +120,24 @@ impl Anchors {
         for (at, requirement) in result.requirements.iter().enumerate() {
             let id = &requirement.id;
             let plain = id.len() <= 40 && id.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-');
-            let anchor = if plain && !id.is_empty() { format!("r-{id}") } else { format!("r--{at}") };
+            let anchor = if plain && !id.is_empty() {
+                format!("r-{id}")
+            } else {
+                format!("r--{at}")
+            };
             anchors.requirements.entry(id.clone()).or_insert(anchor);
         }
         for (at, test) in result.tests.iter().enumerate() {
-            anchors.deciders.entry(test.id.clone()).or_insert(format!("t{}", at + 1));
+            anchors
+                .deciders
+                .entry(test.id.clone())
+                .or_insert(format!("t{}", at + 1));
         }
         for (at, monitor) in result.monitors.iter().enumerate() {
-            anchors.deciders.entry(monitor.id.clone()).or_insert(format!("monitor-{}", at + 1));
+            anchors
+                .deciders
+                .entry(monitor.id.clone())
+                .or_insert(format!("monitor-{}", at + 1));
         }
         anchors
     }

@@ -25,15 +25,25 @@ pub struct Line {
 
 impl Line {
     fn plain(text: impl Into<String>) -> Self {
-        Self { text: text.into(), marked: false }
+        Self {
+            text: text.into(),
+            marked: false,
+        }
     }
 }
 
-/// The lines of a JSON text that is known to parse; the one at `place` (`errors[0].errorType` or
-/// `/errors/0/errorType`) is marked, or the nearest place above it that exists.
-pub fn json(text: &str, place: Option<&str>) -> Vec<Line> {
-    let target = place.and_then(|place| existing(text, place));
-    let mut writer = Writer { target, ..Writer::default() };
+/// The lines of a JSON text that is known to parse; those at `places` (`errors[0].errorType` or
+/// `/errors/0/errorType`) are marked, or the nearest places above them that exist.
+pub fn json(text: &str, places: &[&str]) -> Vec<Line> {
+    let root: Value = match places {
+        [] => Value::Null,
+        _ => serde_json::from_str(text).unwrap_or_default(),
+    };
+    let targets = places.iter().filter_map(|place| existing(&root, place)).collect();
+    let mut writer = Writer {
+        targets,
+        ..Writer::default()
+    };
     let mut rest = text.trim();
     while let Some(first) = rest.chars().next() {
         let length = token(rest, first);
@@ -76,7 +86,13 @@ fn dump(bytes: &[u8]) -> Vec<Line> {
             let hex: Vec<String> = chunk.iter().map(|byte| format!("{byte:02x}")).collect();
             let text: String = chunk
                 .iter()
-                .map(|byte| if byte.is_ascii_graphic() { char::from(*byte) } else { '·' })
+                .map(|byte| {
+                    if byte.is_ascii_graphic() {
+                        char::from(*byte)
+                    } else {
+                        '·'
+                    }
+                })
                 .collect();
             Line::plain(format!("{:04x}  {:<47}  {text}", row * 16, hex.join(" ")))
         })
@@ -115,10 +131,9 @@ fn parts(place: &str) -> impl Iterator<Item = &str> {
     place.split(['.', '[', ']', '/']).filter(|part| !part.is_empty())
 }
 
-/// The longest beginning of `place` that exists in the text.
-fn existing(text: &str, place: &str) -> Option<Vec<String>> {
-    let root: Value = serde_json::from_str(text).ok()?;
-    let mut value = &root;
+/// The longest beginning of `place` that exists.
+fn existing(root: &Value, place: &str) -> Option<Vec<String>> {
+    let mut value = root;
     let mut path = Vec::new();
     for part in parts(place) {
         let next = match value {
@@ -142,7 +157,7 @@ struct Level {
 
 #[derive(Default)]
 struct Writer {
-    target: Option<Vec<String>>,
+    targets: Vec<Vec<String>>,
     levels: Vec<Level>,
     lines: Vec<Line>,
     current: String,
@@ -155,7 +170,10 @@ impl Writer {
     fn flush(&mut self) {
         if !self.current.is_empty() {
             let text = std::mem::take(&mut self.current);
-            self.lines.push(Line { text, marked: std::mem::take(&mut self.marked) });
+            self.lines.push(Line {
+                text,
+                marked: std::mem::take(&mut self.marked),
+            });
         }
     }
 
@@ -182,16 +200,21 @@ impl Writer {
             level.place = level.index.to_string();
             self.begin();
         }
-        if let Some(target) = &self.target {
+        for target in &self.targets {
             let here = self.levels.iter().map(|level| level.place.as_str());
-            self.marked |= target.len() == self.levels.len() && here.eq(target.iter().map(String::as_str));
+            self.marked |= here.eq(target.iter().map(String::as_str));
         }
     }
 
     fn open(&mut self, list: bool) {
         self.value_begins();
         self.current.push(if list { '[' } else { '{' });
-        self.levels.push(Level { list, place: String::new(), index: 0, empty: true });
+        self.levels.push(Level {
+            list,
+            place: String::new(),
+            index: 0,
+            empty: true,
+        });
         self.name = !list;
     }
 
@@ -244,22 +267,30 @@ mod tests {
     use proptest::prelude::*;
 
     fn text(lines: &[Line]) -> String {
-        lines.iter().map(|line| line.text.clone()).collect::<Vec<_>>().join("\n")
+        lines
+            .iter()
+            .map(|line| line.text.clone())
+            .collect::<Vec<_>>()
+            .join("\n")
     }
 
     #[test]
     fn tokens_stay_as_the_device_wrote_them() {
         let raw = r#"{"a":1.0e3,"a":"\u0041","b":[],"c":{},"d":[1,{"e":null}],"f":[[2]]}"#;
         let expected = "{\n  \"a\": 1.0e3,\n  \"a\": \"\\u0041\",\n  \"b\": [],\n  \"c\": {},\n  \"d\": [\n    1,\n    {\n      \"e\": null\n    }\n  ],\n  \"f\": [\n    [\n      2\n    ]\n  ]\n}";
-        assert_eq!(text(&json(raw, None)), expected);
+        assert_eq!(text(&json(raw, &[])), expected);
     }
 
     #[test]
     fn the_place_a_verdict_speaks_of_is_marked() {
         let raw = r#"{"errors":[{"errorType":"a"},{"errorType":"b","errorLevel":"FATAL"}]}"#;
         let marked = |place| {
-            let lines = json(raw, Some(place));
-            lines.into_iter().filter(|line| line.marked).map(|line| line.text.trim().to_owned()).collect::<Vec<_>>()
+            let lines = json(raw, &[place]);
+            lines
+                .into_iter()
+                .filter(|line| line.marked)
+                .map(|line| line.text.trim().to_owned())
+                .collect::<Vec<_>>()
         };
         assert_eq!(marked("errors[1].errorLevel"), [r#""errorLevel": "FATAL""#]);
         assert_eq!(marked("/errors/0/errorType"), [r#""errorType": "a""#]);
@@ -271,7 +302,10 @@ mod tests {
     #[test]
     fn bytes_that_are_not_text_are_dumped() {
         let lines = other(&[0xff, b'{', 0]);
-        assert_eq!(lines[0].text.split_whitespace().collect::<Vec<_>>(), ["0000", "ff", "7b", "00", "·{·"]);
+        assert_eq!(
+            lines[0].text.split_whitespace().collect::<Vec<_>>(),
+            ["0000", "ff", "7b", "00", "·{·"]
+        );
         assert!(text(&other(&[0xff; 600])).ends_with("… 88 more bytes"));
     }
 
@@ -285,7 +319,8 @@ mod tests {
         leaf.prop_recursive(4, 40, 5, |inner| {
             prop_oneof![
                 prop::collection::vec(inner.clone(), 0..5).prop_map(Value::from),
-                prop::collection::vec(("[a-z\"\\\\]{0,5}", inner), 0..5).prop_map(|members| Value::Object(members.into_iter().collect())),
+                prop::collection::vec(("[a-z\"\\\\]{0,5}", inner), 0..5)
+                    .prop_map(|members| Value::Object(members.into_iter().collect())),
             ]
         })
     }
@@ -296,12 +331,12 @@ mod tests {
             let raw = value.to_string();
             let expected = serde_json::to_string_pretty(&value).unwrap();
             prop_assume!(expected.lines().count() < LINE_LIMIT);
-            prop_assert_eq!(text(&json(&raw, None)), expected);
+            prop_assert_eq!(text(&json(&raw, &[])), expected);
         }
 
         #[test]
         fn no_text_makes_it_panic(raw in any::<String>()) {
-            json(&raw, Some("a[0].b"));
+            json(&raw, &["a[0].b", "/"]);
             other(raw.as_bytes());
         }
     }

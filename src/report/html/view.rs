@@ -2,9 +2,9 @@
 
 use super::Anchors;
 use super::messages::Gallery;
-use crate::report::result::RunResult;
+use crate::report::result::{RequirementResult, RunResult};
 use crate::report::sources::Sources;
-use crate::report::statement::{self, Counts, seconds};
+use crate::report::statement::{self, Gap, seconds};
 use crate::verdict::Verdict;
 
 /// Most occurrences of a monitor's finding whose messages are shown.
@@ -32,12 +32,43 @@ impl Badge {
             Some(Verdict::Fail) => ("fail", "✕"),
             None => ("none", "–"),
         };
-        Self { class, sign, word: verdict.map_or("not decided", Verdict::word) }
+        Self {
+            class,
+            sign,
+            word: verdict.map_or("not decided", Verdict::word),
+        }
     }
 
-    pub const NOT_APPLICABLE: Self = Self { class: "none", sign: "–", word: "not applicable" };
-    pub const NOT_TESTABLE: Self = Self { class: "none untestable", sign: "∅", word: "not testable" };
-    pub const NOT_DECIDED: Self = Self { class: "none gap", sign: "·", word: "not decided" };
+    /// For a requirement: a gap is told from what does not apply and what cannot be tested.
+    pub fn of_requirement(requirement: &RequirementResult) -> Self {
+        match statement::gap(requirement) {
+            None => Self::of(requirement.verdict),
+            Some(Gap::NotApplicable) => Self::NOT_APPLICABLE,
+            Some(Gap::NotTestable) => Self::NOT_TESTABLE,
+            Some(Gap::NotDecided) => Self::NOT_DECIDED,
+        }
+    }
+
+    pub const NOT_APPLICABLE: Self = Self {
+        class: "none",
+        sign: "–",
+        word: "not applicable",
+    };
+    pub const NOT_TESTABLE: Self = Self {
+        class: "none untestable",
+        sign: "∅",
+        word: "not testable",
+    };
+    pub const NOTHING_TO_JUDGE: Self = Self {
+        class: "none",
+        sign: "–",
+        word: "nothing to judge",
+    };
+    pub const NOT_DECIDED: Self = Self {
+        class: "none gap",
+        sign: "·",
+        word: "not decided",
+    };
 }
 
 /// What stands in the title bar.
@@ -60,7 +91,11 @@ pub fn identity(result: &RunResult) -> Vec<(&'static str, String)> {
         ("Serial number", device.serial_number.clone()),
     ];
     rows.extend(device.series_name.clone().map(|name| ("Series", name)));
-    let suites = if result.suites_modified { "modified, " } else { "as delivered, " };
+    let suites = if result.suites_modified {
+        "modified, "
+    } else {
+        "as delivered, "
+    };
     let vantage = match result.vantage.as_str() {
         "tap" => "tap: every packet of the device was seen",
         "subscriber" => "subscriber: only what the broker delivered was seen",
@@ -91,33 +126,44 @@ fn started(text: &str) -> String {
 pub struct CountRow {
     pub name: &'static str,
     pub total: usize,
-    /// Badge, number, share of the bar in percent.
+    /// How many have which badge, best verdict first.
     pub cells: Vec<(Badge, usize)>,
 }
 
-/// Tests, monitors and requirements by verdict, best first.
-pub fn counts(result: &RunResult) -> Vec<CountRow> {
-    let row = |name, counts: Counts, without: Badge| {
-        let verdicts = Verdict::ALL.into_iter().map(Some).chain([None]);
-        CountRow {
-            name,
-            total: counts.total(),
-            cells: verdicts
-                .map(|verdict| {
-                    let badge = verdict.map_or(without, |verdict| Badge::of(Some(verdict)));
-                    (badge, counts.get(verdict))
-                })
-                .collect(),
+impl CountRow {
+    fn of(name: &'static str, badges: impl Iterator<Item = Badge>, without: &[Badge]) -> Self {
+        let verdicts = Verdict::ALL.iter().map(|verdict| Badge::of(Some(*verdict)));
+        let mut cells: Vec<(Badge, usize)> = verdicts
+            .chain(without.iter().copied())
+            .map(|badge| (badge, 0))
+            .collect();
+        let mut total = 0;
+        for badge in badges {
+            total += 1;
+            for cell in cells.iter_mut().filter(|cell| cell.0 == badge) {
+                cell.1 += 1;
+            }
         }
-    };
+        Self { name, total, cells }
+    }
+}
+
+/// Tests, monitors and requirements by verdict.
+pub fn counts(result: &RunResult) -> Vec<CountRow> {
+    let requirements = result.requirements.iter().map(Badge::of_requirement);
+    let tests = result.tests.iter().map(|test| match statement::test_verdict(test) {
+        None => Badge::NOT_APPLICABLE,
+        verdict => Badge::of(verdict),
+    });
+    let monitors = result.monitors.iter().map(|monitor| match monitor.verdict {
+        None => Badge::NOTHING_TO_JUDGE,
+        verdict => Badge::of(verdict),
+    });
+    let gaps = [Badge::NOT_DECIDED, Badge::NOT_TESTABLE, Badge::NOT_APPLICABLE];
     vec![
-        row("Requirements", statement::requirements(result), Badge::NOT_DECIDED),
-        row("Tests", statement::tests(result), Badge::NOT_APPLICABLE),
-        row(
-            "Monitors",
-            statement::monitors(result),
-            Badge { class: "none", sign: "–", word: "nothing to judge" },
-        ),
+        CountRow::of("Requirements", requirements, &gaps),
+        CountRow::of("Tests", tests, &[Badge::NOT_APPLICABLE]),
+        CountRow::of("Monitors", monitors, &[Badge::NOTHING_TO_JUDGE]),
     ]
 }
 
@@ -144,7 +190,12 @@ pub struct FindingView {
     pub interpretation: Option<String>,
 }
 
-pub fn monitors(result: &RunResult, sources: &Sources, anchors: &Anchors, gallery: &mut Gallery<'_>) -> Vec<MonitorView> {
+pub fn monitors(
+    result: &RunResult,
+    sources: &Sources,
+    anchors: &Anchors,
+    gallery: &mut Gallery<'_>,
+) -> Vec<MonitorView> {
     result
         .monitors
         .iter()
@@ -152,26 +203,34 @@ pub fn monitors(result: &RunResult, sources: &Sources, anchors: &Anchors, galler
         .map(|(at, monitor)| MonitorView {
             anchor: format!("monitor-{}", at + 1),
             badge: match monitor.verdict {
-                None => Badge { class: "none", sign: "–", word: "nothing to judge" },
+                None => Badge::NOTHING_TO_JUDGE,
                 verdict => Badge::of(verdict),
             },
             id: monitor.id.clone(),
             title: monitor.title.clone(),
-            why: sources.monitor(&monitor.id).map(|source| source.why.clone()).unwrap_or_default(),
+            why: sources
+                .monitor(&monitor.id)
+                .map(|source| source.why.clone())
+                .unwrap_or_default(),
             judged: monitor.judged,
             findings: monitor
                 .findings
                 .iter()
                 .map(|finding| {
                     for seq in finding.first.iter().take(OCCURRENCES) {
-                        gallery.show(*seq, finding.verdict.word(), None);
+                        gallery.show(*seq, finding.verdict.word(), &[]);
                     }
                     FindingView {
                         badge: Badge::of(Some(finding.verdict)),
                         link: anchors.requirement(&finding.requirement),
                         requirement: finding.requirement.clone(),
                         count: finding.count,
-                        first: finding.first.iter().take(10).map(|seq| (*seq, gallery.shows(*seq))).collect(),
+                        first: finding
+                            .first
+                            .iter()
+                            .take(10)
+                            .map(|seq| (*seq, gallery.shows(*seq)))
+                            .collect(),
                         message: finding.message.clone(),
                         interpretation: finding.interpretation.clone(),
                     }
@@ -215,7 +274,10 @@ pub fn legend() -> Vec<LegendRow> {
     let row = |badge, meaning| LegendRow { badge, meaning };
     let verdict = |verdict, meaning| row(Badge::of(Some(verdict)), meaning);
     vec![
-        verdict(Verdict::Pass, "The obligation was seen to be met, every time it was looked at."),
+        verdict(
+            Verdict::Pass,
+            "The obligation was seen to be met, every time it was looked at.",
+        ),
         verdict(
             Verdict::Warning,
             "A recommendation (should) was not followed, or a ruling of the catalogue asks for a remark. Conformance is not affected.",
@@ -236,7 +298,13 @@ pub fn legend() -> Vec<LegendRow> {
             Badge::NOT_APPLICABLE,
             "The device declares that it lacks what the obligation is about, so there is nothing to test.",
         ),
-        row(Badge::NOT_TESTABLE, "The catalogue gives a reason why no test can decide it from outside."),
-        row(Badge::NOT_DECIDED, "Nothing in this run decided it. This is a gap, not a pass."),
+        row(
+            Badge::NOT_TESTABLE,
+            "The catalogue gives a reason why no test can decide it from outside.",
+        ),
+        row(
+            Badge::NOT_DECIDED,
+            "Nothing in this run decided it. This is a gap, not a pass.",
+        ),
     ]
 }

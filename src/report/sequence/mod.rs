@@ -60,7 +60,10 @@ pub fn render(journal: &Journal, window: (u64, u64), options: &Options<'_>) -> R
         width: WIDTH,
         height: top + 34,
         foot: top + 6,
-        lanes: Lane::ALL.map(|lane| LaneView { x: lane.x(), name: lane.name() }),
+        lanes: Lane::ALL.map(|lane| LaneView {
+            x: lane.x(),
+            name: lane.name(),
+        }),
         rows: placed,
         hidden: hidden(&found),
     }
@@ -76,7 +79,11 @@ fn height(row: &Row) -> usize {
 }
 
 fn description(found: &rows::Rows) -> String {
-    let arrows = found.rows.iter().filter(|row| matches!(row.what, What::Arrow { .. })).count();
+    let arrows = found
+        .rows
+        .iter()
+        .filter(|row| matches!(row.what, What::Arrow { .. }))
+        .count();
     format!(
         "Sequence diagram with three lanes, harness, broker and device, read from top to bottom: {arrows} arrows in {} rows. The same messages are listed as text below it.",
         found.rows.len()
@@ -140,6 +147,8 @@ struct RowView {
     detail: String,
     mark: String,
     class: &'static str,
+    /// Whether the step set the mark.
+    flag: bool,
 }
 
 fn place(row: &Row, top: usize, height: usize, options: &Options<'_>) -> RowView {
@@ -156,14 +165,12 @@ fn place(row: &Row, top: usize, height: usize, options: &Options<'_>) -> RowView
         What::Arrow { .. } => top + height - 10,
         _ => top + height / 2,
     };
-    let tip = if to >= from {
-        format!("{to},{line_y} {},{} {},{}", to - 8, line_y - 4, to - 8, line_y + 4)
-    } else {
-        format!("{to},{line_y} {},{} {},{}", to + 8, line_y - 4, to + 8, line_y + 4)
-    };
+    // Where the tip of the arrow begins.
+    let back = if to >= from { to.saturating_sub(8) } else { to + 8 };
+    let tip = format!("{to},{line_y} {back},{} {back},{}", line_y - 4, line_y + 4);
     // About 6.2 units a character at the size the text is set in.
     let room = match row.what {
-        What::Step | What::Gap => 130,
+        What::Step | What::Gap => 112,
         What::Arrow { .. } => from.abs_diff(to) * 10 / 62,
         What::Box(_) => 32,
     };
@@ -178,7 +185,11 @@ fn place(row: &Row, top: usize, height: usize, options: &Options<'_>) -> RowView
     RowView {
         kind,
         link: options.linked.contains(&row.seq).then_some(row.seq),
-        seq: if row.seq == 0 { String::new() } else { format!("#{}", row.seq) },
+        seq: if row.seq == 0 {
+            String::new()
+        } else {
+            format!("#{}", row.seq)
+        },
         time: row.time.map_or(String::new(), |time| format!("{time:+.3} s")),
         y: top,
         text_y: match row.what {
@@ -195,5 +206,6 @@ fn place(row: &Row, top: usize, height: usize, options: &Options<'_>) -> RowView
         detail,
         class: if mark.is_empty() { row.class } else { "marked" },
         mark,
+        flag: row.mark,
     }
 }

@@ -56,6 +56,8 @@ pub struct Row {
     pub title: String,
     pub detail: String,
     pub class: &'static str,
+    /// Whether the step set the mark.
+    pub mark: bool,
     count: u32,
     last: u64,
     headline: String,
@@ -98,7 +100,11 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
         .iter()
         .any(|entry| matches!(entry.event(), Event::Packet { .. } | Event::Opened { .. }));
     let twins = twins(entries);
-    let mut found = Rows { rows: Vec::new(), acknowledgements: 0, probes: 0 };
+    let mut found = Rows {
+        rows: Vec::new(),
+        acknowledgements: 0,
+        probes: 0,
+    };
     let mut before: HashMap<String, &Value> = HashMap::new();
     for (at, entry) in entries.iter().enumerate() {
         match entry.event() {
@@ -109,12 +115,14 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
             } => found.acknowledgements += 1,
             _ => {}
         }
-        if twins.hidden.contains(&at) {
+        if twins.hidden.contains(&at) || flagged(&mut found.rows, entry) {
             continue;
         }
         let topic = headline::topic(entry);
         let previous = topic.as_ref().and_then(|topic| before.get(topic)).copied();
-        let Some(mut row) = row(entry, twins.seen.contains(&at), tap, previous, options) else { continue };
+        let Some(mut row) = row(entry, twins.seen.contains(&at), tap, previous, options) else {
+            continue;
+        };
         row.time = start.map(|start| (entry.at().moment - start).as_secs_f64());
         if let (Some(topic), Some(json)) = (topic, entry.json()) {
             before.insert(topic, json);
@@ -139,10 +147,18 @@ struct Twins {
 }
 
 fn twins(entries: &[std::sync::Arc<Entry>]) -> Twins {
-    let mut twins = Twins { hidden: BTreeSet::new(), seen: BTreeSet::new() };
+    let mut twins = Twins {
+        hidden: BTreeSet::new(),
+        seen: BTreeSet::new(),
+    };
     let tap = |entry: &Entry, way: Direction| {
-        matches!(entry.event(), Event::Packet { packet: Packet::Publish { .. }, .. })
-            && entry.record.direction == Some(way)
+        matches!(
+            entry.event(),
+            Event::Packet {
+                packet: Packet::Publish { .. },
+                ..
+            }
+        ) && entry.record.direction == Some(way)
     };
     let same = |a: &Entry, b: &Entry| full_topic(a) == full_topic(b) && a.payload() == b.payload();
     for (at, entry) in entries.iter().enumerate() {
@@ -166,7 +182,10 @@ fn full_topic(entry: &Entry) -> Option<&str> {
     match entry.event() {
         Event::Message { topic, .. }
         | Event::Sent { topic, .. }
-        | Event::Packet { packet: Packet::Publish { topic, .. }, .. } => Some(topic),
+        | Event::Packet {
+            packet: Packet::Publish { topic, .. },
+            ..
+        } => Some(topic),
         _ => None,
     }
 }
@@ -179,6 +198,7 @@ fn plain(entry: &Entry, what: What, title: impl Into<String>, detail: impl Into<
         title: title.into(),
         detail: detail.into(),
         class: "",
+        mark: false,
         count: 1,
         last: entry.seq(),
         headline: String::new(),
@@ -206,13 +226,21 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
             (true, _) => arrow(Device, Harness),
             // The broker spoke for the device: its last will, or something stored.
             (false, true) => arrow(Broker, Harness),
-            (false, false) => What::Arrow { from: Device, to: Harness, unseen: Some((Device, Broker)) },
+            (false, false) => What::Arrow {
+                from: Device,
+                to: Harness,
+                unseen: Some((Device, Broker)),
+            },
         }),
         Event::Sent { .. } => {
             let mut row = message(match (twin, tap) {
                 (true, _) => arrow(Harness, Device),
                 (false, true) => arrow(Harness, Broker),
-                (false, false) => What::Arrow { from: Harness, to: Device, unseen: Some((Broker, Device)) },
+                (false, false) => What::Arrow {
+                    from: Harness,
+                    to: Device,
+                    unseen: Some((Broker, Device)),
+                },
             });
             row.class = "sent";
             row.stimulus = true;
@@ -260,16 +288,31 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
             row
         }
         Event::Mark { .. } => plain(entry, What::Box(Harness), "mark", "deadlines count from here"),
-        Event::Served { name, behaviour, .. } => {
-            plain(entry, What::Box(Harness), format!("offers {}", text(name)), text(behaviour))
-        }
-        Event::Fetched { request, status, phase, .. } => {
+        Event::Served { name, behaviour, .. } => plain(
+            entry,
+            What::Box(Harness),
+            format!("offers {}", text(name)),
+            text(behaviour),
+        ),
+        Event::Fetched {
+            request, status, phase, ..
+        } => {
             let status = status.map_or(String::new(), |status| format!("{status} "));
-            plain(entry, arrow(Device, Harness), text(request), format!("HTTP {status}{}", text(phase)))
+            plain(
+                entry,
+                arrow(Device, Harness),
+                text(request),
+                format!("HTTP {status}{}", text(phase)),
+            )
         }
         Event::Hook { hook, ok, detail } => {
             let done = if *ok { "done" } else { "failed" };
-            plain(entry, What::Box(Harness), format!("hook {} {done}", text(hook)), text(detail))
+            plain(
+                entry,
+                What::Box(Harness),
+                format!("hook {} {done}", text(hook)),
+                text(detail),
+            )
         }
         Event::Answer { answer, .. } => plain(entry, What::Box(Harness), "the operator answers", text(answer)),
         Event::Note { text: note } => plain(entry, What::Box(Harness), "note", text(note)),
@@ -298,7 +341,13 @@ fn packet_row(entry: &Entry, packet: &Packet, message: &impl Fn(What) -> Row) ->
     };
     let detail = match packet {
         Packet::Publish { .. } => return Some(message(way)),
-        Packet::Connect { client_id, keep_alive, clean_session, will, .. } => {
+        Packet::Connect {
+            client_id,
+            keep_alive,
+            clean_session,
+            will,
+            ..
+        } => {
             let will = will.as_ref().map_or("no last will", |_| "with a last will");
             let session = if *clean_session { "" } else { ", session kept" };
             let client = short(&line(client_id), 24).into_owned();
@@ -336,8 +385,16 @@ fn link_fault(fault: &LinkFault) -> (&'static str, String) {
         LinkFault::Cut { reset: false } => ("link cut", "in order (FIN)".to_owned()),
         LinkFault::Silence { direction } => ("link silent", way(direction).to_owned()),
         LinkFault::Delay { millis, direction } => ("link slow", format!("{millis} ms {}", way(direction))),
-        LinkFault::Drop { topic, count, direction } => ("link drops", some(topic, count, direction)),
-        LinkFault::Duplicate { topic, count, direction } => ("link doubles", some(topic, count, direction)),
+        LinkFault::Drop {
+            topic,
+            count,
+            direction,
+        } => ("link drops", some(topic, count, direction)),
+        LinkFault::Duplicate {
+            topic,
+            count,
+            direction,
+        } => ("link doubles", some(topic, count, direction)),
         LinkFault::Refuse => ("link refuses", "new connections".to_owned()),
         LinkFault::Restore => ("link restored", String::new()),
     }
@@ -362,6 +419,18 @@ fn repeats(rows: &mut [Row], row: &Row, options: &Options<'_>) -> bool {
     earlier.count += 1;
     earlier.last = row.seq;
     true
+}
+
+/// A mark is shown on the band of its step, where that is drawn.
+fn flagged(rows: &mut [Row], entry: &Entry) -> bool {
+    let Event::Mark { path } = entry.event() else {
+        return false;
+    };
+    let path = line(path);
+    let step = rows.iter_mut().rev().find(|row| row.what == What::Step);
+    step.filter(|row| row.title == path)
+        .map(|row| row.mark = true)
+        .is_some()
 }
 
 /// Keeps at most the given number of rows: those nearest to what is marked, or both ends when nothing is.
@@ -398,7 +467,10 @@ fn shorten(rows: &mut Vec<Row>, options: &Options<'_>) {
 
 fn push_gap(rows: &mut Vec<Row>, left_out: &mut usize) {
     if *left_out > 0 {
-        let title = format!("{} left out; the journal has them", crate::report::statement::many(*left_out, "row"));
+        let title = format!(
+            "{} left out; the journal has them",
+            crate::report::statement::many(*left_out, "row")
+        );
         rows.push(Row {
             seq: 0,
             time: None,
@@ -406,6 +478,7 @@ fn push_gap(rows: &mut Vec<Row>, left_out: &mut usize) {
             title,
             detail: String::new(),
             class: "",
+            mark: false,
             count: 1,
             last: 0,
             headline: String::new(),

@@ -53,6 +53,8 @@ pub struct DecisionView {
     pub clause: String,
     pub place: String,
     pub message: String,
+    /// Whether the explanation says it too.
+    pub said: bool,
     pub witness: Option<(u64, bool)>,
     pub expected: Option<String>,
     pub nearest: Option<NearestView>,
@@ -132,7 +134,12 @@ fn view(
             let steps = test
                 .steps
                 .iter()
-                .map(|step| (step.path.clone(), step.title.clone().unwrap_or_else(|| step.verb.clone())))
+                .map(|step| {
+                    (
+                        step.path.clone(),
+                        step.title.clone().unwrap_or_else(|| step.verb.clone()),
+                    )
+                })
                 .collect();
             let options = sequence::Options {
                 id: &format!("seq{}", at + 1),
@@ -157,11 +164,11 @@ fn view(
         id: test.id.clone(),
         title: test.title.clone(),
         why: source.map(|source| source.why.clone()).unwrap_or_default(),
-        reason: test
-            .not_applicable
-            .clone()
-            .or_else(|| test.reason.clone())
-            .or_else(|| finding.then(|| "the test decided nothing".to_owned()).filter(|_| test.decisions.is_empty())),
+        reason: test.not_applicable.clone().or_else(|| test.reason.clone()).or_else(|| {
+            finding
+                .then(|| "the test decided nothing".to_owned())
+                .filter(|_| test.decisions.is_empty())
+        }),
         not_applicable: verdict.is_none(),
         watchlist: test.maturity == "watchlist",
         seconds: seconds(test.seconds),
@@ -194,16 +201,25 @@ fn view(
 
 /// The records a diagram points out.
 fn marked(test: &TestResult) -> BTreeMap<u64, String> {
+    let mut worst: BTreeMap<u64, Verdict> = BTreeMap::new();
     let mut marked = BTreeMap::new();
-    for decision in test.decisions.iter().filter(|decision| decision.verdict != Verdict::Pass) {
+    for decision in findings(test) {
         if let Some(nearest) = &decision.nearest {
-            marked.entry(nearest.seq).or_insert("nearest miss".to_owned());
+            marked.insert(nearest.seq, "nearest miss".to_owned());
         }
         if let Some(witness) = decision.witness {
-            marked.insert(witness, decision.verdict.word().to_owned());
+            let entry = worst.entry(witness).or_insert(decision.verdict);
+            *entry = entry.join(decision.verdict);
         }
     }
+    marked.extend(worst.into_iter().map(|(seq, verdict)| (seq, verdict.word().to_owned())));
     marked
+}
+
+fn findings(test: &TestResult) -> impl Iterator<Item = &Decision> {
+    test.decisions
+        .iter()
+        .filter(|decision| decision.verdict != Verdict::Pass)
 }
 
 /// Asks for the messages of a test: those that decided, the nearest misses, the stimuli around them. Says what
@@ -211,23 +227,27 @@ fn marked(test: &TestResult) -> BTreeMap<u64, String> {
 fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
     let journal = gallery.journal()?;
     // The most important first, because there is a limit.
-    let mut wanted: Vec<(u64, &str, Option<&str>)> = Vec::new();
-    let mut centres = BTreeSet::new();
-    for decision in test.decisions.iter().filter(|decision| decision.verdict != Verdict::Pass) {
-        let nearest = decision.nearest.as_ref();
+    let pointed_out = marked(test);
+    let mut places: BTreeMap<u64, Vec<&str>> = BTreeMap::new();
+    for decision in findings(test) {
         if let Some(witness) = decision.witness {
-            let place = nearest.filter(|nearest| nearest.seq == witness).map(|nearest| nearest.path.as_str());
-            wanted.push((witness, decision.verdict.word(), place.or(Some(""))));
-            centres.insert(witness);
+            places.entry(witness).or_default();
         }
-        if let Some(nearest) = nearest {
-            wanted.push((nearest.seq, "nearest miss", Some(&nearest.path)));
-            centres.insert(nearest.seq);
-        }
-        if let Some(waited) = &decision.waited {
-            wanted.push((waited.since, "stimulus", None));
+        if let Some(nearest) = &decision.nearest {
+            places.entry(nearest.seq).or_default().push(&nearest.path);
         }
     }
+    for of_one in places.values_mut().filter(|places| places.is_empty()) {
+        // Nothing to mark, but the message is shown unfolded.
+        of_one.push("");
+    }
+    let mut wanted: Vec<(u64, &str)> = pointed_out.iter().map(|(seq, role)| (*seq, role.as_str())).collect();
+    let mut centres: BTreeSet<u64> = pointed_out.keys().copied().collect();
+    wanted.extend(
+        findings(test)
+            .filter_map(|finding| finding.waited.as_ref())
+            .map(|w| (w.since, "stimulus")),
+    );
     let (first, last) = test.journal?;
     let all: Vec<_> = journal
         .entries()
@@ -244,21 +264,34 @@ fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
     }
     for centre in &centres {
         let split = sent.partition_point(|seq| seq < centre);
-        wanted.extend(sent[..split].iter().rev().take(STIMULI).map(|seq| (*seq, "stimulus", None)));
-        wanted.extend(sent[split..].iter().take(1).map(|seq| (*seq, "stimulus", None)));
+        wanted.extend(sent[..split].iter().rev().take(STIMULI).map(|seq| (*seq, "stimulus")));
+        wanted.extend(sent[split..].iter().take(1).map(|seq| (*seq, "stimulus")));
     }
-    wanted.extend(test.steps.iter().filter_map(|step| step.took).map(|seq| (seq, "taken by a step", None)));
+    wanted.extend(
+        test.steps
+            .iter()
+            .filter_map(|step| step.took)
+            .map(|seq| (seq, "taken by a step")),
+    );
     let mut asked = BTreeSet::new();
-    for (seq, role, place) in wanted {
+    for (seq, role) in wanted {
         if asked.len() >= MESSAGES && !asked.contains(&seq) {
             continue;
         }
-        if gallery.show(seq, role, place) {
+        if gallery.show(seq, role, places.get(&seq).map_or(&[], Vec::as_slice)) {
             asked.insert(seq);
         }
     }
-    let messages = all.iter().filter(|entry| entry.payload().is_some()).count();
-    let shown = all.iter().filter(|entry| entry.payload().is_some() && gallery.shows(entry.seq())).count();
+    // What the tap saw of them is the same messages once more.
+    let seen_once = |event: &Event| {
+        matches!(
+            event,
+            Event::Message { .. } | Event::Sent { .. } | Event::Retained { .. }
+        )
+    };
+    let recorded = || all.iter().filter(|entry| seen_once(entry.event()));
+    let messages = recorded().count();
+    let shown = recorded().filter(|entry| gallery.shows(entry.seq())).count();
     (shown < messages).then(|| {
         format!(
             "{shown} of the {} recorded during this test; the journal has all of them.",
@@ -281,11 +314,17 @@ fn decision_view(
         pass: decision.verdict == Verdict::Pass,
         requirement: decision.requirement.clone(),
         link: anchors.requirement(&decision.requirement),
-        origin: known.map(|known| format!("{}, §{}", known.mood, known.section)).unwrap_or_default(),
+        origin: known
+            .map(|known| format!("{}, §{}", known.mood, known.section))
+            .unwrap_or_default(),
         text: known.map(|known| known.text.clone()).unwrap_or_default(),
         clause: decision.clause.clone(),
         place: decision.place.clone(),
         message: decision.message.clone(),
+        said: decision
+            .explanation
+            .as_ref()
+            .is_some_and(|text| text.contains(&decision.message)),
         witness: decision.witness.map(|seq| (seq, gallery.shows(seq))),
         expected: decision.expected.as_deref().map(|text| clean::block(text).into_owned()),
         nearest: decision.nearest.as_ref().map(|nearest| NearestView {
@@ -298,9 +337,16 @@ fn decision_view(
         }),
         waited: decision.waited.as_ref().map(|waited| {
             let came = many(usize::try_from(waited.messages).unwrap_or(usize::MAX), "message");
-            format!("{} after {}; {came} came meanwhile", seconds(waited.seconds), see(waited.since))
+            format!(
+                "{} after {}; {came} came meanwhile",
+                seconds(waited.seconds),
+                see(waited.since)
+            )
         }),
-        explanation: decision.explanation.as_deref().map(|text| clean::block(text).into_owned()),
+        explanation: decision
+            .explanation
+            .as_deref()
+            .map(|text| clean::block(text).into_owned()),
         interpretation: decision.interpretation.clone(),
         deviation: result.deviations.get(&decision.requirement).cloned(),
     }
@@ -310,7 +356,7 @@ fn source_view(source: &TestSource, test: &TestResult) -> SourceView {
     let mut notes: BTreeMap<usize, Vec<(Badge, String)>> = BTreeMap::new();
     let mut deciding = BTreeSet::new();
     let mut around = BTreeSet::new();
-    for decision in test.decisions.iter().filter(|decision| decision.verdict != Verdict::Pass) {
+    for decision in findings(test) {
         let clause = source
             .clauses
             .iter()

@@ -1,0 +1,173 @@
+//! JUnit XML: always well-formed, and never greener than the run was.
+
+use proptest::prelude::*;
+use roxmltree::{Document, Node};
+use vda5050_tck::report::junit;
+use vda5050_tck::report::result::RunResult;
+use vda5050_tck::verdict::Verdict;
+
+use crate::samples;
+
+fn count(document: &Document<'_>, name: &str) -> usize {
+    document.descendants().filter(|node| node.has_tag_name(name)).count()
+}
+
+fn case<'a>(document: &'a Document<'a>, name: &str) -> Node<'a, 'a> {
+    let mut cases = document.descendants().filter(|node| node.has_tag_name("testcase"));
+    cases.find(|node| node.attribute("name") == Some(name)).expect(name)
+}
+
+#[test]
+fn the_failing_sample_reads_as_it_should() {
+    let xml = junit::render(&samples::fail().0).expect("junit");
+    insta::assert_snapshot!("junit_fail", xml.replace("><", ">\n<"));
+    let document = Document::parse(&xml).expect("well-formed");
+    let failure = case(&document, "order/update-lower-id-refused")
+        .first_element_child()
+        .expect("failure");
+    assert!(failure.has_tag_name("failure"));
+    assert_eq!(failure.attribute("type"), Some("ORD-REJ-12"));
+    let text = failure.text().expect("text");
+    assert!(
+        text.find("fail: ORD-REJ-12") < text.find("warning: ORD-REJ-14"),
+        "the worst comes first"
+    );
+    let open = case(&document, "connection/last-will")
+        .first_element_child()
+        .expect("error");
+    assert!(open.has_tag_name("error") && open.attribute("type") == Some("inconclusive"));
+    let absent = case(&document, "order/refusal-shown")
+        .first_element_child()
+        .expect("skipped");
+    assert!(absent.has_tag_name("skipped") && absent.attribute("message") == Some("the profile has no hook trigger"));
+    let monitor = case(&document, "header/id-rises").first_element_child().expect("out");
+    assert!(monitor.has_tag_name("system-out") && monitor.text().expect("text").contains("HDR-01"));
+}
+
+#[test]
+fn the_timestamp_is_the_start_of_the_run_and_two_renderings_are_equal() {
+    let result = samples::pass().0;
+    let xml = junit::render(&result).expect("junit");
+    assert_eq!(
+        xml.matches("timestamp=\"2026-03-02T08:15:00Z\"").count(),
+        xml.matches("timestamp=").count()
+    );
+    assert_eq!(junit::render(&result).expect("junit"), xml);
+}
+
+#[test]
+fn counts_agree_with_the_result() {
+    for result in [samples::pass().0, samples::fail().0, samples::hostile().0] {
+        let xml = junit::render(&result).expect("junit");
+        let document = Document::parse(&xml).expect("well-formed");
+        let verdicts: Vec<Option<Verdict>> = result
+            .tests
+            .iter()
+            .map(|test| test.verdict)
+            .chain(result.monitors.iter().map(|monitor| monitor.verdict))
+            .collect();
+        let of = |wanted: &[Option<Verdict>]| verdicts.iter().filter(|verdict| wanted.contains(verdict)).count();
+        assert_eq!(count(&document, "testcase"), verdicts.len() + 1);
+        assert_eq!(count(&document, "failure"), of(&[Some(Verdict::Fail)]));
+        let errors = of(&[Some(Verdict::Error), Some(Verdict::Inconclusive)]) + usize::from(result.partial);
+        assert_eq!(count(&document, "error"), errors);
+        assert_eq!(count(&document, "skipped"), of(&[None]));
+        let total = |attribute: &str| -> usize {
+            let suites = document.descendants().filter(|node| node.has_tag_name("testsuite"));
+            suites
+                .map(|suite| {
+                    suite
+                        .attribute(attribute)
+                        .expect("count")
+                        .parse::<usize>()
+                        .expect("number")
+                })
+                .sum()
+        };
+        assert_eq!(total("tests"), verdicts.len() + 1);
+        assert_eq!(total("failures"), of(&[Some(Verdict::Fail)]));
+        assert_eq!(total("errors"), errors);
+    }
+}
+
+#[test]
+fn a_partial_run_an_empty_one_and_a_test_without_decision_are_not_green() {
+    let errors = |change: fn(&mut RunResult)| {
+        let mut result = samples::pass().0;
+        change(&mut result);
+        let xml = junit::render(&result).expect("junit");
+        count(&Document::parse(&xml).expect("well-formed"), "error")
+    };
+    assert_eq!(errors(|_| ()), 0);
+    assert_eq!(errors(|result| result.partial = true), 1);
+    assert_eq!(errors(|result| result.verdict = None), 1);
+    assert_eq!(errors(|result| result.tests[0].verdict = None), 1);
+}
+
+#[test]
+fn an_absurd_time_or_start_does_not_stop_the_report() {
+    let mut result = samples::pass().0;
+    for (seconds, started) in [
+        (f64::MAX, "-009999-01-01T00:00:00Z"),
+        (f64::NAN, "9999-12-30T22:00:00Z"),
+        (-5.0, "soon"),
+    ] {
+        result.tests[0].seconds = seconds;
+        started.clone_into(&mut result.started);
+        assert!(Document::parse(&junit::render(&result).expect("junit")).is_ok());
+    }
+}
+
+#[test]
+fn a_long_text_is_bounded() {
+    let mut result = samples::fail().0;
+    result.tests[0].reason = Some("x".repeat(5_000_000));
+    result.tests[0].decisions[1].explanation = Some("y\n".repeat(5_000_000));
+    assert!(junit::render(&result).expect("junit").len() < 200_000);
+}
+
+proptest! {
+    #[test]
+    fn any_string_anywhere_gives_well_formed_xml(
+        strings in prop::collection::vec(prop_oneof![any::<String>(), "[\\x00-\\x20<>&'\"\\]\\]>\\x7f-\\xa0]{0,12}", Just("]]>]]>".to_owned()), Just(samples::HOSTILE.to_owned())], 12)
+    ) {
+        let mut result = samples::fail().0;
+        let mut next = strings.iter().cycle().cloned();
+        let mut take = || next.next().unwrap_or_default();
+        result.role = take();
+        result.protocol = take();
+        result.started = take();
+        result.device.manufacturer = take();
+        result.device.serial_number = take();
+        for test in &mut result.tests {
+            test.id = take();
+            test.reason = Some(take());
+            test.not_applicable = test.not_applicable.as_ref().map(|_| take());
+            for decision in &mut test.decisions {
+                decision.requirement = take();
+                decision.message = take();
+                decision.clause = take();
+                decision.place = take();
+                decision.explanation = Some(take());
+                if let Some(nearest) = &mut decision.nearest {
+                    nearest.path = take();
+                    nearest.found = take();
+                    nearest.expected = take();
+                }
+            }
+        }
+        for monitor in &mut result.monitors {
+            monitor.id = take();
+            monitor.title = take();
+            for finding in &mut monitor.findings {
+                finding.requirement = take();
+                finding.message = take();
+            }
+        }
+        let xml = junit::render(&result).expect("junit");
+        let document = Document::parse(&xml);
+        prop_assert!(document.is_ok(), "{:?}\n{xml}", document.err());
+        prop_assert!(!xml.chars().any(|c| c.is_control() && c != '\n' && c != '\t'));
+        prop_assert_eq!(count(&document.expect("parsed"), "testcase"), 5);
+    }
+}

@@ -1,0 +1,85 @@
+//! What the terminal says, and the coverage table.
+
+use vda5050_tck::journal::Journal;
+use vda5050_tck::pack::Role;
+use vda5050_tck::report::text::{self, Bundle, Color};
+use vda5050_tck::report::{coverage, result::RunResult, sources::Sources};
+
+use crate::samples;
+
+fn whole(result: &RunResult, sources: &Sources, journal: Option<&Journal>, color: Color) -> String {
+    let tests = result
+        .tests
+        .iter()
+        .map(|test| text::test(test, sources, journal, color));
+    let monitors = result.monitors.iter().map(|monitor| text::monitor(monitor, color));
+    let bundle = Bundle {
+        report: Some("reports/Lindner-TX-0042/report.html"),
+        root: Some("9f2c"),
+    };
+    let end = text::summary(result, bundle, color);
+    tests.chain(monitors).chain(["\n".to_owned(), end]).collect()
+}
+
+#[test]
+fn a_failing_run_on_the_terminal() {
+    let (result, journal) = samples::fail();
+    insta::assert_snapshot!(
+        "text_fail",
+        whole(&result, &samples::sources(), Some(&journal), Color::Never)
+    );
+}
+
+#[test]
+fn a_passing_run_on_the_terminal() {
+    let (result, journal) = samples::pass();
+    insta::assert_snapshot!(
+        "text_pass",
+        whole(&result, &samples::sources(), Some(&journal), Color::Never)
+    );
+}
+
+#[test]
+fn colour_changes_nothing_but_colour() {
+    let (result, journal) = samples::fail();
+    let sources = samples::sources();
+    let colored = whole(&result, &sources, Some(&journal), Color::Always);
+    let plain = whole(&result, &sources, Some(&journal), Color::Never);
+    assert!(colored.contains('\u{1b}') && !plain.contains('\u{1b}'));
+    assert_eq!(console::strip_ansi_codes(&colored), plain);
+}
+
+#[test]
+fn a_device_cannot_write_control_characters_to_the_terminal() {
+    let (result, journal, sources) = samples::hostile();
+    let text = whole(&result, &sources, Some(&journal), Color::Never);
+    assert!(
+        !text.chars().any(|c| (c.is_control() && c != '\n') || c == '\u{202e}'),
+        "{text}"
+    );
+    assert!(text.contains("PARTIAL"));
+}
+
+#[test]
+fn without_journal_and_catalogue_the_block_still_says_what_is_known() {
+    let (result, _) = samples::fail();
+    let text = whole(&result, &Sources::default(), None, Color::Never);
+    assert!(
+        text.contains("closest  #") && text.contains("errors[0].errorType is \"orderError\", not \"orderUpdateError\""),
+        "{text}"
+    );
+}
+
+#[test]
+fn coverage_counts_what_decides_what_and_lists_what_nothing_decides() {
+    let sources = samples::sources();
+    let coverage = coverage::coverage(&sources, Role::Agv);
+    insta::assert_snapshot!("coverage", coverage.text());
+    assert_eq!(coverage.total().total(), sources.requirements.len());
+    let other = coverage::coverage(&sources, Role::MasterControl);
+    assert_eq!(
+        other.total().total(),
+        0,
+        "requirements of the vehicle do not concern the other side"
+    );
+}
