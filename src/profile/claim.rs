@@ -63,7 +63,10 @@ impl FromStr for Claim {
                     name: (*name).to_owned(),
                     value,
                 }),
-                Err(_) => Err((format!("`{value}` is not a whole number"), "such as `limit NAME = 10`".to_owned())),
+                Err(_) => Err((
+                    format!("`{value}` is not a whole number"),
+                    "such as `limit NAME = 10`".to_owned(),
+                )),
             },
             ["no", name] => statement(name).map(Self::NoStatement),
             [name] => statement(name).map(Self::Statement),
@@ -100,7 +103,13 @@ impl Claim {
             | (NoOptional(no), Optional(yes))
             | (Statement(yes), NoStatement(no))
             | (NoStatement(no), Statement(yes)) => yes == no,
-            (Limit { name, value }, Limit { name: other, value: second }) => name == other && value != second,
+            (
+                Limit { name, value },
+                Limit {
+                    name: other,
+                    value: second,
+                },
+            ) => name == other && value != second,
             _ => false,
         }
     }
@@ -110,7 +119,10 @@ impl std::fmt::Display for Claim {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Action { name, scope: None } => write!(f, "action {name}"),
-            Self::Action { name, scope: Some(scope) } => write!(f, "action {name} {scope}"),
+            Self::Action {
+                name,
+                scope: Some(scope),
+            } => write!(f, "action {name} {scope}"),
             Self::NoAction(name) => write!(f, "no action {name}"),
             Self::Optional(path) => write!(f, "optional {path}"),
             Self::NoOptional(path) => write!(f, "no optional {path}"),
@@ -143,7 +155,15 @@ mod tests {
 
     #[test]
     fn a_claim_that_is_none_is_refused_with_a_hint() {
-        for text in ["", "action", "action pick NODES", "line-guidet", "limit x = y", "limit x 10", "a b c"] {
+        for text in [
+            "",
+            "action",
+            "action pick NODES",
+            "line-guidet",
+            "limit x = y",
+            "limit x 10",
+            "a b c",
+        ] {
             let (_, hint) = text.parse::<Claim>().expect_err(text);
             assert!(!hint.is_empty());
         }

@@ -33,8 +33,8 @@ impl Effective {
 }
 
 /// Checks a merged layer as a whole and turns it into a profile.
-pub(super) fn effective(layer: Layer) -> Result<Effective, Vec<Diagnostic>> {
-    let taken = Taken { layer: &layer };
+pub(super) fn effective(layer: &Layer) -> Result<Effective, Vec<Diagnostic>> {
+    let taken = Taken { layer };
     let wrong = taken.contradictions();
     if !wrong.is_empty() {
         return Err(wrong);
@@ -194,7 +194,12 @@ impl Taken<'_> {
                 Some(Value::Paths(files)) => files.clone(),
                 _ => Vec::new(),
             },
-            deviations: self.layer.deviations.iter().map(|(deviation, _)| deviation.clone()).collect(),
+            deviations: self
+                .layer
+                .deviations
+                .iter()
+                .map(|(deviation, _)| deviation.clone())
+                .collect(),
             hooks: self
                 .layer
                 .hooks
@@ -228,16 +233,18 @@ impl Taken<'_> {
             value: deviation.reason.clone(),
             origin: origin.to_string(),
         }));
-        settings.extend(self.layer.hooks.iter().map(|(name, (hook, origin))| Setting {
-            name: format!("hooks.{name}"),
-            // Not the command or the address itself: those may hold what a report should not.
-            value: match hook.action {
-                HookAction::Run(_) => "run",
-                HookAction::Http { .. } => "http",
-                HookAction::Prompt(_) => "prompt",
+        settings.extend(self.layer.hooks.iter().map(|(name, (hook, origin))| {
+            Setting {
+                name: format!("hooks.{name}"),
+                // Not the command or the address itself: those may hold what a report should not.
+                value: match hook.action {
+                    HookAction::Run(_) => "run",
+                    HookAction::Http { .. } => "http",
+                    HookAction::Prompt(_) => "prompt",
+                }
+                .to_owned(),
+                origin: origin.to_string(),
             }
-            .to_owned(),
-            origin: origin.to_string(),
         }));
         settings
     }
@@ -254,17 +261,21 @@ impl Taken<'_> {
         let has = |path: &str| self.value(path).is_some();
         if let (Some((list, _)), true) = (&self.layer.list, has("layout.lif")) {
             let title = "the layout is given twice, by a LIF file and by a list";
-            wrong.push(
-                Diagnostic::new("contradiction", list.span.clone(), title, "the list").hint("keep one of them"),
-            );
+            wrong.push(Diagnostic::new("contradiction", list.span.clone(), title, "the list").hint("keep one of them"));
         }
         if has("layout.vehicle-type") && !has("layout.lif") {
             let title = "`layout.vehicle-type` belongs to a LIF file, and none is named";
-            wrong.push(self.at("layout.vehicle-type", title, "of which file?").hint("name the file with `lif`"));
+            wrong.push(
+                self.at("layout.vehicle-type", title, "of which file?")
+                    .hint("name the file with `lif`"),
+            );
         }
         if has("bench.password-env") && has("bench.password-file") {
             let title = "the password is said to be in two places";
-            wrong.push(self.at("bench.password-file", title, "and `password-env` names another").hint("keep one of them"));
+            wrong.push(
+                self.at("bench.password-file", title, "and `password-env` names another")
+                    .hint("keep one of them"),
+            );
         }
         for (one, other) in [("bench.tls-cert", "bench.tls-key"), ("bench.tls-key", "bench.tls-cert")] {
             if has(one) && !has(other) {
@@ -274,7 +285,10 @@ impl Taken<'_> {
         }
         if self.flag("bench.tap") == Some(false) && !has("bench.broker") {
             let title = "without the tap the device needs a broker of its own";
-            wrong.push(self.at("bench.tap", title, "and no broker is named").hint("name it with `broker`"));
+            wrong.push(
+                self.at("bench.tap", title, "and no broker is named")
+                    .hint("name it with `broker`"),
+            );
         }
         let time = self.time();
         if time.slow > time.react {
@@ -292,7 +306,9 @@ impl Taken<'_> {
             wrong.push(self.at("device.node-bound", title, "and `stops-between-nodes` says otherwise"));
         }
         for claim in self.claims() {
-            let (Claim::Statement(name) | Claim::NoStatement(name)) = &claim else { continue };
+            let (Claim::Statement(name) | Claim::NoStatement(name)) = &claim else {
+                continue;
+            };
             let claimed = matches!(claim, Claim::Statement(_));
             if self.flag(&format!("device.{name}")).is_some_and(|flag| flag != claimed) {
                 let title = format!("`device.claims` and `device.{name}` say the opposite of each other");
@@ -303,7 +319,10 @@ impl Taken<'_> {
         for (name, (hook, _)) in &self.layer.hooks {
             if hooks::find(name, role).is_none() {
                 let title = format!("hook `{name}` is not for a device of role `{role}`");
-                let others = hooks::HOOKS.iter().filter(|info| info.role == role).map(|info| info.name);
+                let others = hooks::HOOKS
+                    .iter()
+                    .filter(|info| info.role == role)
+                    .map(|info| info.name);
                 let diagnostic = Diagnostic::new("contradiction", hook.span.clone(), title, "for the other side");
                 wrong.push(diagnostic.hint(diagnostic::did_you_mean(name, others)));
             }

@@ -46,35 +46,95 @@ const fn master_control(name: &'static str, parameters: &'static [&'static str],
 /// Every hook there is, by role.
 pub const HOOKS: &[HookInfo] = &[
     agv("power-cycle", &[], "The vehicle was switched off hard and on again."),
-    agv("shutdown", &[], "The vehicle was shut down, or its communication ended, in good order."),
+    agv(
+        "shutdown",
+        &[],
+        "The vehicle was shut down, or its communication ended, in good order.",
+    ),
     agv("start", &[], "The vehicle was started after a shutdown."),
     agv("set-mode", &["mode"], "The operating mode was switched at the vehicle."),
     agv("drive-manually", &[], "The vehicle was driven by hand for a short way."),
-    agv("move-to", &["nodeId"], "The vehicle was brought to a node and knows where it is."),
+    agv(
+        "move-to",
+        &["nodeId"],
+        "The vehicle was brought to a node and knows where it is.",
+    ),
     agv("push-out", &[], "The vehicle was moved off the way it had been given."),
     agv("emergency-stop", &[], "An emergency stop was pressed."),
-    agv("release-emergency-stop", &[], "The emergency stop was released and acknowledged."),
-    agv("enter-field", &[], "Somebody or something entered the protective field."),
+    agv(
+        "release-emergency-stop",
+        &[],
+        "The emergency stop was released and acknowledged.",
+    ),
+    agv(
+        "enter-field",
+        &[],
+        "Somebody or something entered the protective field.",
+    ),
     agv("leave-field", &[], "The protective field was left."),
     agv("place-obstacle", &["edgeId"], "An obstacle was put on an edge."),
     agv("remove-obstacle", &["edgeId"], "The obstacle was taken away."),
-    agv("trigger", &["actionId"], "The trigger that a waiting vehicle waits for was given."),
-    agv("place-load", &["loadType"], "A load was put on the vehicle or where it picks next."),
-    agv("remove-load", &["loadType"], "The load was taken off the vehicle or from where it picks next."),
+    agv(
+        "trigger",
+        &["actionId"],
+        "The trigger that a waiting vehicle waits for was given.",
+    ),
+    agv(
+        "place-load",
+        &["loadType"],
+        "A load was put on the vehicle or where it picks next.",
+    ),
+    agv(
+        "remove-load",
+        &["loadType"],
+        "The load was taken off the vehicle or from where it picks next.",
+    ),
     agv("press-pause", &[], "The pause button at the vehicle was pressed."),
     agv("release-pause", &[], "The pause at the vehicle was ended."),
-    agv("block-pause", &[], "A pause or its end by a message was made impossible, such as by a switch."),
-    agv("unblock-pause", &[], "A pause and its end by a message were made possible again."),
-    agv("enable-map", &["mapId", "mapVersion"], "A map version was enabled at the vehicle."),
-    agv("provoke-error", &["errorLevel"], "A real fault of the vehicle was brought about."),
+    agv(
+        "block-pause",
+        &[],
+        "A pause or its end by a message was made impossible, such as by a switch.",
+    ),
+    agv(
+        "unblock-pause",
+        &[],
+        "A pause and its end by a message were made possible again.",
+    ),
+    agv(
+        "enable-map",
+        &["mapId", "mapVersion"],
+        "A map version was enabled at the vehicle.",
+    ),
+    agv(
+        "provoke-error",
+        &["errorLevel"],
+        "A real fault of the vehicle was brought about.",
+    ),
     agv("clear-error", &[], "The fault was cleared."),
-    agv("confirm", &["question"], "Somebody looked, and says yes to the question."),
-    master_control("dispatch", &["from", "to", "loadType", "action"], "A transport was ordered."),
-    master_control("reroute", &["to"], "The running transport was given another destination."),
+    agv(
+        "confirm",
+        &["question"],
+        "Somebody looked, and says yes to the question.",
+    ),
+    master_control(
+        "dispatch",
+        &["from", "to", "loadType", "action"],
+        "A transport was ordered.",
+    ),
+    master_control(
+        "reroute",
+        &["to"],
+        "The running transport was given another destination.",
+    ),
     master_control("cancel", &[], "The running transport was called off."),
     master_control("pause", &[], "The vehicle was told to pause."),
     master_control("resume", &[], "The vehicle was told to go on."),
-    master_control("instant-action", &["action"], "An instant action was sent to the vehicle."),
+    master_control(
+        "instant-action",
+        &["action"],
+        "An instant action was sent to the vehicle.",
+    ),
     master_control("request-factsheet", &[], "The factsheet of the vehicle was asked for."),
     master_control("request-state", &[], "The state of the vehicle was asked for."),
     master_control(
@@ -87,14 +147,34 @@ pub const HOOKS: &[HookInfo] = &[
         &["mapId", "mapVersion", "mapDownloadLink"],
         "The roll-out of a map version to the vehicle was begun.",
     ),
-    master_control("enable-map", &["mapId", "mapVersion"], "A map version was enabled on the vehicle."),
-    master_control("delete-map", &["mapId", "mapVersion"], "A map version was deleted from the vehicle."),
-    master_control("block-edge", &["from", "to"], "A way was closed for the vehicle in the layout."),
+    master_control(
+        "enable-map",
+        &["mapId", "mapVersion"],
+        "A map version was enabled on the vehicle.",
+    ),
+    master_control(
+        "delete-map",
+        &["mapId", "mapVersion"],
+        "A map version was deleted from the vehicle.",
+    ),
+    master_control(
+        "block-edge",
+        &["from", "to"],
+        "A way was closed for the vehicle in the layout.",
+    ),
     master_control("unblock-edge", &["from", "to"], "The way was opened again."),
-    master_control("configure", &["what"], "The master control was set up for what comes next."),
+    master_control(
+        "configure",
+        &["what"],
+        "The master control was set up for what comes next.",
+    ),
     master_control("start", &[], "The master control was started."),
     master_control("shutdown", &[], "The master control was shut down."),
-    master_control("confirm", &["question"], "Somebody looked, and says yes to the question."),
+    master_control(
+        "confirm",
+        &["question"],
+        "Somebody looked, and says yes to the question.",
+    ),
 ];
 
 /// The hook of that name for that side.
@@ -157,7 +237,9 @@ impl HookAction {
             Self::Prompt(text) => Self::Prompt(fill(text, values, verbatim)),
             Self::Http { method, url, body } => Self::Http {
                 method: method.clone(),
-                url: fill(url, values, |value| utf8_percent_encode(value, NON_ALPHANUMERIC).to_string()),
+                url: fill(url, values, |value| {
+                    utf8_percent_encode(value, NON_ALPHANUMERIC).to_string()
+                }),
                 body: body.as_ref().map(|body| {
                     let json = body.trim_start().starts_with(['{', '[']);
                     fill(body, values, if json { inside_json } else { verbatim })
@@ -172,7 +254,11 @@ impl HookAction {
         match self {
             Self::Run(arguments) => arguments.iter().map(String::as_str).collect(),
             Self::Prompt(text) => vec![text],
-            Self::Http { url, body, .. } => [Some(url), body.as_ref()].into_iter().flatten().map(String::as_str).collect(),
+            Self::Http { url, body, .. } => [Some(url), body.as_ref()]
+                .into_iter()
+                .flatten()
+                .map(String::as_str)
+                .collect(),
         }
     }
 }
@@ -226,7 +312,11 @@ mod tests {
     #[test]
     fn names_are_unique_for_a_role_and_documented() {
         for (at, hook) in HOOKS.iter().enumerate() {
-            assert!(HOOKS[at + 1..].iter().all(|other| (other.name, other.role) != (hook.name, hook.role)));
+            assert!(
+                HOOKS[at + 1..]
+                    .iter()
+                    .all(|other| (other.name, other.role) != (hook.name, hook.role))
+            );
             assert!(hook.doc.ends_with('.'), "{}", hook.name);
         }
     }
@@ -257,7 +347,10 @@ mod tests {
 
     #[test]
     fn braces_of_json_and_shell_are_no_placeholders() {
-        let names: Vec<_> = placeholders(r#"{"a": {}} ${HOME} {x} {y z} {"#).into_iter().map(|(_, name)| name).collect();
+        let names: Vec<_> = placeholders(r#"{"a": {}} ${HOME} {x} {y z} {"#)
+            .into_iter()
+            .map(|(_, name)| name)
+            .collect();
         assert_eq!(names, ["x"]);
     }
 }

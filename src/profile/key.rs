@@ -177,7 +177,11 @@ impl Kind {
             Self::Level => "a text without `/`, `+` and `#`, because it is a level of a topic".to_owned(),
             Self::Word(words) => format!(
                 "one of {}",
-                words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
+                words
+                    .iter()
+                    .map(|word| format!("\"{word}\""))
+                    .collect::<Vec<_>>()
+                    .join(", ")
             ),
             Self::Flag => "true or false".to_owned(),
             Self::Duration => format!(
@@ -191,7 +195,11 @@ impl Kind {
             Self::Broker => "an address such as \"mqtt://host:1883\" or \"mqtts://host:8883\"".to_owned(),
             Self::Template => format!(
                 "levels of a topic; the topic name is added as the last one. Placeholders: {}",
-                TEMPLATE_PLACEHOLDERS.iter().map(|name| format!("{{{name}}}")).collect::<Vec<_>>().join(" ")
+                TEMPLATE_PLACEHOLDERS
+                    .iter()
+                    .map(|name| format!("{{{name}}}"))
+                    .collect::<Vec<_>>()
+                    .join(" ")
             ),
             Self::Version => "a text such as \"1.2\" or \"1.2.3\"".to_owned(),
             Self::Command => "a list such as [\"./agv\", \"--broker\", \"{broker-host}:{broker-port}\"]".to_owned(),

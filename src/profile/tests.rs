@@ -9,7 +9,9 @@ use super::*;
 use crate::diagnostic::{Diagnostic, Source};
 
 fn fixtures(which: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/profiles").join(which);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fixtures/profiles")
+        .join(which);
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
         .expect("fixtures")
         .map(|entry| entry.expect("entry").path())
@@ -55,7 +57,10 @@ fn every_bad_profile_is_refused_at_its_place_with_a_way_out() {
         let name = file.file_stem().expect("name").to_string_lossy().into_owned();
         let expected = if name == "two-mistakes" { 2 } else { 1 };
         assert_eq!(wrong.len(), expected, "{name}: {}", shown.join("\n"));
-        assert!(wrong.iter().all(|diagnostic| diagnostic.span.is_some()), "{name} has a caret");
+        assert!(
+            wrong.iter().all(|diagnostic| diagnostic.span.is_some()),
+            "{name} has a caret"
+        );
         assert!(!shown.concat().contains("secret"), "{name} shows a password");
         insta::assert_snapshot!(name, shown.join("\n\n"));
     }
@@ -95,7 +100,11 @@ fn the_default_file_shows_every_setting_there_is() {
     let whole: toml::Table = uncommented(DEFAULT_TOML).parse().expect("TOML");
     for key in KEYS {
         let (section, name) = key.path.split_once('.').expect("section and name");
-        assert!(whole[section].get(name).is_some(), "{} is not in default.toml", key.path);
+        assert!(
+            whole[section].get(name).is_some(),
+            "{} is not in default.toml",
+            key.path
+        );
     }
 }
 
@@ -117,7 +126,12 @@ fn the_schema_for_editors_agrees_with_the_reader_about_good_profiles() {
     let validator = jsonschema::draft202012::new(&schema).expect("a schema");
     let mut texts: Vec<(String, String)> = fixtures("good")
         .into_iter()
-        .map(|file| (file.display().to_string(), std::fs::read_to_string(&file).expect("fixture")))
+        .map(|file| {
+            (
+                file.display().to_string(),
+                std::fs::read_to_string(&file).expect("fixture"),
+            )
+        })
         .collect();
     texts.push(("default.toml".to_owned(), DEFAULT_TOML.to_owned()));
     for (name, text) in texts {
@@ -147,13 +161,19 @@ fn the_schema_for_editors_refuses_what_a_schema_can_refuse() {
         "slow-after-react",
         "statements-contradict",
     ];
-    const ALSO_BEYOND: [&str; 3] = ["no-tap-no-broker", "topic-template-placeholder", "vehicle-type-of-nothing"];
+    const ALSO_BEYOND: [&str; 3] = [
+        "no-tap-no-broker",
+        "topic-template-placeholder",
+        "vehicle-type-of-nothing",
+    ];
     let schema: Value = serde_json::from_str(SCHEMA).expect("JSON");
     let validator = jsonschema::draft202012::new(&schema).expect("a schema");
     for file in fixtures("bad") {
         let name = file.file_stem().expect("name").to_string_lossy().into_owned();
         let text = std::fs::read_to_string(&file).expect("fixture");
-        let Ok(profile) = toml::from_str::<Value>(&text) else { continue };
+        let Ok(profile) = toml::from_str::<Value>(&text) else {
+            continue;
+        };
         let beyond = BEYOND_A_SCHEMA.contains(&name.as_str()) || ALSO_BEYOND.contains(&name.as_str());
         assert_eq!(validator.is_valid(&profile), beyond, "{name}");
     }
@@ -164,7 +184,11 @@ fn the_schema_for_editors_knows_the_same_names_as_the_reader() {
     let schema: Value = serde_json::from_str(SCHEMA).expect("JSON");
     let mut in_schema = Vec::new();
     for (section, rules) in schema["properties"].as_object().expect("sections") {
-        for name in rules["properties"].as_object().into_iter().flat_map(serde_json::Map::keys) {
+        for name in rules["properties"]
+            .as_object()
+            .into_iter()
+            .flat_map(serde_json::Map::keys)
+        {
             in_schema.push(format!("{section}.{name}"));
         }
     }
@@ -174,7 +198,9 @@ fn the_schema_for_editors_knows_the_same_names_as_the_reader() {
     in_reader.sort();
     assert_eq!(in_schema, in_reader);
 
-    let hooks = schema["properties"]["hooks"]["propertyNames"]["enum"].as_array().expect("names");
+    let hooks = schema["properties"]["hooks"]["propertyNames"]["enum"]
+        .as_array()
+        .expect("names");
     let mut in_schema: Vec<&str> = hooks.iter().filter_map(Value::as_str).collect();
     in_schema.sort_unstable();
     let mut in_reader: Vec<&str> = HOOKS.iter().map(|hook| hook.name).collect();
@@ -186,13 +212,22 @@ fn the_schema_for_editors_knows_the_same_names_as_the_reader() {
 #[test]
 fn every_statement_is_a_setting_of_the_device() {
     for statement in STATEMENTS {
-        assert!(Key::find(&format!("device.{}", statement.name)).is_some(), "{}", statement.name);
+        assert!(
+            Key::find(&format!("device.{}", statement.name)).is_some(),
+            "{}",
+            statement.name
+        );
     }
 }
 
 #[test]
 fn a_full_profile_arrives_whole() {
-    let text = std::fs::read_to_string(fixtures("good").iter().find(|f| f.ends_with("hall.toml")).expect("hall"));
+    let text = std::fs::read_to_string(
+        fixtures("good")
+            .iter()
+            .find(|f| f.ends_with("hall.toml"))
+            .expect("hall"),
+    );
     let effective = check_text(&text.expect("fixture")).expect("good");
     let profile = &effective.profile;
     assert_eq!(profile.device.serial_number.as_deref(), Some("carrier_07"));
@@ -210,9 +245,14 @@ fn a_full_profile_arrives_whole() {
     assert_eq!(vehicle_type.as_deref(), Some("ACME.Carrier"));
     let cycle = &profile.hooks["power-cycle"];
     assert_eq!(cycle.timeout, std::time::Duration::from_secs(120));
-    let words = ["./power", "--device", "{serial-number}", "cycle"].map(String::from).to_vec();
+    let words = ["./power", "--device", "{serial-number}", "cycle"]
+        .map(String::from)
+        .to_vec();
     assert_eq!(cycle.action, HookAction::Run(words));
-    assert_eq!(profile.hooks["emergency-stop"].timeout, std::time::Duration::from_secs(600));
+    assert_eq!(
+        profile.hooks["emergency-stop"].timeout,
+        std::time::Duration::from_secs(600)
+    );
     assert_eq!(setting(&effective, "hooks.set-mode"), Some(("http", "device.toml")));
     assert_eq!(setting(&effective, "time.react"), Some(("10 s", "device.toml")));
     assert_eq!(setting(&effective, "time.slow"), Some(("5 s", "default")));
@@ -284,10 +324,16 @@ fn flag_beats_environment_beats_profile_beats_project_beats_user_beats_default()
 
     let variable = ("VDA5050_TCK_BENCH_LISTEN".to_owned(), "e:1".to_owned());
     site.surroundings.environment.extend([variable]);
-    assert_eq!(listen(&site, Some(&profile), &[]), ("e:1".to_owned(), "environment".to_owned()));
+    assert_eq!(
+        listen(&site, Some(&profile), &[]),
+        ("e:1".to_owned(), "environment".to_owned())
+    );
 
     let flags = [("bench.listen", "f:1".to_owned())];
-    assert_eq!(listen(&site, Some(&profile), &flags), ("f:1".to_owned(), "flag".to_owned()));
+    assert_eq!(
+        listen(&site, Some(&profile), &flags),
+        ("f:1".to_owned(), "flag".to_owned())
+    );
 }
 
 #[test]
@@ -303,7 +349,10 @@ fn the_other_way_of_saying_a_thing_is_replaced_by_the_layer_above() {
     );
     let effective = load(Some(&profile), &[], &site.surroundings).expect("no contradiction");
     assert!(matches!(effective.profile.layout.source, LayoutSource::List(_)));
-    assert_eq!(effective.profile.bench.password, PasswordSource::Environment("P".to_owned()));
+    assert_eq!(
+        effective.profile.bench.password,
+        PasswordSource::Environment("P".to_owned())
+    );
 }
 
 #[test]
@@ -313,8 +362,13 @@ fn hooks_and_deviations_of_two_layers_add_up() {
         "project/vda5050-tck.toml",
         "[deviations]\nMQTT-04 = \"old\"\n[hooks.start]\nprompt = \"start it\"\n",
     );
-    let profile = site.write("device.toml", "[deviations]\nMQTT-04 = \"new\"\n[hooks.shutdown]\nprompt = \"stop it\"\n");
-    let profile = load(Some(&profile), &[], &site.surroundings).expect("effective").profile;
+    let profile = site.write(
+        "device.toml",
+        "[deviations]\nMQTT-04 = \"new\"\n[hooks.shutdown]\nprompt = \"stop it\"\n",
+    );
+    let profile = load(Some(&profile), &[], &site.surroundings)
+        .expect("effective")
+        .profile;
     assert_eq!(profile.hooks.keys().collect::<Vec<_>>(), ["shutdown", "start"]);
     assert_eq!(profile.deviations.len(), 1);
     assert_eq!(profile.deviations[0].reason, "new");
@@ -326,7 +380,19 @@ fn a_variable_that_sets_nothing_is_refused_with_the_one_that_was_meant() {
     let variable = ("VDA5050_TCK_BENCH_LISTN".to_owned(), "e:1".to_owned());
     site.surroundings.environment.extend([variable]);
     let wrong = load(None, &[], &site.surroundings).expect_err("a slip");
-    assert_eq!(wrong[0].hint.as_deref(), Some("did you mean `VDA5050_TCK_BENCH_LISTEN`?"));
+    assert_eq!(
+        wrong[0].hint.as_deref(),
+        Some("did you mean `VDA5050_TCK_BENCH_LISTEN`?")
+    );
+}
+
+#[test]
+fn a_variable_set_to_nothing_is_not_set() {
+    let mut site = Site::new();
+    let variable = ("VDA5050_TCK_DEVICE_MANUFACTURER".to_owned(), String::new());
+    site.surroundings.environment.extend([variable]);
+    let effective = load(None, &[], &site.surroundings).expect("effective");
+    assert_eq!(effective.profile.device.manufacturer, None);
 }
 
 #[test]
@@ -334,7 +400,10 @@ fn a_bad_flag_and_a_missing_profile_are_both_named() {
     let site = Site::new();
     let flags = [("bench.broker", "mqtt://me:secret@host".to_owned())];
     let wrong = load(Some(Path::new("/nowhere/device.toml")), &flags, &site.surroundings).expect_err("two mistakes");
-    assert_eq!(wrong.iter().map(|diagnostic| diagnostic.code).collect::<Vec<_>>(), ["credentials", "unreadable"]);
+    assert_eq!(
+        wrong.iter().map(|diagnostic| diagnostic.code).collect::<Vec<_>>(),
+        ["credentials", "unreadable"]
+    );
     assert!(!format!("{wrong:?}").contains("secret"));
 }
 
@@ -345,11 +414,16 @@ fn passwords_come_from_environment_or_file_and_are_never_shown() {
     assert_eq!(secret(&PasswordSource::Usual, &site).expect("none needed"), None);
     let named = PasswordSource::Environment("PLANT".to_owned());
     assert!(matches!(secret(&named, &site), Err(PasswordError::NotSet(_))));
-    site.surroundings.environment.insert("PLANT".to_owned(), "hush".to_owned());
+    site.surroundings
+        .environment
+        .insert("PLANT".to_owned(), "hush".to_owned());
     let password = secret(&named, &site).expect("set").expect("there");
     assert_eq!(password.reveal(), "hush");
     assert!(!format!("{password:?}").contains("hush"));
     let file = PasswordSource::File(site.write("password", "two words\n"));
-    assert_eq!(secret(&file, &site).expect("readable").expect("there").reveal(), "two words");
+    assert_eq!(
+        secret(&file, &site).expect("readable").expect("there").reveal(),
+        "two words"
+    );
     assert!(secret(&PasswordSource::File("/nowhere".into()), &site).is_err());
 }

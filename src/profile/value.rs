@@ -123,9 +123,8 @@ impl Value {
                 None => Ok(Self::Text(text.to_owned())),
             },
             Kind::Word(words) if words.contains(&text) => Ok(Self::Text(text.to_owned())),
-            Kind::Word(words) => {
-                Err(Refusal::bad("not one of the words allowed here").hint(diagnostic::did_you_mean(text, words.iter().copied())))
-            }
+            Kind::Word(words) => Err(Refusal::bad("not one of the words allowed here")
+                .hint(diagnostic::did_you_mean(text, words.iter().copied()))),
             Kind::Flag => text
                 .parse()
                 .map(Self::Flag)
@@ -152,7 +151,10 @@ impl Value {
     }
 
     fn from_list(kind: Kind, items: Vec<String>, folder: &Path) -> Result<Self, Refusal> {
-        if let Some(at) = items.iter().position(|item| item.trim().is_empty() && kind != Kind::Command) {
+        if let Some(at) = items
+            .iter()
+            .position(|item| item.trim().is_empty() && kind != Kind::Command)
+        {
             return Err(Refusal::bad("nothing stands here").at(at));
         }
         match kind {
@@ -213,7 +215,10 @@ impl Value {
 
 /// Refuses `{name}` that stands for nothing.
 pub(super) fn unknown_placeholder(text: &str, known: &[&str]) -> Result<(), Refusal> {
-    match hooks::placeholders(text).into_iter().find(|(_, name)| !known.contains(name)) {
+    match hooks::placeholders(text)
+        .into_iter()
+        .find(|(_, name)| !known.contains(name))
+    {
         Some((_, name)) => Err(Refusal {
             code: "unknown-placeholder",
             ..Refusal::bad(format!("`{{{name}}}` stands for nothing here"))
@@ -259,7 +264,11 @@ fn broker(text: &str) -> Result<Value, Refusal> {
     }
     let place = rest.strip_suffix('/').unwrap_or(rest);
     let has_port = place.rsplit_once(':').is_some_and(|(_, port)| !port.ends_with(']'));
-    let with_port = if has_port { place.to_owned() } else { format!("{place}:1") };
+    let with_port = if has_port {
+        place.to_owned()
+    } else {
+        format!("{place}:1")
+    };
     address(&with_port).map_err(|label| expected(&label))?;
     Ok(Value::Text(text.to_owned()))
 }
@@ -300,7 +309,9 @@ mod tests {
         assert_eq!(
             read(Kind::Command, "./agv --name 'my agv' {broker-port}; rm"),
             Ok(Value::Texts(
-                ["./agv", "--name", "my agv", "{broker-port};", "rm"].map(String::from).into()
+                ["./agv", "--name", "my agv", "{broker-port};", "rm"]
+                    .map(String::from)
+                    .into()
             ))
         );
         assert!(read(Kind::Command, "./agv 'open").is_err());
@@ -318,16 +329,28 @@ mod tests {
 
     #[test]
     fn a_broker_address_never_holds_credentials() {
-        for good in ["mqtt://host", "mqtts://host:8883", "mqtt://[::1]:1883", "mqtt://[::1]", "mqtt://host:1/"] {
+        for good in [
+            "mqtt://host",
+            "mqtts://host:8883",
+            "mqtt://[::1]:1883",
+            "mqtt://[::1]",
+            "mqtt://host:1/",
+        ] {
             assert!(read(Kind::Broker, good).is_ok(), "{good}");
         }
-        assert_eq!(read(Kind::Broker, "mqtt://me:secret@host").map_err(|r| r.code), Err("credentials"));
+        assert_eq!(
+            read(Kind::Broker, "mqtt://me:secret@host").map_err(|r| r.code),
+            Err("credentials")
+        );
         assert!(read(Kind::Broker, "http://host:80").is_err() && read(Kind::Broker, "mqtt://").is_err());
     }
 
     #[test]
     fn lists_of_an_environment_variable_are_separated_by_commas() {
-        assert_eq!(read(Kind::Names, "n1, n2"), Ok(Value::Texts(vec!["n1".into(), "n2".into()])));
+        assert_eq!(
+            read(Kind::Names, "n1, n2"),
+            Ok(Value::Texts(vec!["n1".into(), "n2".into()]))
+        );
         assert_eq!(read(Kind::Names, "n1,,n2").map_err(|r| r.element), Err(Some(1)));
         assert_eq!(read(Kind::Names, "n1,n1").map_err(|r| r.element), Err(Some(1)));
     }

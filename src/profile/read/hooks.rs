@@ -25,13 +25,22 @@ impl Reader<'_> {
         };
         let ways: Vec<&str> = members.keys().copied().filter(|way| *way != "timeout").collect();
         let [way] = ways.as_slice() else {
-            let title = format!("{what} has {}", if ways.is_empty() { "no way to be done" } else { "more than one way to be done" });
+            let title = format!(
+                "{what} has {}",
+                if ways.is_empty() {
+                    "no way to be done"
+                } else {
+                    "more than one way to be done"
+                }
+            );
             let hint = "give exactly one of `run`, `http` and `prompt`".to_owned();
             self.complain("contradiction", name.span(), &title, &ways.join(" and "), Some(hint));
             return;
         };
         let Some(way_value) = members.get(way) else { return };
-        let Some(action) = self.action(id, way, way_value) else { return };
+        let Some(action) = self.action(id, way, way_value) else {
+            return;
+        };
         let mut timeout = action.default_timeout();
         if let Some(written) = members.get("timeout") {
             match Value::from_toml(Kind::Duration, written.get_ref(), self.folder) {
@@ -85,7 +94,13 @@ impl Reader<'_> {
             }
         };
         if words.is_empty() {
-            self.complain("bad-value", value.span(), &format!("{what} names no program"), "no program", None);
+            self.complain(
+                "bad-value",
+                value.span(),
+                &format!("{what} names no program"),
+                "no program",
+                None,
+            );
             return None;
         }
         Some(words)
@@ -98,7 +113,13 @@ impl Reader<'_> {
         let url = self.text(&format!("the url in {what}"), url_value)?;
         if !url.starts_with("http://") && !url.starts_with("https://") {
             let hint = "such as \"http://192.168.1.30/mode\"".to_owned();
-            self.complain("bad-value", url_value.span(), &format!("{what} has no web address"), "neither http:// nor https://", Some(hint));
+            self.complain(
+                "bad-value",
+                url_value.span(),
+                &format!("{what} has no web address"),
+                "neither http:// nor https://",
+                Some(hint),
+            );
             return None;
         }
         let body = match members.get("body") {
@@ -110,7 +131,13 @@ impl Reader<'_> {
                 let text = self.text(&format!("the method in {what}"), method)?;
                 if !METHODS.contains(&text.as_str()) {
                     let hint = diagnostic::did_you_mean(&text, METHODS);
-                    self.complain("bad-value", method.span(), &format!("{what} has no method `{text}`"), "not a method", Some(hint));
+                    self.complain(
+                        "bad-value",
+                        method.span(),
+                        &format!("{what} has no method `{text}`"),
+                        "not a method",
+                        Some(hint),
+                    );
                     return None;
                 }
                 text

@@ -15,10 +15,22 @@ impl Reader<'_> {
         let members = self.members("a node", item, &KNOWN, &["id", "x", "y", "map"])?;
         let id = self.text("the id of a node", members.get("id")?);
         let map_id = self.text("the map of a node", members.get("map")?);
-        let x = self.number("x of a node", members.get("x")?, METRES, "metres, at most 10 km from the origin");
-        let y = self.number("y of a node", members.get("y")?, METRES, "metres, at most 10 km from the origin");
+        let x = self.number(
+            "x of a node",
+            members.get("x")?,
+            METRES,
+            "metres, at most 10 km from the origin",
+        );
+        let y = self.number(
+            "y of a node",
+            members.get("y")?,
+            METRES,
+            "metres, at most 10 km from the origin",
+        );
         let mut optional = |name: &str, limits, expected: &str| match members.get(name) {
-            Some(value) => self.number(&format!("{name} of a node"), value, limits, expected).map(Some),
+            Some(value) => self
+                .number(&format!("{name} of a node"), value, limits, expected)
+                .map(Some),
             None => Some(None),
         };
         let theta = optional("theta", TURN, "radians from -π to π");
@@ -55,13 +67,23 @@ impl Reader<'_> {
         for (at, node) in list.nodes.iter().enumerate() {
             if ids[..at].contains(&node.id.as_str()) {
                 let title = format!("there are two nodes `{}`", node.id);
-                wrong.push(Diagnostic::new("duplicate-node", node.span.clone(), title, "the second one"));
+                wrong.push(Diagnostic::new(
+                    "duplicate-node",
+                    node.span.clone(),
+                    title,
+                    "the second one",
+                ));
             }
         }
         for (at, edge) in list.edges.iter().enumerate() {
             if list.edges[..at].iter().any(|other| other.id == edge.id) {
                 let title = format!("there are two edges `{}`", edge.id);
-                wrong.push(Diagnostic::new("duplicate-edge", edge.span.clone(), title, "the second one"));
+                wrong.push(Diagnostic::new(
+                    "duplicate-edge",
+                    edge.span.clone(),
+                    title,
+                    "the second one",
+                ));
             }
             for end in [&edge.start, &edge.end] {
                 if !ids.contains(&end.as_str()) {

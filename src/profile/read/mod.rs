@@ -119,7 +119,12 @@ impl Reader<'_> {
         for (name, value) in document {
             let section = name.get_ref().as_ref();
             if !SECTIONS.contains(&section) {
-                self.unknown_key(name.span(), &format!("there is no section `{section}`"), section, &SECTIONS);
+                self.unknown_key(
+                    name.span(),
+                    &format!("there is no section `{section}`"),
+                    section,
+                    &SECTIONS,
+                );
                 continue;
             }
             let Some(table) = self.table(&format!("`[{section}]`"), value) else {
@@ -206,10 +211,19 @@ impl Reader<'_> {
             if known.contains(&name.get_ref().as_ref()) {
                 members.insert(name.get_ref().as_ref(), value);
             } else {
-                self.unknown_key(name.span(), &format!("{what} has no `{}`", name.get_ref()), name.get_ref(), known);
+                self.unknown_key(
+                    name.span(),
+                    &format!("{what} has no `{}`", name.get_ref()),
+                    name.get_ref(),
+                    known,
+                );
             }
         }
-        let missing: Vec<&str> = required.iter().copied().filter(|name| !members.contains_key(name)).collect();
+        let missing: Vec<&str> = required
+            .iter()
+            .copied()
+            .filter(|name| !members.contains_key(name))
+            .collect();
         if missing.is_empty() {
             return Some(members);
         }
@@ -257,7 +271,9 @@ impl Reader<'_> {
         let id = name.get_ref().as_ref();
         let is_id = id.rsplit_once('-').is_some_and(|(group, number)| {
             group.starts_with(|c: char| c.is_ascii_uppercase())
-                && group.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '-')
+                && group
+                    .chars()
+                    .all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '-')
                 && number.len() >= 2
                 && number.chars().all(|c| c.is_ascii_digit())
         });
