@@ -33,7 +33,11 @@ impl Layout {
                     x: *x,
                     y: *y,
                     nearest: match nearest {
-                        Some(node) => format!("the nearest node, {:?}, is {:.2} m away", node.id, node.distance(*x, *y)),
+                        Some(node) => format!(
+                            "the nearest node, {:?}, is {:.2} m away",
+                            node.id,
+                            node.distance(*x, *y)
+                        ),
                         None => "the layout has no node on that map".to_owned(),
                     },
                 })
@@ -79,13 +83,13 @@ impl Layout {
         if need.nodes.iter().any(|name| name == FAR) && !course.nodes.contains_key(FAR) {
             course.nodes.insert(FAR.to_owned(), graph.far(places)?.clone());
         }
-        let named: Vec<(String, String)> = course
+        let ids: Vec<(String, String)> = course
             .nodes
             .iter()
             .map(|(name, node)| (name.clone(), node.id.clone()))
             .collect();
-        for (from, start) in &named {
-            for (to, end) in &named {
+        for (from, start) in &ids {
+            for (to, end) in &ids {
                 if let Some(edge) = self.edge(start, end) {
                     course.edges.insert((from.clone(), to.clone()), edge.clone());
                 }
@@ -100,7 +104,13 @@ impl Layout {
 fn names_of(need: &CourseNeed) -> Vec<&str> {
     let in_edges = need.edges.iter().flat_map(|(from, to)| [from.as_str(), to.as_str()]);
     let mut names = vec![HERE];
-    for name in need.nodes.iter().map(String::as_str).filter(|name| *name != FAR).chain(in_edges) {
+    for name in need
+        .nodes
+        .iter()
+        .map(String::as_str)
+        .filter(|name| *name != FAR)
+        .chain(in_edges)
+    {
         if !names.contains(&name) {
             names.push(name);
         }
@@ -135,7 +145,11 @@ impl<'a> Graph<'a> {
         if let Some(map) = nodes.first().map(|node| node.map_id.as_str()) {
             nodes.retain(|node| node.map_id == map);
         }
-        let numbers: BTreeMap<&str, usize> = nodes.iter().enumerate().map(|(at, node)| (node.id.as_str(), at)).collect();
+        let numbers: BTreeMap<&str, usize> = nodes
+            .iter()
+            .enumerate()
+            .map(|(at, node)| (node.id.as_str(), at))
+            .collect();
         let mut ways = vec![BTreeMap::new(); nodes.len()];
         let mut back = vec![Vec::new(); nodes.len()];
         for edge in layout.edges() {
@@ -190,7 +204,11 @@ impl<'g, 'a> Search<'g, 'a> {
             let (Some(from), Some(to)) = (number(from), number(to)) else {
                 continue;
             };
-            let join = if from < to { (to, (from, true)) } else { (from, (to, false)) };
+            let join = if from < to {
+                (to, (from, true))
+            } else {
+                (from, (to, false))
+            };
             if !joins[join.0].contains(&join.1) {
                 joins[join.0].push(join.1);
             }
@@ -225,7 +243,10 @@ impl<'g, 'a> Search<'g, 'a> {
             return;
         }
         let mut candidates: Vec<(f64, usize)> = match self.joins[name].iter().find(|(_, forth)| *forth) {
-            Some((earlier, _)) => self.graph.ways[self.places[*earlier]].keys().copied().collect::<Vec<_>>(),
+            Some((earlier, _)) => self.graph.ways[self.places[*earlier]]
+                .keys()
+                .copied()
+                .collect::<Vec<_>>(),
             None => (0..self.graph.nodes.len()).collect(),
         }
         .into_iter()

@@ -144,7 +144,9 @@ impl Layout {
             }
             let ends = (edge.start.clone(), edge.end.clone());
             if layout.edges.contains_key(&ends) {
-                layout.left_out.push(format!("edge {} is parallel to another one", edge.id));
+                layout
+                    .left_out
+                    .push(format!("edge {} is parallel to another one", edge.id));
                 continue;
             }
             layout.edges.insert(ends, edge);

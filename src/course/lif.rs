@@ -15,6 +15,9 @@ use crate::diagnostic::{self, Diagnostic, Source, Span};
 /// No floor is larger than this from its origin, in metres; beyond it, the file is in other units.
 const LARGEST: f64 = 10_000.0;
 
+/// A file in the wrong unit has one mistake per node; nobody reads more of them than this.
+const MOST_MISTAKES: usize = 20;
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct File {
@@ -105,14 +108,21 @@ impl Layout {
     /// [`Layout::left_out`] tells.
     ///
     /// # Errors
-    /// Every mistake that could be found, naming the node or edge.
+    /// The first mistakes, each naming its node or edge.
     pub fn from_lif(source: &Arc<Source>, vehicle_type: Option<&str>) -> Result<Self, Vec<Diagnostic>> {
         let file: File = serde_json::from_str(&source.text).map_err(|error| {
             let at = offset(&source.text, error.line(), error.column());
             let message = error.to_string();
-            let label = message.rsplit_once(" at line ").map_or(message.as_str(), |(label, _)| label);
+            let label = message
+                .rsplit_once(" at line ")
+                .map_or(message.as_str(), |(label, _)| label);
             let span = Span::new(source, at.saturating_sub(1), at);
-            vec![Diagnostic::new("lif", span, "this is not a layout in the format LIF 1.0", label)]
+            vec![Diagnostic::new(
+                "lif",
+                span,
+                "this is not a layout in the format LIF 1.0",
+                label,
+            )]
         })?;
         let vehicle_type = choose_type(source, &file, vehicle_type)?;
         let mut reader = Reader {
@@ -128,6 +138,7 @@ impl Layout {
             reader.layout(layout);
         }
         if !reader.wrong.is_empty() {
+            reader.wrong.truncate(MOST_MISTAKES);
             return Err(reader.wrong);
         }
         Ok(Self::assemble(reader.nodes, reader.edges, reader.left_out))
@@ -136,7 +147,11 @@ impl Layout {
 
 /// Byte offset of a line and a column, both counted from 1.
 fn offset(text: &str, line: usize, column: usize) -> usize {
-    let before: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+    let before: usize = text
+        .split_inclusive('\n')
+        .take(line.saturating_sub(1))
+        .map(str::len)
+        .sum();
     (before + column).min(text.len())
 }
 
@@ -216,7 +231,10 @@ impl Reader<'_> {
             for end in [&edge.start_node_id, &edge.end_node_id] {
                 if !seen.contains(end.as_str()) {
                     let title = format!("edge `{}` touches `{end}`, which is not a node", edge.edge_id);
-                    let hint = diagnostic::did_you_mean(end, seen.iter().copied());
+                    let hint = match diagnostic::closest(end, seen.iter().copied()) {
+                        Some(close) => format!("did you mean `{close}`?"),
+                        None => "an edge joins two nodes of the same file".to_owned(),
+                    };
                     self.complain("edgeId", &edge.edge_id, title, "this edge", &hint);
                 }
             }
@@ -256,11 +274,23 @@ impl Reader<'_> {
         }
         if let Some(theta) = properties.theta.filter(|theta| !is_angle(*theta)) {
             let title = format!("theta of node `{id}` is {theta}");
-            self.complain("nodeId", id, title, "not an angle from -π to π", "angles are in radians");
+            self.complain(
+                "nodeId",
+                id,
+                title,
+                "not an angle from -π to π",
+                "angles are in radians",
+            );
         }
         let Some(map_id) = node.map_id.clone() else {
             let title = format!("node `{id}` has no `mapId`");
-            self.complain("nodeId", id, title, "on which map?", "the text of LIF 1.0 demands it, though its schema does not");
+            self.complain(
+                "nodeId",
+                id,
+                title,
+                "on which map?",
+                "the text of LIF 1.0 demands it, though its schema does not",
+            );
             return;
         };
         self.nodes.push(Node {
@@ -300,17 +330,35 @@ impl Reader<'_> {
         ] {
             if let Some(speed) = speed.filter(|speed| *speed <= 0.0) {
                 let title = format!("{name} of edge `{id}` is {speed}");
-                self.complain("edgeId", id, title, "nothing moves at this speed", "leave it out for no limit");
+                self.complain(
+                    "edgeId",
+                    id,
+                    title,
+                    "nothing moves at this speed",
+                    "leave it out for no limit",
+                );
             }
         }
         if let Some(speed) = properties.max_speed.filter(|speed| *speed > 50.0) {
             let title = format!("maxSpeed of edge `{id}` is {speed}");
-            self.complain("edgeId", id, title, "faster than any vehicle", "speeds are in metres per second");
+            self.complain(
+                "edgeId",
+                id,
+                title,
+                "faster than any vehicle",
+                "speeds are in metres per second",
+            );
         }
         // LIF has this in degrees in the example everybody copies, and in radians in its text.
         if let Some(angle) = properties.vehicle_orientation.filter(|angle| !is_angle(*angle)) {
             let title = format!("vehicleOrientation of edge `{id}` is {angle}");
-            self.complain("edgeId", id, title, "not an angle from -π to π", "angles are in radians");
+            self.complain(
+                "edgeId",
+                id,
+                title,
+                "not an angle from -π to π",
+                "angles are in radians",
+            );
         }
         self.edges.push(Edge {
             id: id.clone(),

@@ -16,6 +16,9 @@ use serde_json::{Map, Value};
 
 pub use layout::{BUILT_IN_MAP, Edge, Layout, Node};
 
+use crate::diagnostic::{Diagnostic, Source};
+use crate::profile::{LayoutSource, Profile};
+
 /// What a test asks of the course.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CourseNeed {
@@ -23,6 +26,42 @@ pub struct CourseNeed {
     pub nodes: Vec<String>,
     /// Pairs of names that must be joined by an edge.
     pub edges: Vec<(String, String)>,
+}
+
+impl Layout {
+    /// The layout a profile describes, within its allow-list and its speed cap; `None` when it describes none.
+    /// Reads the LIF file, if one is named.
+    ///
+    /// # Errors
+    /// What is wrong with the file or the allow-list.
+    pub fn of_profile(profile: &Profile) -> Result<Option<Self>, Vec<Diagnostic>> {
+        let mut layout = match &profile.layout.source {
+            LayoutSource::None => return Ok(None),
+            LayoutSource::List(list) => Self::from_list(list),
+            LayoutSource::Lif { file, vehicle_type } => {
+                let name = file.display().to_string();
+                let text = std::fs::read_to_string(file).map_err(|error| {
+                    vec![Diagnostic::whole(
+                        "unreadable",
+                        format!("the layout {name} cannot be read: {error}"),
+                    )]
+                })?;
+                Self::from_lif(&Source::new(name, text), vehicle_type.as_deref())?
+            }
+        };
+        if let Some(allowed) = &profile.layout.allow_list {
+            layout = layout.only(allowed).map_err(|error| {
+                vec![Diagnostic::whole(
+                    "unknown-node",
+                    format!("`layout.allow-list`: {error}"),
+                )]
+            })?;
+        }
+        Ok(Some(match profile.motion.max_speed {
+            Some(cap) => layout.slower_than(cap),
+            None => layout,
+        }))
+    }
 }
 
 /// The name of the node where the vehicle stands.
@@ -81,7 +120,9 @@ pub enum CourseError {
         edges: String,
     },
     /// The search was given up.
-    #[error("the layout is too big to say whether it has a course as the test asks; name a few nodes in `layout.allow-list`")]
+    #[error(
+        "the layout is too big to say whether it has a course as the test asks; name a few nodes in `layout.allow-list`"
+    )]
     GivenUp,
 }
 

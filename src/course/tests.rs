@@ -9,7 +9,9 @@ use super::*;
 use crate::diagnostic::{Diagnostic, Source};
 
 fn fixture(name: &str) -> Arc<Source> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/layouts").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fixtures/layouts")
+        .join(name);
     Source::new(name, std::fs::read_to_string(path).expect("fixture"))
 }
 
@@ -31,7 +33,8 @@ fn need(text: &str) -> CourseNeed {
                 need.nodes.push(name.clone());
             }
         }
-        need.edges.extend(names.windows(2).map(|pair| (pair[0].clone(), pair[1].clone())));
+        need.edges
+            .extend(names.windows(2).map(|pair| (pair[0].clone(), pair[1].clone())));
     }
     need
 }
@@ -59,9 +62,27 @@ fn assert_satisfies(course: &Course, need: &CourseNeed, layout: &Layout, start: 
 fn every_node_of_the_built_in_floor_can_start_every_usual_course() {
     let layout = Layout::built_in();
     let needs = [
-        "a", "a b", "a far", "a-b", "a-b-a", "a-b-c", "a-b-c-d", "a-b-c-d-e", "a-b-c-d-e-f", "a-b-c-d-e-f far",
-        "a-b-c-a", "a-b-c-d-a", "a-b-c-d-e-a", "a-b-c-d-e-f-a", "a-b-c-d-e-d-c-b-a", "a-b-c b-d", "a-b-c b-d-e",
-        "a-b a-c a-d", "a-b-c-a a-d-b", "b-a c-a", "a-b c-d far",
+        "a",
+        "a b",
+        "a far",
+        "a-b",
+        "a-b-a",
+        "a-b-c",
+        "a-b-c-d",
+        "a-b-c-d-e",
+        "a-b-c-d-e-f",
+        "a-b-c-d-e-f far",
+        "a-b-c-a",
+        "a-b-c-d-a",
+        "a-b-c-d-e-a",
+        "a-b-c-d-e-f-a",
+        "a-b-c-d-e-d-c-b-a",
+        "a-b-c b-d",
+        "a-b-c b-d-e",
+        "a-b a-c a-d",
+        "a-b-c-a a-d-b",
+        "b-a c-a",
+        "a-b c-d far",
     ];
     for node in layout.nodes() {
         for text in needs {
@@ -116,14 +137,20 @@ fn a_layout_gives_its_vehicle_type_what_it_may_drive_on() {
 fn a_course_goes_round_stations_where_it_can() {
     let course = hall().assign(&need("a-b"), &on("H3")).expect("a course");
     assert_ne!(course.node("b").map(|node| node.id.as_str()), Some("P1"));
-    let course = hall().assign(&need("a-b a-c a-d"), &on("H3")).expect("a course that needs the station");
+    let course = hall()
+        .assign(&need("a-b a-c a-d"), &on("H3"))
+        .expect("a course that needs the station");
     assert_eq!(course.node("d").map(|node| node.id.as_str()), Some("P1"));
 }
 
 #[test]
 fn a_course_from_which_there_is_a_way_back_is_preferred() {
     let course = one_way_loop().assign(&need("a-b"), &on("L1")).expect("a course");
-    assert_eq!(course.node("b").map(|node| node.id.as_str()), Some("L2"), "E1 is nearer, but a dead end");
+    assert_eq!(
+        course.node("b").map(|node| node.id.as_str()),
+        Some("L2"),
+        "E1 is nearer, but a dead end"
+    );
     let course = one_way_loop().assign(&need("a-b a-c"), &on("L1")).expect("a course");
     assert_eq!(course.node("c").map(|node| node.id.as_str()), Some("L2"));
 }
@@ -139,7 +166,10 @@ fn what_the_floor_cannot_give_is_said() {
     );
     assert!(layout.assign(&need("a-b"), &on("E1")).is_err(), "a dead end");
     assert!(layout.assign(&need("a-a"), &on("L1")).is_err());
-    let hint = layout.assign(&need("a"), &on("L11")).expect_err("no such node").to_string();
+    let hint = layout
+        .assign(&need("a"), &on("L11"))
+        .expect_err("no such node")
+        .to_string();
     assert!(hint.contains("did you mean"), "{hint}");
 }
 
@@ -154,7 +184,11 @@ fn a_far_node_that_is_not_there_is_no_course() {
 fn a_vehicle_near_a_node_stands_on_it() {
     let layout = hall();
     let at = |map: &str, x: f64, y: f64| {
-        let standing = Standing::Pose { map: map.to_owned(), x, y };
+        let standing = Standing::Pose {
+            map: map.to_owned(),
+            x,
+            y,
+        };
         layout.standing(&standing).map(|node| node.id.clone())
     };
     assert_eq!(at("hall", 3.1, 0.3), Ok("H2".to_owned()));
@@ -172,11 +206,17 @@ fn a_course_stays_on_the_map_where_the_vehicle_stands() {
 
 #[test]
 fn an_allow_list_and_a_speed_cap_restrict_the_layout() {
-    let layout = hall().only(&["H1".into(), "H2".into(), "H3".into()]).expect("nodes").slower_than(0.5);
+    let layout = hall()
+        .only(&["H1".into(), "H2".into(), "H3".into()])
+        .expect("nodes")
+        .slower_than(0.5);
     assert_eq!(layout.nodes().count(), 3);
     assert_eq!(layout.edges().count(), 4);
     assert!(layout.edges().all(|edge| edge.max_speed == Some(0.5)));
-    assert!(matches!(hall().only(&["H9".into()]), Err(CourseError::UnknownNode { .. })));
+    assert!(matches!(
+        hall().only(&["H9".into()]),
+        Err(CourseError::UnknownNode { .. })
+    ));
 }
 
 #[test]
@@ -224,6 +264,42 @@ fn a_huge_floor_is_given_up_rather_than_searched_for_ever() {
     assert_eq!(result, Err(CourseError::GivenUp));
 }
 
+fn layout_of(profile: &str) -> Result<Option<Layout>, Vec<Diagnostic>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/profiles/good");
+    let effective = crate::profile::check(&Source::new("device.toml", profile), &folder).expect("a profile");
+    Layout::of_profile(&effective.profile)
+}
+
+#[test]
+fn a_profile_names_its_layout_its_nodes_and_its_speed() {
+    let hall = "[layout]\nlif = \"../../layouts/hall.lif.json\"\nvehicle-type = \"ACME.Carrier\"\n";
+    let layout = layout_of(&format!(
+        "{hall}allow-list = [\"H1\", \"H2\"]\n[motion]\nmax-speed = 0.4\n"
+    ));
+    let layout = layout.expect("readable").expect("a layout");
+    assert_eq!(layout.nodes().count(), 2);
+    assert_eq!(layout.edge("H1", "H2").and_then(|edge| edge.max_speed), Some(0.4));
+
+    assert_eq!(layout_of("").expect("nothing to read"), None);
+    let wrong = layout_of(&format!("{hall}allow-list = [\"H11\"]\n")).expect_err("no such node");
+    assert!(wrong[0].title.ends_with("did you mean `H1`?"), "{}", wrong[0].title);
+    let wrong = layout_of("[layout]\nlif = \"nowhere.json\"\n").expect_err("no such file");
+    assert_eq!(wrong[0].code, "unreadable");
+}
+
+#[test]
+fn the_short_list_of_a_profile_is_a_layout() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/profiles/good/program.toml");
+    let layout = layout_of(&std::fs::read_to_string(file).expect("fixture"))
+        .expect("good")
+        .expect("a layout");
+    assert_eq!(layout.nodes().count(), 3);
+    let need = need("a-b-c-b-a");
+    let course = layout.assign(&need, &on("n1")).expect("a course");
+    assert_satisfies(&course, &need, &layout, "n1");
+    assert_eq!(course.bindings()["nodes"]["b"]["allowedDeviationXY"], 0.3);
+}
+
 fn wrong(from: &str, to: &str) -> String {
     let source = fixture("hall.lif.json");
     assert!(source.text.contains(from), "{from}");
@@ -238,12 +314,20 @@ fn a_layout_that_looks_wrong_is_refused_at_its_node_or_edge() {
     let mistakes = [
         ("degrees", "\"theta\": 1.5708", "\"theta\": 90.0"),
         ("millimetres", "\"x\": 3, \"y\": 0", "\"x\": 30000, \"y\": 0"),
-        ("no-map", "\"mapId\": \"hall\", \"nodePosition\": {\"x\": 6, \"y\": 0}", "\"nodePosition\": {\"x\": 6, \"y\": 0}"),
+        (
+            "no-map",
+            "\"mapId\": \"hall\", \"nodePosition\": {\"x\": 6, \"y\": 0}",
+            "\"nodePosition\": {\"x\": 6, \"y\": 0}",
+        ),
         ("two-nodes", "\"nodeId\": \"H2\"", "\"nodeId\": \"H1\""),
         ("edge-to-nowhere", "\"endNodeId\": \"H2\"", "\"endNodeId\": \"H22\""),
         ("no-speed", "\"maxSpeed\": 0.3", "\"maxSpeed\": 0"),
         ("kilometres-per-hour", "\"maxSpeed\": 1.2", "\"maxSpeed\": 120"),
-        ("orientation", "\"vehicleOrientation\": 0.0", "\"vehicleOrientation\": 180.0"),
+        (
+            "orientation",
+            "\"vehicleOrientation\": 0.0",
+            "\"vehicleOrientation\": 180.0",
+        ),
         ("missing-member", "\"nodeId\": \"H3\", ", ""),
         ("not-json", "\"layouts\": [", "\"layouts\": [,"),
     ];
@@ -301,10 +385,13 @@ fn floor_and_need() -> impl Strategy<Value = (Layout, CourseNeed)> {
 /// Whether any assignment exists, by trying them all.
 fn possible(layout: &Layout, need: &CourseNeed, start: &str) -> bool {
     fn extend(layout: &Layout, need: &CourseNeed, names: &[&String], given: &mut Vec<(String, String)>) -> bool {
-        let id = |name: &str, given: &[(String, String)]| given.iter().find(|(n, _)| n == name).map(|(_, id)| id.clone());
+        let id =
+            |name: &str, given: &[(String, String)]| given.iter().find(|(n, _)| n == name).map(|(_, id)| id.clone());
         let Some((name, rest)) = names.split_first() else {
             return need.edges.iter().all(|(from, to)| {
-                let (Some(from), Some(to)) = (id(from, given), id(to, given)) else { return false };
+                let (Some(from), Some(to)) = (id(from, given), id(to, given)) else {
+                    return false;
+                };
                 layout.edge(&from, &to).is_some()
             });
         };

@@ -33,8 +33,8 @@ impl Effective {
 }
 
 /// Checks a merged layer as a whole and turns it into a profile.
-pub(super) fn effective(layer: Layer) -> Result<Effective, Vec<Diagnostic>> {
-    let taken = Taken { layer: &layer };
+pub(super) fn effective(layer: &Layer) -> Result<Effective, Vec<Diagnostic>> {
+    let taken = Taken { layer };
     let wrong = taken.contradictions();
     if !wrong.is_empty() {
         return Err(wrong);

@@ -161,7 +161,9 @@ impl Surroundings {
         let mut layer = Layer::default();
         let mut wrong = Vec::new();
         for (name, text) in &self.environment {
-            if !name.starts_with("VDA5050_TCK_") || OTHER_VARIABLES.contains(&name.as_str()) {
+            let ours = name.starts_with("VDA5050_TCK_") && !OTHER_VARIABLES.contains(&name.as_str());
+            // Set to nothing is how scripts say "not set".
+            if !ours || text.is_empty() {
                 continue;
             }
             let Some(key) = KEYS.iter().find(|key| key.variable() == *name) else {
@@ -174,7 +176,13 @@ impl Surroundings {
                 wrong.push(Diagnostic::whole("unknown-key", title).hint(hint));
                 continue;
             };
-            match given(key, text, &self.directory, &Origin::Environment, &format!("the environment variable {name}")) {
+            match given(
+                key,
+                text,
+                &self.directory,
+                &Origin::Environment,
+                &format!("the environment variable {name}"),
+            ) {
                 Ok(setter) => drop(layer.values.insert(key.path, setter)),
                 Err(diagnostic) => wrong.push(diagnostic),
             }
@@ -205,7 +213,10 @@ fn file(path: &Path) -> Result<Layer, Vec<Diagnostic>> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|error| {
         let diagnostic = Diagnostic::whole("unreadable", format!("the profile {name} cannot be read: {error}"));
-        vec![diagnostic.hint("give the path of a profile with --profile; every setting is explained in the documentation")]
+        vec![
+            diagnostic
+                .hint("give the path of a profile with --profile; every setting is explained in the documentation"),
+        ]
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     read::read(&Source::new(name.clone(), text), folder, Origin::File(name))
@@ -229,15 +240,28 @@ pub fn load(
     let mut wrong = Vec::new();
     for (path, text) in flags {
         let Some(key) = Key::find(path) else {
-            wrong.push(Diagnostic::whole("unknown-key", format!("there is no setting `{path}`")));
+            wrong.push(Diagnostic::whole(
+                "unknown-key",
+                format!("there is no setting `{path}`"),
+            ));
             continue;
         };
-        match given(key, text, &surroundings.directory, &Origin::Flag, &format!("the flag for `{path}`")) {
+        match given(
+            key,
+            text,
+            &surroundings.directory,
+            &Origin::Flag,
+            &format!("the flag for `{path}`"),
+        ) {
             Ok(setter) => drop(from_flags.values.insert(key.path, setter)),
             Err(diagnostic) => wrong.push(diagnostic),
         }
     }
-    let files = [surroundings.user_file(), surroundings.project_file(), profile.map(Path::to_path_buf)];
+    let files = [
+        surroundings.user_file(),
+        surroundings.project_file(),
+        profile.map(Path::to_path_buf),
+    ];
     let layers = std::iter::once(defaults())
         .chain(files.into_iter().flatten().map(|path| file(&path)))
         .chain([surroundings.layer(), Ok(from_flags)]);
@@ -248,7 +272,11 @@ pub fn load(
             Err(diagnostics) => wrong.extend(diagnostics),
         }
     }
-    if wrong.is_empty() { effective(merged.fit_defaults()) } else { Err(wrong) }
+    if wrong.is_empty() {
+        effective(&merged.fit_defaults())
+    } else {
+        Err(wrong)
+    }
 }
 
 /// Reads one profile by itself, over the defaults only. Relative files in it are found from `folder`.
@@ -257,5 +285,5 @@ pub fn load(
 /// Every mistake in it.
 pub fn check(source: &Arc<Source>, folder: &Path) -> Result<Effective, Vec<Diagnostic>> {
     let layer = read::read(source, folder, Origin::File(source.name.clone()))?;
-    effective(defaults()?.under(layer).fit_defaults())
+    effective(&defaults()?.under(layer).fit_defaults())
 }

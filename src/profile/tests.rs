@@ -387,6 +387,15 @@ fn a_variable_that_sets_nothing_is_refused_with_the_one_that_was_meant() {
 }
 
 #[test]
+fn a_variable_set_to_nothing_is_not_set() {
+    let mut site = Site::new();
+    let variable = ("VDA5050_TCK_DEVICE_MANUFACTURER".to_owned(), String::new());
+    site.surroundings.environment.extend([variable]);
+    let effective = load(None, &[], &site.surroundings).expect("effective");
+    assert_eq!(effective.profile.device.manufacturer, None);
+}
+
+#[test]
 fn a_bad_flag_and_a_missing_profile_are_both_named() {
     let site = Site::new();
     let flags = [("bench.broker", "mqtt://me:secret@host".to_owned())];

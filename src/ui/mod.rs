@@ -1,1 +1,14 @@
-//! The terminal.
+//! The terminal: one line per test on standard output, what is awaited on standard error.
+//!
+//! [`Progress`] is what a run tells; [`Terminal`] shows it, [`Quiet`] does not. Texts of the device are shown
+//! escaped, because they may hold anything. What is told is decided elsewhere.
+
+mod listing;
+mod output;
+mod progress;
+mod terminal;
+
+pub use listing::{faults, hooks};
+pub use output::{Output, escaped};
+pub use progress::{Progress, Quiet, RunSummary, RunTitle, TestLine};
+pub use terminal::{Terminal, TerminalOptions};

@@ -15,10 +15,22 @@ impl Reader<'_> {
         let members = self.members("a node", item, &KNOWN, &["id", "x", "y", "map"])?;
         let id = self.text("the id of a node", members.get("id")?);
         let map_id = self.text("the map of a node", members.get("map")?);
-        let x = self.number("x of a node", members.get("x")?, METRES, "metres, at most 10 km from the origin");
-        let y = self.number("y of a node", members.get("y")?, METRES, "metres, at most 10 km from the origin");
+        let x = self.number(
+            "x of a node",
+            members.get("x")?,
+            METRES,
+            "metres, at most 10 km from the origin",
+        );
+        let y = self.number(
+            "y of a node",
+            members.get("y")?,
+            METRES,
+            "metres, at most 10 km from the origin",
+        );
         let mut optional = |name: &str, limits, expected: &str| match members.get(name) {
-            Some(value) => self.number(&format!("{name} of a node"), value, limits, expected).map(Some),
+            Some(value) => self
+                .number(&format!("{name} of a node"), value, limits, expected)
+                .map(Some),
             None => Some(None),
         };
         let theta = optional("theta", TURN, "radians from -π to π");

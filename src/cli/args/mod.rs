@@ -1,0 +1,169 @@
+//! What can be typed. Help texts are written for somebody who has never seen the tool.
+//!
+//! Flags that are settings of a device (`--broker`, `--serial` …) are handed to [`crate::profile::load`] as
+//! they stand, so that a value means the same on the command line, in the environment and in a file.
+
+mod inspect;
+mod run;
+mod simulate;
+#[cfg(test)]
+mod tests;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+pub use inspect::{Explain, List, Listing, Report, Validate};
+pub use run::{Certify, Qualify, Run, Shard};
+pub use simulate::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
+
+const AFTER_HELP: &str = "\
+Examples:
+  vda5050-tck run                              test the built-in reference AGV: see how it works
+  vda5050-tck run --profile device.toml        test your device, as the profile describes it
+  vda5050-tck run 'order/*' -v                 only some tests, with every effective setting
+  vda5050-tck explain ORD-REJ-03               what a requirement asks, and what decides it
+  vda5050-tck certify --profile device.toml    everything that applies, with nothing left to choose
+
+Exit codes:
+  0 conforms · 1 does not conform · 2 usage, profile or suite wrong · 3 undecided
+  4 nothing selected or applicable · 5 the harness or its environment broke · 130 interrupted";
+
+/// Tests whether an AGV or a master control keeps to VDA 5050, and shows the evidence.
+#[derive(Debug, Parser)]
+#[command(name = "vda5050-tck", version, after_help = AFTER_HELP, max_term_width = 100, propagate_version = true)]
+#[command(arg_required_else_help = true, disable_help_subcommand = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Test a device; without a profile, the built-in reference AGV
+    Run(Run),
+    /// Test a device with nothing left to choose: all applicable tests, default timings, built-in suites
+    Certify(Certify),
+    /// Show what there is: tests, requirements, coverage, monitors, faults or hooks
+    List(List),
+    /// Explain a requirement, test, monitor, check, hook or fault
+    Explain(Explain),
+    /// Check files: messages, suites, profiles, layouts or results, told apart by their content
+    Validate(Validate),
+    /// Be a device on a broker: a reference AGV or a reference master control
+    Simulate(Simulate),
+    /// Render the report of a finished run again, verify it, judge it again, or compare two
+    Report(Report),
+    /// Prove the harness: the reference passes everything, and every check is failed by a fault
+    Qualify(Qualify),
+}
+
+/// Settings of the device and the bench; each is also a setting of the profile.
+#[derive(Clone, Debug, Default, Args)]
+pub struct DeviceArgs {
+    /// What is known about the device and its site (device.toml)
+    #[arg(long, value_name = "FILE", env = "VDA5050_TCK_PROFILE", hide_env_values = true)]
+    pub profile: Option<PathBuf>,
+    /// Which side is tested [agv, master-control]
+    #[arg(long, value_name = "ROLE", help_heading = "Device")]
+    pub role: Option<String>,
+    /// Manufacturer, as in its topics
+    #[arg(long, value_name = "NAME", help_heading = "Device")]
+    pub manufacturer: Option<String>,
+    /// Serial number, as in its topics
+    #[arg(long, value_name = "NUMBER", help_heading = "Device")]
+    pub serial: Option<String>,
+    /// Protocol version it is judged by
+    #[arg(long, value_name = "VERSION", help_heading = "Device")]
+    pub protocol: Option<String>,
+    /// How its topics begin, with {majorVersion}, {manufacturer} and {serialNumber}
+    #[arg(long, value_name = "TEMPLATE", help_heading = "Device")]
+    pub topic_template: Option<String>,
+    /// Where the device connects; this machine only unless said [default: 127.0.0.1:1883]
+    #[arg(long, value_name = "HOST:PORT", help_heading = "Bench")]
+    pub listen: Option<String>,
+    /// Use this broker instead of the built-in one: mqtt://host:port or mqtts://host:port
+    #[arg(long, value_name = "URL", help_heading = "Bench")]
+    pub broker: Option<String>,
+    /// The device is connected to the broker directly: packets cannot be seen (needs --broker)
+    #[arg(long, help_heading = "Bench")]
+    pub no_tap: bool,
+    /// Let the vehicle drive; somebody has to have looked at the floor first
+    #[arg(long, conflicts_with = "no_motion", help_heading = "Bench")]
+    pub allow_motion: bool,
+    /// Leave out every test in which the vehicle drives
+    #[arg(long, help_heading = "Bench")]
+    pub no_motion: bool,
+}
+
+impl DeviceArgs {
+    /// The flags that were given, by the names of the settings they set.
+    #[must_use]
+    pub fn settings(&self) -> Vec<(&'static str, String)> {
+        let texts = [
+            ("device.role", &self.role),
+            ("device.manufacturer", &self.manufacturer),
+            ("device.serial-number", &self.serial),
+            ("device.protocol", &self.protocol),
+            ("device.topic-template", &self.topic_template),
+            ("bench.listen", &self.listen),
+            ("bench.broker", &self.broker),
+        ];
+        let flags = [
+            ("bench.tap", self.no_tap, "false"),
+            ("motion.allowed", self.allow_motion, "true"),
+            ("motion.allowed", self.no_motion, "false"),
+        ];
+        let given = texts.into_iter().filter_map(|(name, text)| Some((name, text.clone()?)));
+        let set = flags.into_iter().filter(|(_, given, _)| *given);
+        given
+            .chain(set.map(|(name, _, text)| (name, text.to_owned())))
+            .collect()
+    }
+}
+
+/// Where results go and how they are shown.
+#[derive(Clone, Debug, Default, Args)]
+pub struct OutputArgs {
+    /// Write the report below this folder
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "reports",
+        env = "VDA5050_TCK_OUT",
+        hide_env_values = true
+    )]
+    pub out: PathBuf,
+    /// How results are written to standard output
+    #[arg(
+        long,
+        value_enum,
+        default_value_t,
+        env = "VDA5050_TCK_FORMAT",
+        hide_env_values = true
+    )]
+    pub format: Format,
+    /// Say more: every effective setting with its origin; twice, every step
+    #[arg(short, long, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+}
+
+/// The format of standard output.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people
+    #[default]
+    Text,
+    /// For programs
+    Json,
+}
+
+/// The suites to be used.
+#[derive(Clone, Debug, Default, Args)]
+pub struct SuiteArgs {
+    /// Use the suites of this folder instead of the built-in ones; the report says so
+    #[arg(long, value_name = "DIR", env = "VDA5050_TCK_SUITES", hide_env_values = true)]
+    pub suites: Option<PathBuf>,
+}

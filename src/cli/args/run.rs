@@ -1,0 +1,142 @@
+//! `run`, `certify` and `qualify`: what runs tests.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+
+use super::{DeviceArgs, Format, OutputArgs, SuiteArgs};
+
+const RUN_HELP: &str = "\
+Examples:
+  vda5050-tck run                                    the built-in reference AGV
+  vda5050-tck run --virtual                          the same in virtual time, in seconds
+  vda5050-tck run --virtual --fault outdated-update-taken-over   see a test fail
+  vda5050-tck run --profile device.toml --no-motion  nothing drives
+  vda5050-tck run 'order-rejection/*' --manufacturer ACME --serial 0001 --listen 0.0.0.0:1883
+  vda5050-tck run --profile device.toml --shard 2/4  the second quarter of the tests
+
+A test is named by its id, and `*` stands for anything: `order/*`, `*map*`. See `list tests`.
+Results go to standard output, progress to standard error; the report to --out.";
+
+/// `run`.
+#[derive(Clone, Debug, Default, Args)]
+#[command(after_help = RUN_HELP)]
+pub struct Run {
+    /// Only tests whose id matches one of these; all that apply unless said
+    #[arg(value_name = "TEST")]
+    pub tests: Vec<String>,
+    /// The device and the bench.
+    #[command(flatten)]
+    pub device: DeviceArgs,
+    /// Where results go.
+    #[command(flatten)]
+    pub output: OutputArgs,
+    /// Which suites.
+    #[command(flatten)]
+    pub suites: SuiteArgs,
+    /// Give the reference AGV a defect, to see a test fail; may be repeated (see `list faults`)
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = "Reference AGV",
+        conflicts_with = "profile"
+    )]
+    pub fault: Vec<String>,
+    /// Run against the reference AGV in memory and in virtual time, without a network
+    #[arg(long = "virtual", help_heading = "Reference AGV", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
+    pub in_virtual_time: bool,
+    /// Make identifiers and the order of events repeatable
+    #[arg(long, value_name = "NUMBER")]
+    pub seed: Option<u64>,
+    /// Only part I of N of the tests, for several benches at once
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+}
+
+const CERTIFY_HELP: &str = "\
+A certificate has to mean the same for everybody. So there is no filter, no modified suite, and no \
+changed timing: a profile that sets `[time]` is refused, and so is a run without a profile.
+
+Example:
+  vda5050-tck certify --profile device.toml";
+
+/// `certify`.
+#[derive(Clone, Debug, Default, Args)]
+#[command(after_help = CERTIFY_HELP)]
+pub struct Certify {
+    /// What is known about the device and its site (device.toml)
+    #[arg(
+        long,
+        value_name = "FILE",
+        env = "VDA5050_TCK_PROFILE",
+        hide_env_values = true,
+        required = true
+    )]
+    pub profile: Option<PathBuf>,
+    /// Where results go.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+const QUALIFY_HELP: &str = "\
+Runs all tests against the reference AGV in virtual time: once without a fault, where everything has \
+to pass without a warning, and once with each fault, where the requirement it breaks has to fail. \
+Decisions that no fault can fail are listed by name: they are unproven.
+
+Example:
+  vda5050-tck qualify 'order-rejection/*'";
+
+/// `qualify`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = QUALIFY_HELP)]
+pub struct Qualify {
+    /// Only tests whose id matches one of these
+    #[arg(value_name = "TEST")]
+    pub tests: Vec<String>,
+    /// Only these faults; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub fault: Vec<String>,
+    /// For this protocol version; every one known unless said
+    #[arg(long, value_name = "VERSION")]
+    pub protocol: Option<String>,
+    /// How the kill matrix is written
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+    /// Which suites.
+    #[command(flatten)]
+    pub suites: SuiteArgs,
+}
+
+/// One part of a run that several benches share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Which part, counted from 1.
+    pub index: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+impl Shard {
+    /// Whether the test at a place of the plan, counted from 0, belongs to this part.
+    #[must_use]
+    pub fn takes(self, place: usize) -> bool {
+        place % self.of == self.index - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text
+            .split_once('/')
+            .and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            Some((_, 0)) => Err("there is at least one part".to_owned()),
+            Some((index, of)) => Err(format!("there is no part {index} of {of}")),
+            None => Err("a part is written like 2/4: the second of four".to_owned()),
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What the command line has to hold.
+
+use clap::CommandFactory as _;
+
+use super::*;
+
+fn parse(line: &str) -> Result<Command, clap::Error> {
+    let words = shlex::split(line).expect("words");
+    Cli::try_parse_from(std::iter::once("vda5050-tck".to_owned()).chain(words)).map(|cli| cli.command)
+}
+
+fn run(line: &str) -> Run {
+    match parse(line) {
+        Ok(Command::Run(run)) => run,
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+#[test]
+fn the_command_line_is_consistent() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn help_reads_well() {
+    fn show(command: &mut clap::Command, name: &str) {
+        let text = command.render_long_help().to_string();
+        insta::with_settings!({ filters => vec![(env!("CARGO_PKG_VERSION"), "[version]")] }, {
+            insta::assert_snapshot!(format!("help{name}"), text);
+        });
+        for subcommand in command.get_subcommands_mut() {
+            let name = format!("{name}-{}", subcommand.get_name());
+            show(subcommand, &name);
+        }
+    }
+    let mut command = Cli::command().term_width(100);
+    command.build();
+    show(&mut command, "");
+}
+
+#[test]
+fn the_exit_codes_in_the_help_are_the_exit_codes() {
+    for exit in crate::cli::exit::Exit::ALL {
+        let word = exit.meaning().split(':').next().unwrap_or_default();
+        assert!(AFTER_HELP.contains(&format!("{} {word}", exit.code())), "{exit:?}");
+    }
+}
+
+#[test]
+fn flags_become_settings_by_their_names_in_the_profile() {
+    let run = run("run 'order/*' --serial 7 --broker mqtt://host --no-tap --allow-motion --shard 2/4 --seed 5");
+    assert_eq!(run.tests, ["order/*"]);
+    assert_eq!(run.shard, Some(Shard { index: 2, of: 4 }));
+    let settings = run.device.settings();
+    let expected = [
+        ("device.serial-number", "7"),
+        ("bench.broker", "mqtt://host"),
+        ("bench.tap", "false"),
+        ("motion.allowed", "true"),
+    ];
+    assert_eq!(settings, expected.map(|(name, text)| (name, text.to_owned())));
+    for (name, _) in settings {
+        assert!(crate::profile::Key::find(name).is_some(), "{name}");
+    }
+}
+
+#[test]
+fn without_flags_nothing_is_set() {
+    assert!(run("run").device.settings().is_empty());
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    for line in [
+        "",
+        "run --virtual --profile device.toml",
+        "run --virtual --listen 127.0.0.1:1883",
+        "run --fault x --profile device.toml",
+        "run --allow-motion --no-motion",
+        "run --shard 5/4",
+        "run --shard 0/4",
+        "run --shard 1/0",
+        "run --shard 2",
+        "certify",
+        "certify --profile device.toml --protocol 9",
+        "list",
+        "list tests --role mc",
+        "report",
+        "report --compare one",
+        "report one --compare one two",
+        "report one --verify --rejudge",
+        "simulate agv --count 0",
+        "validate",
+    ] {
+        assert!(parse(line).is_err(), "{line}");
+    }
+}
+
+#[test]
+fn the_shards_of_a_run_share_its_tests_without_loss() {
+    let shards: Vec<Shard> = (1..=4)
+        .map(|index| format!("{index}/4").parse().expect("a shard"))
+        .collect();
+    for place in 0..10 {
+        assert_eq!(shards.iter().filter(|shard| shard.takes(place)).count(), 1);
+    }
+}
+
+#[test]
+fn variables_of_flags_are_known_to_the_settings() {
+    fn variables(command: &clap::Command) -> Vec<String> {
+        let own = command.get_arguments().filter_map(|argument| argument.get_env());
+        let own = own.map(|name| name.to_string_lossy().into_owned());
+        own.chain(command.get_subcommands().flat_map(variables)).collect()
+    }
+    let variables = variables(&Cli::command());
+    assert!(variables.iter().any(|name| name == "VDA5050_TCK_PROFILE"));
+    let surroundings = crate::profile::Surroundings {
+        environment: variables.into_iter().map(|name| (name, "x".to_owned())).collect(),
+        ..Default::default()
+    };
+    if let Err(wrong) = crate::profile::load(None, &[], &surroundings) {
+        panic!("{}", wrong[0]);
+    }
+}

@@ -1,0 +1,78 @@
+//! Texts of `list hooks` and `list faults`.
+
+use std::fmt::Write as _;
+
+use crate::pack::Role;
+use crate::profile::HookInfo;
+use crate::reference::Fault;
+
+/// Every hook with its parameters, by role.
+#[must_use]
+pub fn hooks(hooks: &[HookInfo]) -> String {
+    let width = hooks.iter().map(|hook| hook.name.len()).max().unwrap_or(0);
+    let mut text = String::new();
+    for role in [Role::Agv, Role::MasterControl] {
+        let mut of_role = hooks.iter().filter(|hook| hook.role == role).peekable();
+        if of_role.peek().is_none() {
+            continue;
+        }
+        if !text.is_empty() {
+            text.push('\n');
+        }
+        let _ = writeln!(
+            text,
+            "Hooks for a device of role {role}, and what is true when they are done:"
+        );
+        for hook in of_role {
+            let _ = write!(text, "  {:<width$}  {}", hook.name, hook.doc);
+            if !hook.parameters.is_empty() {
+                let placeholders: Vec<String> = hook.parameters.iter().map(|name| format!("{{{name}}}")).collect();
+                let _ = write!(text, " {}", placeholders.join(" "));
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+/// Every fault with what is wrong and the requirements it breaks.
+#[must_use]
+pub fn faults(faults: &[Fault]) -> String {
+    let width = faults.iter().map(|fault| fault.name.len()).max().unwrap_or(0);
+    faults.iter().fold(String::new(), |mut text, fault| {
+        let breaks = fault.breaks.join(", ");
+        let _ = writeln!(text, "{:<width$}  {} ({breaks})", fault.name, fault.wrong);
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::HOOKS;
+
+    #[test]
+    fn hooks_are_listed_by_role_with_their_parameters() {
+        insta::assert_snapshot!(hooks(HOOKS));
+    }
+
+    #[test]
+    fn faults_are_listed_with_what_they_break() {
+        let some = [
+            Fault {
+                name: "outdated-update-taken-over",
+                breaks: &["ORD-REJ-10", "ORD-REJ-11"],
+                wrong: "Takes over an update that is older than the one it has.",
+            },
+            Fault {
+                name: "silent",
+                breaks: &["STATE-01"],
+                wrong: "Sends no state.",
+            },
+        ];
+        insta::assert_snapshot!(faults(&some), @r"
+        outdated-update-taken-over  Takes over an update that is older than the one it has. (ORD-REJ-10, ORD-REJ-11)
+        silent                      Sends no state. (STATE-01)
+        ");
+    }
+}

@@ -1,0 +1,92 @@
+//! What a run tells while it goes on.
+
+use std::time::Duration;
+
+use crate::verdict::{Outcome, Verdict};
+
+/// What a run is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunTitle {
+    /// The device, in words.
+    pub device: String,
+    /// Protocol version it is judged by.
+    pub protocol: String,
+    /// How many tests will run.
+    pub tests: usize,
+    /// How many do not apply.
+    pub not_applicable: usize,
+}
+
+/// How a test ended, on one line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TestLine {
+    /// Its id.
+    pub id: String,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// How long it took, in the time of the run.
+    pub elapsed: Duration,
+    /// Why it is not a pass, in one line.
+    pub reason: Option<String>,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RunSummary {
+    /// Join over everything; `None` when nothing was decided.
+    pub verdict: Option<Verdict>,
+    /// How many tests ended with each verdict.
+    pub counts: Vec<(Verdict, usize)>,
+    /// How many did not apply.
+    pub not_applicable: usize,
+    /// How long it took, in the time of the run.
+    pub elapsed: Duration,
+    /// Where the report is.
+    pub report: Option<String>,
+    /// Root hash of the report.
+    pub root_hash: Option<String>,
+    /// Why the run ended before its plan did.
+    pub partial: Option<String>,
+}
+
+/// Who is told. Telling never fails a run: somebody who cannot write swallows it.
+pub trait Progress {
+    /// The run begins.
+    fn run_begun(&mut self, title: &RunTitle);
+
+    /// A test begins.
+    fn test_begun(&mut self, id: &str, title: &str);
+
+    /// The run waits for something, and has been doing so for a while.
+    fn waiting(&mut self, what: &str, since: Duration);
+
+    /// A test has ended, or does not apply.
+    fn test_ended(&mut self, line: &TestLine);
+
+    /// Something worth knowing.
+    fn note(&mut self, text: &str);
+
+    /// The run has ended.
+    fn run_ended(&mut self, summary: &RunSummary);
+
+    /// Runs `ask` with the terminal to itself, so that a person can be asked something.
+    fn aside<T>(&mut self, ask: impl FnOnce() -> T) -> T
+    where
+        Self: Sized,
+    {
+        ask()
+    }
+}
+
+/// Tells nobody.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Quiet;
+
+impl Progress for Quiet {
+    fn run_begun(&mut self, _: &RunTitle) {}
+    fn test_begun(&mut self, _: &str, _: &str) {}
+    fn waiting(&mut self, _: &str, _: Duration) {}
+    fn test_ended(&mut self, _: &TestLine) {}
+    fn note(&mut self, _: &str) {}
+    fn run_ended(&mut self, _: &RunSummary) {}
+}
