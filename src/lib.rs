@@ -19,3 +19,4 @@ pub mod reference;
 pub mod report;
 pub mod suite;
 pub mod verdict;
+pub mod yaml;

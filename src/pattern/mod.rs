@@ -5,5 +5,16 @@
 //! left to the judge.
 
 mod ast;
+mod bindings;
+mod bound;
+mod examine;
+mod matches;
+mod number;
+#[cfg(test)]
+mod properties;
 
 pub use ast::{Compare, Comparison, Element, Elements, Pattern, PatternKind, Piece, Term, TermKind};
+pub use bindings::{Bindings, Unbound};
+pub use bound::{Bound, whole_text};
+pub use examine::{Examination, Miss};
+pub use number::{compare_numbers, same_value};

@@ -1,0 +1,168 @@
+//! Whether a message matches. Work is bounded by the size of the pattern times the size of the message.
+
+use std::collections::{HashMap, HashSet};
+
+use serde_json::Value;
+
+use super::ast::{Compare, Element};
+use super::bound::{Bound, BoundKind};
+use super::number::{canonical, compare_numbers, same_value};
+
+/// What every `$hasNew` of a pattern found in the baseline: canonical texts of the elements that were there
+/// before, by the address of the pattern. An element is old when an equal one was anywhere at this path.
+pub(super) struct Baseline(HashMap<*const Bound, HashSet<String>>);
+
+impl Baseline {
+    pub(super) fn new(pattern: &Bound, message: Option<&Value>) -> Self {
+        let mut old = HashMap::new();
+        if let Some(message) = message
+            && pattern.looks_back()
+        {
+            collect(pattern, &[message], &mut old);
+        }
+        Self(old)
+    }
+
+    /// Whether this element of a `$hasNew` was not there before.
+    pub(super) fn is_new(&self, pattern: &Bound, element: &Value) -> bool {
+        self.0
+            .get(&std::ptr::from_ref(pattern))
+            .is_none_or(|old| !old.contains(&canonical(element)))
+    }
+}
+
+fn collect(pattern: &Bound, before: &[&Value], old: &mut HashMap<*const Bound, HashSet<String>>) {
+    if before.is_empty() {
+        return;
+    }
+    let elements = || -> Vec<&Value> { before.iter().filter_map(|value| value.as_array()).flatten().collect() };
+    match &pattern.kind {
+        BoundKind::Object(members) => {
+            for (name, member) in members {
+                let before: Vec<_> = before.iter().filter_map(|value| value.get(name)).collect();
+                collect(member, &before, old);
+            }
+        }
+        BoundKind::List(items) => {
+            for (at, item) in items.iter().enumerate() {
+                let before: Vec<_> = before.iter().filter_map(|value| value.get(at)).collect();
+                collect(item, &before, old);
+            }
+        }
+        BoundKind::All(parts) => parts.iter().for_each(|part| collect(part, before, old)),
+        BoundKind::Not(inner) => collect(inner, before, old),
+        BoundKind::Elements(which, inner) => {
+            let elements = elements();
+            if *which == Element::HasNew {
+                let texts = elements.iter().map(|element| canonical(element)).collect();
+                old.insert(std::ptr::from_ref(pattern), texts);
+            }
+            collect(inner, &elements, old);
+        }
+        _ => {}
+    }
+}
+
+impl Bound {
+    /// Whether `message` matches. `baseline` is the last message on the same topic before the stimulus; it only
+    /// matters to `$hasNew`, and without one every element is new.
+    #[must_use]
+    pub fn matches(&self, message: &Value, baseline: Option<&Value>) -> bool {
+        self.accepts(Some(message), &Baseline::new(self, baseline))
+    }
+
+    /// Whether a `$hasNew` stands anywhere in the pattern, so that the baseline matters.
+    #[must_use]
+    pub fn looks_back(&self) -> bool {
+        match &self.kind {
+            BoundKind::Elements(which, inner) => *which == Element::HasNew || inner.looks_back(),
+            BoundKind::Object(members) => members.iter().any(|(_, member)| member.looks_back()),
+            BoundKind::List(parts) | BoundKind::All(parts) => parts.iter().any(Self::looks_back),
+            BoundKind::Not(inner) => inner.looks_back(),
+            _ => false,
+        }
+    }
+
+    pub(super) fn accepts(&self, value: Option<&Value>, baseline: &Baseline) -> bool {
+        match &self.kind {
+            BoundKind::Equals(expected) => value.is_some_and(|found| same_value(expected, found)),
+            BoundKind::Object(members) => value.and_then(Value::as_object).is_some_and(|found| {
+                members
+                    .iter()
+                    .all(|(name, member)| member.accepts(found.get(name), baseline))
+            }),
+            BoundKind::List(items) => value.and_then(Value::as_array).is_some_and(|found| {
+                items.len() == found.len()
+                    && items
+                        .iter()
+                        .zip(found)
+                        .all(|(item, found)| item.accepts(Some(found), baseline))
+            }),
+            BoundKind::All(parts) => parts.iter().all(|part| part.accepts(value, baseline)),
+            BoundKind::Elements(which, inner) => match value {
+                None => *which == Element::None,
+                Some(Value::Array(found)) => self.elements_accept(*which, inner, found, baseline),
+                Some(_) => false,
+            },
+            BoundKind::Includes(items) => value
+                .and_then(Value::as_array)
+                .is_some_and(|found| first_not_included(items, found, baseline).is_none()),
+            BoundKind::Unfit { .. } => false,
+            BoundKind::Empty(empty) => value
+                .and_then(Value::as_array)
+                .is_some_and(|found| found.is_empty() == *empty),
+            BoundKind::Count(inner) => value
+                .and_then(Value::as_array)
+                .is_some_and(|found| inner.accepts(Some(&Value::from(found.len())), baseline)),
+            BoundKind::In(items) => value.is_some() && items.iter().any(|item| item.accepts(value, baseline)),
+            BoundKind::Not(inner) => !inner.accepts(value, baseline),
+            BoundKind::Compare(which, limit) => match value {
+                Some(Value::Number(found)) => compare_numbers(found, limit).is_some_and(|order| which.holds(order)),
+                _ => false,
+            },
+            BoundKind::Matches(regex) => value.and_then(Value::as_str).is_some_and(|text| regex.is_match(text)),
+            BoundKind::Present => value.is_some(),
+            BoundKind::Absent => value.is_none(),
+        }
+    }
+
+    fn elements_accept(&self, which: Element, inner: &Self, found: &[Value], baseline: &Baseline) -> bool {
+        let mut matching = found.iter().filter(|element| inner.accepts(Some(element), baseline));
+        match which {
+            Element::Has => matching.next().is_some(),
+            Element::HasNew => matching.any(|element| baseline.is_new(self, element)),
+            Element::None => matching.next().is_none(),
+            Element::One => matching.next().is_some() && matching.next().is_none(),
+            Element::AtMostOne => matching.nth(1).is_none(),
+            Element::Each => matching.count() == found.len(),
+        }
+    }
+}
+
+/// The first item that no element matches. Each search begins behind the last hit, because lists that include
+/// one another mostly do so in order.
+pub(super) fn first_not_included(items: &[Bound], found: &[Value], baseline: &Baseline) -> Option<usize> {
+    let mut next = 0;
+    items.iter().position(|item| {
+        let (before, after) = found.split_at(next);
+        let hit = after
+            .iter()
+            .chain(before)
+            .position(|element| item.accepts(Some(element), baseline));
+        if let Some(at) = hit {
+            next = (next + at + 1) % found.len();
+        }
+        hit.is_none()
+    })
+}
+
+impl Compare {
+    pub(super) fn holds(self, order: std::cmp::Ordering) -> bool {
+        match self {
+            Self::Lt => order.is_lt(),
+            Self::Le => order.is_le(),
+            Self::Gt => order.is_gt(),
+            Self::Ge => order.is_ge(),
+        }
+    }
+}
