@@ -1,7 +1,7 @@
 //! Traces for the tests of the checks: a recorded run in a few lines.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
@@ -10,7 +10,7 @@ use super::{CheckContext, CheckFinding, find};
 use crate::clock::{Moment, Stamp};
 use crate::journal::event::{Close, Direction, Event, LinkFault, Occurrence, Packet, RunHeader, Source, Will};
 use crate::journal::{Entry, Journal, Payload};
-use crate::pack::Pack;
+use crate::pack::{Assets, Pack, Packs};
 use crate::verdict::Verdict;
 
 /// A run under construction.
@@ -294,8 +294,8 @@ impl Trace {
 
 /// The protocol version the checks are tested with.
 pub(super) fn pack() -> Arc<Pack> {
-    let version: crate::pack::Version = format!("{}.{}.0", 2, 1).parse().unwrap();
-    Arc::new(Pack { id: format!("{}.{}", 2, 1), version })
+    static PACKS: LazyLock<Packs> = LazyLock::new(|| Packs::load(&Assets::embedded()).unwrap());
+    Arc::clone(PACKS.latest())
 }
 
 /// A state without header of a vehicle that stands idle on node n1.

@@ -177,11 +177,7 @@ pub(super) fn says_broken(message: &Value) -> bool {
 }
 
 fn publisher(name: &str, context: &CheckContext<'_>) -> Option<Role> {
-    let _ = context;
-    match name {
-        "order" | "instantActions" => Some(Role::MasterControl),
-        _ => Some(Role::Agv),
-    }
+    context.pack.topic(name).map(|topic| topic.publisher)
 }
 
 /// A finding on `requirement` that follows its mood.
