@@ -321,30 +321,18 @@ impl<'a> Builder<'a> {
         open.end = open.end.max(node.span.end);
         match &mut open.kind {
             OpenKind::List(items) => items.push(node),
-            OpenKind::Map { entries, key, seen } => match key.take() {
-                Some(name) => entries.push((name, node)),
-                None => {
-                    let mistake = match node.text() {
-                        None => Some((
-                            "yaml-key",
-                            format!("{} as a key", node.kind_word()),
-                            "quote it: every key is a text",
-                        )),
-                        Some("<<") => Some(("yaml-merge", "a merge key".to_owned(), "write the members out")),
-                        Some(text) if !seen.insert(text.to_owned()) => Some((
-                            "yaml-duplicate-key",
-                            format!("the key `{}` for a second time", short(text)),
-                            "keep one of the two",
-                        )),
-                        Some(_) => None,
-                    };
-                    let span = node.span.clone();
-                    *key = Some(node);
-                    if let Some((code, title, hint)) = mistake {
-                        self.problem(code, span, &title, "not allowed here", hint);
-                    }
+            OpenKind::Map { entries, key, seen } => {
+                if let Some(name) = key.take() {
+                    entries.push((name, node));
+                    return;
                 }
-            },
+                let mistake = key_mistake(&node, seen);
+                let span = node.span.clone();
+                *key = Some(node);
+                if let Some((code, title, hint)) = mistake {
+                    self.problem(code, span, &title, "not allowed here", hint);
+                }
+            }
         }
     }
 
@@ -364,6 +352,22 @@ impl<'a> Builder<'a> {
         };
         self.finished(Node { kind, span });
     }
+}
+
+/// What is wrong with a key: code, title, hint.
+fn key_mistake(key: &Node, seen: &mut HashSet<String>) -> Option<(&'static str, String, &'static str)> {
+    let Some(text) = key.text() else {
+        let title = format!("{} as a key", key.kind_word());
+        return Some(("yaml-key", title, "quote it: every key is a text"));
+    };
+    if text == "<<" {
+        return Some(("yaml-merge", "a merge key".to_owned(), "write the members out"));
+    }
+    if seen.insert(text.to_owned()) {
+        return None;
+    }
+    let title = format!("the key `{}` for a second time", short(text));
+    Some(("yaml-duplicate-key", title, "keep one of the two"))
 }
 
 /// The value of a scalar without quotes, or what else could have been meant by an ambiguous one.

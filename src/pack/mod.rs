@@ -1,15 +1,26 @@
 //! A protocol version as data, and the catalogue of requirements.
 //!
 //! A [`Pack`] is one folder of `schemas/`: six JSON schemas, `protocol.toml` and `vocabulary.yaml`. The
-//! [`Catalogue`] is `suites/requirements/`. Versions are data: no code below or above names one. What a
-//! message *means* is left to patterns, checks and the judge.
+//! [`Catalogue`] is `suites/requirements/`. Both come from [`Assets`], the embedded files
+//! or a replacement. Versions are data: no code below or above names one. What a message *means* is left to
+//! patterns, checks and the judge.
 
+mod assets;
 mod catalogue;
+mod catalogue_file;
 mod protocol;
+mod schema;
+mod shape;
 mod version;
 
-pub use catalogue::RequirementId;
-pub use protocol::Pack;
+#[cfg(test)]
+mod tests;
+
+pub use assets::{AssetFile, Assets};
+pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionNote};
+pub use protocol::{Pack, PackError, Packs, TopicName, TopicRule};
+pub use schema::{Finding, FindingKind, MessageSchema};
+pub use shape::Shape;
 pub use version::{Version, VersionRange};
 
 /// The two sides of the interface.

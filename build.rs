@@ -1,0 +1,7 @@
+//! Embeds suites and schemas anew when a file appears or goes: the compiler alone notices only changed ones.
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=suites");
+    println!("cargo:rerun-if-changed=schemas");
+}

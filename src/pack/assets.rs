@@ -1,0 +1,218 @@
+//! The files of `suites/` and `schemas/`: embedded in the binary, and replaceable by a directory.
+
+use std::io;
+use std::path::Path;
+
+use include_dir::{Dir, DirEntry, include_dir};
+use sha2::{Digest, Sha256};
+
+static SUITES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/suites");
+static SCHEMAS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/schemas");
+
+/// Folders of a replacement deeper than this are refused: it is a loop of links or not a suite.
+const MAX_DEPTH: usize = 16;
+/// Files of a replacement longer than this are refused, in bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// One file.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct AssetFile {
+    /// Path with `/`, beginning with `suites/` or `schemas/`.
+    pub path: String,
+    /// The whole text.
+    pub text: String,
+}
+
+/// All files, sorted by path. Hidden files (`.gitkeep`) are left out.
+#[derive(Debug)]
+pub struct Assets {
+    files: Vec<AssetFile>,
+    sha256: String,
+    modified: bool,
+}
+
+impl Assets {
+    /// The files the binary was built with.
+    #[must_use]
+    pub fn embedded() -> Self {
+        let mut files = Vec::new();
+        embedded_files("suites", &SUITES, &mut files);
+        embedded_files("schemas", &SCHEMAS, &mut files);
+        Self::new(files)
+    }
+
+    /// Everything under `suites/` replaced by the files of `dir`, which is laid out like `suites/`.
+    ///
+    /// # Errors
+    /// `dir` cannot be read, holds a file that is not UTF-8 or longer than 1 MiB, or is nested too deeply.
+    pub fn with_suites(dir: &Path) -> io::Result<Self> {
+        let embedded = Self::embedded();
+        let mut files = Vec::new();
+        files_below(dir, "suites", 0, &mut files)?;
+        files.extend(embedded.under("schemas/").cloned());
+        let mut assets = Self::new(files);
+        assets.modified = assets.sha256 != embedded.sha256;
+        Ok(assets)
+    }
+
+    fn new(mut files: Vec<AssetFile>) -> Self {
+        files.sort();
+        let mut digest = Sha256::new();
+        for file in &files {
+            // Lengths keep a boundary from moving between a path and a text.
+            for part in [&file.path, &file.text] {
+                digest.update(u64::try_from(part.len()).unwrap_or(u64::MAX).to_be_bytes());
+                digest.update(part.as_bytes());
+            }
+        }
+        let sha256 = digest
+            .finalize()
+            .iter()
+            .fold(String::with_capacity(64), |mut hex, byte| {
+                for digit in [byte >> 4, byte & 15] {
+                    hex.extend(char::from_digit(u32::from(digit), 16));
+                }
+                hex
+            });
+        Self {
+            files,
+            sha256,
+            modified: false,
+        }
+    }
+
+    /// The files whose path begins with `prefix`, sorted by path.
+    pub fn under(&self, prefix: &str) -> impl Iterator<Item = &AssetFile> {
+        self.files.iter().filter(move |file| file.path.starts_with(prefix))
+    }
+
+    /// The file at `path`.
+    #[must_use]
+    pub fn get(&self, path: &str) -> Option<&AssetFile> {
+        let at = self.files.binary_search_by(|file| file.path.as_str().cmp(path)).ok()?;
+        self.files.get(at)
+    }
+
+    /// SHA-256 over all paths and texts, in hexadecimal.
+    #[must_use]
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// Whether the suites were replaced by something else than what is embedded.
+    #[must_use]
+    pub fn modified(&self) -> bool {
+        self.modified
+    }
+}
+
+fn embedded_files(root: &str, dir: &Dir<'static>, files: &mut Vec<AssetFile>) {
+    for entry in dir.entries() {
+        match entry {
+            DirEntry::Dir(inner) => embedded_files(root, inner, files),
+            DirEntry::File(file) => {
+                let inside = file.path().to_string_lossy().replace('\\', "/");
+                if !hidden(&inside) {
+                    files.push(AssetFile {
+                        path: format!("{root}/{inside}"),
+                        text: String::from_utf8_lossy(file.contents()).into_owned(),
+                    });
+                }
+            }
+        }
+    }
+}
+
+fn hidden(path: &str) -> bool {
+    path.split('/').any(|part| part.starts_with('.'))
+}
+
+fn files_below(dir: &Path, prefix: &str, depth: usize, files: &mut Vec<AssetFile>) -> io::Result<()> {
+    let refuse = |path: &Path, reason: &str| {
+        let message = format!("{}: {reason}", path.display());
+        Err(io::Error::new(io::ErrorKind::InvalidData, message))
+    };
+    if depth > MAX_DEPTH {
+        return refuse(dir, "nested too deeply");
+    }
+    for entry in std::fs::read_dir(dir)? {
+        let entry = entry?;
+        let path = entry.path();
+        let Some(name) = entry.file_name().to_str().map(str::to_owned) else {
+            return refuse(&path, "the name is not UTF-8");
+        };
+        if hidden(&name) {
+            continue;
+        }
+        let inside = format!("{prefix}/{name}");
+        let facts = std::fs::metadata(&path)?;
+        if facts.is_dir() {
+            files_below(&path, &inside, depth + 1, files)?;
+        } else if facts.len() > MAX_BYTES {
+            return refuse(&path, "longer than 1 MiB");
+        } else {
+            let Ok(text) = String::from_utf8(std::fs::read(&path)?) else {
+                return refuse(&path, "not UTF-8");
+            };
+            files.push(AssetFile { path: inside, text });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_is_embedded_and_nothing_hidden() {
+        let assets = Assets::embedded();
+        assert!(assets.get("suites/requirements/ORD-REJ.yaml").is_some());
+        assert!(
+            assets
+                .under("schemas/")
+                .any(|file| file.path.ends_with("/protocol.toml"))
+        );
+        assert!(assets.under("").all(|file| !file.path.contains("/.")));
+        assert!(assets.get("suites/agv/.gitkeep").is_none());
+        assert_eq!(assets.sha256().len(), 64);
+        assert!(!assets.modified());
+    }
+
+    #[test]
+    fn a_directory_replaces_the_suites_only() {
+        let dir = tempfile::tempdir().expect("directory");
+        std::fs::create_dir_all(dir.path().join("agv/x")).expect("directory");
+        std::fs::write(dir.path().join("agv/x/y.yaml"), "test: x/y").expect("file");
+        std::fs::write(dir.path().join(".hidden"), [0xff]).expect("file");
+        let assets = Assets::with_suites(dir.path()).expect("assets");
+        let suites: Vec<_> = assets.under("suites/").map(|file| file.path.as_str()).collect();
+        assert_eq!(suites, ["suites/agv/x/y.yaml"]);
+        assert!(assets.under("schemas/").count() > 10);
+        assert!(assets.modified());
+        assert_ne!(assets.sha256(), Assets::embedded().sha256());
+    }
+
+    #[test]
+    fn a_copy_of_the_suites_counts_as_unmodified() {
+        let dir = tempfile::tempdir().expect("directory");
+        let embedded = Assets::embedded();
+        for file in embedded.under("suites/") {
+            let path = dir.path().join(&file.path["suites/".len()..]);
+            std::fs::create_dir_all(path.parent().expect("parent")).expect("directory");
+            std::fs::write(path, &file.text).expect("file");
+        }
+        let copy = Assets::with_suites(dir.path()).expect("assets");
+        assert_eq!(copy.sha256(), embedded.sha256());
+        assert!(!copy.modified());
+    }
+
+    #[test]
+    fn what_is_no_text_is_refused_with_its_name() {
+        let dir = tempfile::tempdir().expect("directory");
+        std::fs::write(dir.path().join("x.yaml"), [0xff, 0xfe]).expect("file");
+        let message = Assets::with_suites(dir.path()).expect_err("not text").to_string();
+        assert!(message.contains("x.yaml"), "{message}");
+        assert!(Assets::with_suites(&dir.path().join("missing")).is_err());
+    }
+}
