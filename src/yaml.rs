@@ -302,6 +302,13 @@ impl<'a> Builder<'a> {
         } else {
             open.end
         };
+        // A closing bracket is reported together with the blanks behind it.
+        let end = open.start
+            + self
+                .source
+                .text
+                .get(open.start..end)
+                .map_or(0, |text| text.trim_end().len());
         let kind = match open.kind {
             OpenKind::List(items) => Kind::List(items),
             OpenKind::Map { entries, .. } => Kind::Map(entries),
@@ -542,6 +549,8 @@ mod tests {
             let list = root.get("list").expect("key");
             assert_eq!(place(&list.list().expect("list")[0]), "{ a: 1, b: [x] }");
             assert_eq!(list.span.line(), 3);
+            let inner = read("a: { b: { c: 1 } }").expect("valid");
+            assert_eq!(place(inner.get("a").and_then(|a| a.get("b")).expect("b")), "{ c: 1 }");
             assert!(place(list).ends_with("two"), "{:?}", place(list));
             assert_eq!(place(&root.map().expect("map")[2].0), "last");
             assert!(place(&root).ends_with("end"));

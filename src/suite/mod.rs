@@ -1,7 +1,108 @@
 //! YAML into typed tests, with a source span on everything, linted against the packs.
 //!
-//! [`model`] is what the rest of the program sees. `syntax` turns text into a spanned tree (the only place
-//! that knows the YAML crate), `read` turns the tree into the model, `lint` checks every path, literal,
+//! [`model`] is what the rest of the program sees. [`Suites::load`] makes it from the files: tables of cases and
+//! states are filled in on the tree, the tree is read into the model, and `lint` looks up every path, literal,
 //! requirement, variable, state and check name. Running a test is left to the engine, judging it to the judge.
 
+mod course;
+mod expand;
+mod fields;
+mod grammar;
+mod lint;
+mod load;
 pub mod model;
+mod steps;
+mod stimuli;
+mod terms;
+#[cfg(test)]
+mod tests;
+mod visit;
+
+use std::sync::Arc;
+
+pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
+
+use crate::diagnostic::Diagnostic;
+use crate::pack::{Assets, Catalogue, Packs};
+use model::{Monitor, Test};
+
+/// What the linter has to know of a named check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CheckInfo {
+    /// Name, such as `order/remaining-route`.
+    pub name: &'static str,
+    /// Requirements it can decide.
+    pub decides: &'static [&'static str],
+    /// Names of arguments it takes.
+    pub arguments: &'static [&'static str],
+}
+
+/// All tests and monitors, sorted by id.
+#[derive(Clone, Debug, Default)]
+pub struct Suites {
+    /// The tests; every row of a table is one.
+    pub tests: Vec<Arc<Test>>,
+    /// The monitors.
+    pub monitors: Vec<Arc<Monitor>>,
+}
+
+impl Suites {
+    /// Loads every suite of `assets`. `checks` are the named checks there are, `hooks` the hooks a profile can have.
+    ///
+    /// # Errors
+    /// Everything that is wrong with any of the files, by file and place.
+    pub fn load(
+        assets: &Assets,
+        packs: &Packs,
+        catalogue: &Catalogue,
+        checks: &[CheckInfo],
+        hooks: &[HookFacts],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        let vocabulary = PackVocabulary {
+            packs,
+            catalogue,
+            hooks,
+        };
+        load::load(files(assets), &vocabulary, checks)
+    }
+
+    /// Loads the text of one test, state or monitor, told apart by content, wherever it lies. The states it uses
+    /// are those of `assets`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn load_test_text(
+        name: &str,
+        text: &str,
+        assets: &Assets,
+        packs: &Packs,
+        catalogue: &Catalogue,
+        checks: &[CheckInfo],
+        hooks: &[HookFacts],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        let vocabulary = PackVocabulary {
+            packs,
+            catalogue,
+            hooks,
+        };
+        load::load_text(name, text, files(assets), &vocabulary, checks)
+    }
+
+    /// Loads files given by path (`suites/agv/…`) and text against any vocabulary.
+    ///
+    /// # Errors
+    /// As [`Suites::load`].
+    pub fn load_files<'a>(
+        files: impl Iterator<Item = (&'a str, &'a str)>,
+        vocabulary: &dyn Vocabulary,
+        checks: &[CheckInfo],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        load::load(files, vocabulary, checks)
+    }
+}
+
+fn files(assets: &Assets) -> impl Iterator<Item = (&str, &str)> {
+    assets
+        .under("suites/")
+        .map(|file| (file.path.as_str(), file.text.as_str()))
+}

@@ -1,0 +1,333 @@
+//! Variables: which names there are at a step, and what a use of one of them needs.
+
+use std::collections::BTreeMap;
+
+use super::vocabulary::Vocabulary;
+use crate::diagnostic::{Diagnostic, Span, did_you_mean};
+use crate::pattern::{Term, TermKind};
+use crate::suite::fields::Problems;
+use crate::suite::grammar::is_course_name;
+use crate::suite::model::{Step, Verb};
+
+/// The names of `time.`.
+const TIMES: [&str; 12] = [
+    "react",
+    "slow",
+    "event",
+    "drive",
+    "download",
+    "connect",
+    "reconnect",
+    "will",
+    "quiet",
+    "broker",
+    "statePeriod",
+    "settle",
+];
+
+/// Where names of a test come from.
+#[derive(Clone, PartialEq, Eq)]
+enum Origin {
+    /// `save`.
+    Saved,
+    /// `as`, with the actionType as written.
+    Action(String),
+}
+
+/// The names that have a value at some point of a test.
+pub(super) struct Scope<'a> {
+    vocabulary: &'a dyn Vocabulary,
+    /// Whether course, run, serve and saved names exist: not in a monitor.
+    in_test: bool,
+    names: BTreeMap<String, Origin>,
+    served: Vec<String>,
+    /// Names that some step of the test defines, to tell "too early" from "never".
+    later: Vec<String>,
+    /// Whether every step could be read; otherwise a name may come from one that could not.
+    pub(super) complete: bool,
+}
+
+impl<'a> Scope<'a> {
+    /// The scope at the start of a test with these steps.
+    pub(super) fn of_test<'s>(
+        vocabulary: &'a dyn Vocabulary,
+        steps: impl Iterator<Item = &'s Step>,
+        complete: bool,
+    ) -> Self {
+        let mut later = Vec::new();
+        for step in steps {
+            later.extend(definitions(step).into_iter().map(|(name, _, _)| name));
+            if let Verb::Serve(serve) = &step.verb {
+                later.push(format!("serve.{}", serve.name));
+            }
+        }
+        Self {
+            vocabulary,
+            in_test: true,
+            names: BTreeMap::new(),
+            served: Vec::new(),
+            later,
+            complete,
+        }
+    }
+
+    /// The scope of a monitor.
+    pub(super) fn of_monitor(vocabulary: &'a dyn Vocabulary) -> Self {
+        Self {
+            in_test: false,
+            ..Self::of_test(vocabulary, std::iter::empty(), true)
+        }
+    }
+
+    /// The names of actions that have been sent.
+    pub(super) fn actions(&self) -> Vec<&str> {
+        self.names
+            .iter()
+            .filter(|(_, origin)| matches!(origin, Origin::Action(_)))
+            .map(|(name, _)| name.as_str())
+            .collect()
+    }
+
+    /// Whether some step defines this name.
+    pub(super) fn comes_later(&self, name: &str) -> bool {
+        self.later.iter().any(|later| later == name)
+    }
+
+    /// Takes over the names a stimulus defines; they are known to the stimulus itself.
+    pub(super) fn enter(&mut self, step: &Step, problems: &mut Problems) {
+        if let Verb::Serve(serve) = &step.verb
+            && !self.served.contains(&serve.name)
+        {
+            self.served.push(serve.name.clone());
+        }
+        if matches!(step.verb, Verb::Send(_)) {
+            self.define(step, problems);
+        }
+    }
+
+    /// Takes over the names a step saves; they are known to later steps.
+    pub(super) fn leave(&mut self, step: &Step, problems: &mut Problems) {
+        if !matches!(step.verb, Verb::Send(_)) {
+            self.define(step, problems);
+        }
+    }
+
+    fn define(&mut self, step: &Step, problems: &mut Problems) {
+        for (name, origin, span) in definitions(step) {
+            match (self.names.get(&name), &origin) {
+                // An order update repeats the actions of the order.
+                (Some(before), now) if before == now => {}
+                (Some(_), _) => problems.at(
+                    "name-taken",
+                    &span,
+                    format!("`{name}` already means something else"),
+                    "choose another name",
+                ),
+                (None, _) => {}
+            }
+            self.names.entry(name).or_insert(origin);
+        }
+    }
+
+    /// Notes every unknown variable of a term. `packs` are those in which it is used.
+    pub(super) fn check(&self, term: &Term, packs: &[usize], problems: &mut Problems) {
+        term.visit_variables(&mut |name, span| {
+            if let Some(diagnostic) = self.mistake(name, span, packs) {
+                problems.add(diagnostic);
+            }
+        });
+    }
+
+    fn mistake(&self, name: &str, span: &Span, packs: &[usize]) -> Option<Diagnostic> {
+        let (root, rest) = name.split_once('.').unwrap_or((name, ""));
+        let root_name = root.split('[').next().unwrap_or(root);
+        let unknown = |hint: String| {
+            Some(
+                Diagnostic::new(
+                    "unknown-variable",
+                    span.clone(),
+                    format!("unknown variable `${{{name}}}`"),
+                    "no such name",
+                )
+                .hint(hint),
+            )
+        };
+        let only_in_tests = |known: bool, hint: String| match (self.in_test, known) {
+            (true, true) => None,
+            (true, false) => unknown(hint),
+            (false, _) => unknown("a monitor knows `time.`, `device.` and `vda.`".to_owned()),
+        };
+        match root {
+            "time" if TIMES.contains(&rest) => None,
+            "time" => unknown(did_you_mean(rest, TIMES)),
+            "device" => self.device(rest, packs, unknown),
+            "vda" => self.word(name, rest, span, packs),
+            "course" => only_in_tests(
+                is_course_use(rest),
+                "`${course.a}` is a node, `${course.a-b}` an edge, `${course.a.x}` a value of a node".to_owned(),
+            ),
+            "run" => only_in_tests(!rest.is_empty(), "write such as `${run.order}`".to_owned()),
+            "serve" => self.served(name, rest, span),
+            // Filled in, or noted, before the steps were read.
+            "case" | "with" if self.in_test => None,
+            _ if !self.in_test => only_in_tests(false, String::new()),
+            _ => match self.names.get(root_name) {
+                Some(Origin::Saved) => None,
+                Some(Origin::Action(_)) if rest == "id" => None,
+                Some(Origin::Action(_)) => unknown(format!("`${{{root}.id}}` is its actionId")),
+                None => self.undefined(name, root_name, span),
+            },
+        }
+    }
+
+    fn undefined(&self, name: &str, root: &str, span: &Span) -> Option<Diagnostic> {
+        if self.comes_later(root) {
+            return Some(too_early(name, span));
+        }
+        if !self.complete {
+            return None;
+        }
+        let known: Vec<&str> = self
+            .names
+            .keys()
+            .map(String::as_str)
+            .chain(["time", "device", "course", "run", "vda", "serve"])
+            .collect();
+        Some(
+            Diagnostic::new(
+                "unknown-variable",
+                span.clone(),
+                format!("unknown variable `${{{name}}}`"),
+                "no step gives it a value",
+            )
+            .hint(did_you_mean(root, known)),
+        )
+    }
+
+    fn served(&self, name: &str, rest: &str, span: &Span) -> Option<Diagnostic> {
+        let (offer, member) = rest.split_once('.').unwrap_or((rest, ""));
+        if self.served.iter().any(|served| served == offer) {
+            if ["", "url", "sha256"].contains(&member) {
+                return None;
+            }
+        } else if self.comes_later(&format!("serve.{offer}")) {
+            return Some(too_early(name, span));
+        } else if !self.complete {
+            return None;
+        }
+        Some(
+            Diagnostic::new(
+                "unknown-variable",
+                span.clone(),
+                format!("unknown variable `${{{name}}}`"),
+                "nothing of this name is served",
+            )
+            .hint("`- serve: NAME` gives `${serve.NAME.url}` and `${serve.NAME.sha256}`"),
+        )
+    }
+
+    fn device(
+        &self,
+        rest: &str,
+        packs: &[usize],
+        unknown: impl Fn(String) -> Option<Diagnostic>,
+    ) -> Option<Diagnostic> {
+        let (first, below) = rest.split_once('.').unwrap_or((rest, ""));
+        match first {
+            "manufacturer" | "serialNumber" if below.is_empty() => None,
+            "factsheet" => {
+                let path: Vec<&str> = below
+                    .split(['.', '[', ']'])
+                    .filter(|part| !part.is_empty() && !part.bytes().all(|byte| byte.is_ascii_digit()))
+                    .collect();
+                let known = packs
+                    .iter()
+                    .any(|pack| self.vocabulary.shape(*pack, "factsheet", &path).is_some());
+                if known {
+                    return None;
+                }
+                let parent = path.split_last().map_or(&[][..], |(_, parent)| parent);
+                let members: Vec<String> = packs
+                    .iter()
+                    .flat_map(|pack| self.vocabulary.members(*pack, "factsheet", parent))
+                    .collect();
+                unknown(did_you_mean(
+                    path.last().copied().unwrap_or_default(),
+                    members.iter().map(String::as_str),
+                ))
+            }
+            _ => unknown(did_you_mean(first, ["manufacturer", "serialNumber", "factsheet"])),
+        }
+    }
+
+    fn word(&self, name: &str, path: &str, span: &Span, packs: &[usize]) -> Option<Diagnostic> {
+        let pack = packs
+            .iter()
+            .find(|pack| path.is_empty() || self.vocabulary.word(**pack, path).is_none())?;
+        let version = self
+            .vocabulary
+            .versions()
+            .get(*pack)
+            .map(ToString::to_string)
+            .unwrap_or_default();
+        let (parent, last) = path.rsplit_once('.').unwrap_or(("", path));
+        let siblings: Vec<String> = match self.vocabulary.word(*pack, parent) {
+            Some(serde_json::Value::Object(members)) => members.keys().cloned().collect(),
+            _ => Vec::new(),
+        };
+        Some(
+            Diagnostic::new(
+                "unknown-variable",
+                span.clone(),
+                format!("unknown variable `${{{name}}}`"),
+                format!("not in the vocabulary of {version}"),
+            )
+            .hint(did_you_mean(last, siblings.iter().map(String::as_str))),
+        )
+    }
+}
+
+fn too_early(name: &str, span: &Span) -> Diagnostic {
+    Diagnostic::new(
+        "used-too-early",
+        span.clone(),
+        format!("`${{{name}}}` is used before it has a value"),
+        "a later step gives it one",
+    )
+}
+
+fn is_course_use(rest: &str) -> bool {
+    let name = rest.split(['.', '[']).next().unwrap_or(rest);
+    match name.split_once('-') {
+        Some((from, to)) => is_course_name(from) && is_course_name(to),
+        None => is_course_name(name),
+    }
+}
+
+/// The names a step defines, what they mean, and where.
+fn definitions(step: &Step) -> Vec<(String, Origin, Span)> {
+    match &step.verb {
+        Verb::Send(send) => send
+            .route
+            .iter()
+            .flat_map(|route| route.actions.iter().flat_map(|(_, actions)| actions))
+            .chain(&send.actions)
+            .filter_map(|action| {
+                let kind = match &action.action.kind {
+                    TermKind::Literal(value) => value.to_string(),
+                    other => format!("{other:?}"),
+                };
+                Some((action.name.clone()?, Origin::Action(kind), action.span.clone()))
+            })
+            .collect(),
+        Verb::Expect(expect) => saved(&expect.save, step),
+        Verb::Action(action) => saved(&action.save, step),
+        _ => Vec::new(),
+    }
+}
+
+fn saved(save: &[(String, crate::suite::model::Path)], step: &Step) -> Vec<(String, Origin, Span)> {
+    save.iter()
+        .map(|(name, _)| (name.clone(), Origin::Saved, super::within(&step.span, name)))
+        .collect()
+}
