@@ -19,6 +19,7 @@ use clap::Parser as _;
 
 use crate::diagnostic::Diagnostic;
 use crate::pack::Pack;
+use crate::report::text::Color;
 use crate::run::Library;
 use args::{Cli, Command};
 use list::print;
@@ -51,6 +52,12 @@ pub fn main() -> ExitCode {
         problem.exit()
     });
     ExitCode::from(exit.code())
+}
+
+/// Whether results on standard output are coloured.
+fn color() -> Color {
+    let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    if console::colors_enabled() && !no_color { Color::Always } else { Color::Never }
 }
 
 /// The pack of a version; the newest one unless said.

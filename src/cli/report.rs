@@ -8,7 +8,7 @@ use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
 use crate::journal::file::{self, Recording};
 use crate::judge;
-use crate::report::text::{self, Color};
+use crate::report::text;
 use crate::report::{compare, json, manifest};
 use crate::run::{Bundle, Library, sources, write_all};
 
@@ -48,7 +48,7 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
                 report: Some(&shown),
                 root: Some(&root),
             };
-            super::print(&text::summary(&result, bundle, Color::of_stdout()))?
+            super::print(&text::summary(&result, bundle, super::color()))?
         }
     };
     Ok(Exit::of(result.verdict))

@@ -9,27 +9,27 @@ use tokio::sync::watch;
 use super::args;
 use super::exit::Exit;
 use super::problem::Problem;
+use super::screen::Screen;
 use crate::clock::WallClock;
 use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::engine::{Composer, Engine, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, Occurrence, Setting};
 use crate::judge::RunJudge;
-use crate::link::mqtt::endpoint::Credentials;
+use crate::link::mqtt::endpoint::{Credentials, Endpoint};
 use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
-use crate::link::{Link, LinkError, Vantage};
+use crate::link::{LinkError, Vantage};
 use crate::pack::Pack;
-use crate::profile::{self, Effective, LayoutSource, Profile, Surroundings, TimeLimits};
+use crate::profile::{self, Claim, Effective, LayoutSource, Profile, Surroundings, TimeLimits};
 use crate::reference::agv::Agv;
-use crate::report::text::{self, Color};
-use crate::run::device_driver::{DeviceCommand, DeviceHandle, drive_device};
+use crate::report::text;
+use crate::run::device_driver::RunningDevice;
 use crate::run::hooks::{DeviceProcess, ProfileHooks};
 use crate::run::{
     Bundle, Capabilities, End, Finished, HeaderParts, Library, ReferenceAgv, Setup, Subject, VirtualRun, run,
     run_virtually, sources, write_all, write_result,
 };
 use crate::suite::model::Test;
-use crate::ui::Terminal;
 use crate::verdict::Verdict;
 
 /// What `run` and `certify` have in common.
@@ -137,7 +137,7 @@ fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Proble
     })
 }
 
-fn check_faults(faults: &[String]) -> Result<(), Problem> {
+pub(super) fn check_faults(faults: &[String]) -> Result<(), Problem> {
     use crate::reference::agv::FAULTS;
     for fault in faults {
         if !FAULTS.iter().any(|known| known.name == fault) {
@@ -181,6 +181,7 @@ impl Job {
         let utc = WallClock::start().now().utc;
         let bundle = self.bundle(&device.subject, utc)?;
         let writer = bundle.journal().map_err(|error| Problem::Environment(error.to_string()))?;
+        let device_name = format!("{} {}", device.subject.manufacturer, device.subject.serial_number);
         let mut request = VirtualRun::of(&self.library, &self.pack);
         request.device = device;
         request.faults.clone_from(&arguments.fault);
@@ -190,7 +191,7 @@ impl Job {
         request.begun = utc;
         request.run.clone_from(&self.run);
         request.command.clone_from(&self.command);
-        let mut terminal = Terminal::new(self.output.verbose);
+        let mut terminal = self.screen(&device_name);
         let mut saved = |judge: &RunJudge| drop(write_result(&bundle, &judge.result()));
         let finished = run_virtually(
             &self.library,
@@ -218,8 +219,9 @@ impl Job {
         let bundle = self.bundle(&device.subject, clock.origin_stamp().utc)?;
         let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
         let faults: Vec<&str> = arguments.fault.iter().map(String::as_str).collect();
-        let handle = drive_device(Agv::new(device.config.clone(), &faults), &info.device_address, clock);
-        let operator = Commands(handle);
+        let agv = Agv::new(device.config.clone(), &faults).map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?;
+        let endpoint = Endpoint::parse(&info.device_address, None, None).map_err(link_problem)?;
+        let operator = Commands(RunningDevice::start(agv, endpoint, clock, None));
         let capabilities = Capabilities {
             factsheet: None,
             statements: device.statements(),
@@ -269,9 +271,7 @@ impl Job {
         let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
         let folder = arguments.device.profile.as_deref().and_then(Path::parent).map_or_else(PathBuf::new, Path::to_path_buf);
         let operator = self.hooks(&profile, &info, &bundle, &folder)?;
-        if !self.output.quietly() {
-            eprintln!("the device is expected at mqtt://{}", info.device_address);
-        }
+        eprintln!("the device is expected at mqtt://{}", info.device_address);
         let motion = match (self.no_motion, profile.motion.allowed) {
             (true, _) => Err(NO_MOTION.to_owned()),
             (false, false) => Err("the profile does not allow motion ([motion] allowed = true)".to_owned()),
@@ -283,8 +283,8 @@ impl Job {
         }
         let capabilities = Capabilities {
             factsheet: None,
-            statements: profile.device.statements.clone(),
-            claims: profile.device.claims.iter().map(|claim| (claim.name(), claim.claimed())).collect(),
+            statements: statements(&profile.device),
+            claims: claims(&profile.device),
             vantage: if tap { Vantage::Tap } else { Vantage::Subscriber },
             hooks: operator.hooks(),
             maps: true,
@@ -293,7 +293,7 @@ impl Job {
         let session = SessionParts {
             subject,
             time: profile.time.clone(),
-            device: profile.device.bindings.clone(),
+            device: own_actions(&profile.device)?,
             layout,
             capabilities,
             limits,
@@ -304,6 +304,16 @@ impl Job {
                 .collect(),
         };
         self.carry_out(session, &bundle, link, operator, clock, interrupt).await
+    }
+
+    fn screen(&self, device: &str) -> Screen {
+        let results = self.output.format == args::Format::Text;
+        if self.output.verbose > 0 {
+            for setting in &self.effective.settings {
+                eprintln!("{} = {}  ({})", setting.name, setting.value, setting.origin);
+            }
+        }
+        Screen::new(device.to_owned(), self.pack.version.to_string(), results)
     }
 
     fn subject(&self, profile: &Profile) -> Result<Subject, Problem> {
@@ -353,6 +363,7 @@ impl Job {
         clock: WallClock,
         interrupt: watch::Receiver<bool>,
     ) -> Result<Exit, Problem> {
+        let device_name = format!("{} {}", session.subject.manufacturer, session.subject.serial_number);
         let header = HeaderParts {
             subject: &session.subject,
             pack: &self.pack,
@@ -384,7 +395,7 @@ impl Job {
             limits: session.limits,
             run: self.run.clone(),
         };
-        let mut terminal = Terminal::new(self.output.verbose);
+        let mut terminal = self.screen(&device_name);
         let mut saved = |judge: &RunJudge| drop(write_result(bundle, &judge.result()));
         let end = run(&mut engine, setup, &mut terminal, &mut saved).await;
         let Engine { link, recorder, .. } = engine;
@@ -398,7 +409,7 @@ impl Job {
     }
 
     /// Writes the bundle and says the verdict.
-    fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Terminal) -> Result<Exit, Problem> {
+    fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Screen) -> Result<Exit, Problem> {
         let Finished { end, result, recorder } = finished;
         let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
         let root = write_all(bundle, &result, &quoted, recorder.journal());
@@ -408,10 +419,10 @@ impl Job {
         match self.output.format {
             args::Format::Json => {
                 let text = crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
-                crate::ui::print(&text);
+                super::print(&text)?;
             }
             args::Format::Text => {
-                let color = Color::stdout();
+                let color = super::color();
                 let mut page = String::new();
                 for test in result.tests.iter().filter(|test| test.verdict.is_some_and(|verdict| verdict > Verdict::Pass)) {
                     page.push_str(&text::test(test, &quoted, Some(recorder.journal()), color));
@@ -424,12 +435,12 @@ impl Job {
                 page.push_str(&text::summary(
                     &result,
                     text::Bundle {
-                        report: &format!("{shown}/report.html"),
-                        root: &root,
+                        report: Some(&format!("{shown}/report.html")),
+                        root: Some(&root),
                     },
                     color,
                 ));
-                crate::ui::print(&page);
+                super::print(&page)?;
             }
         }
         match end {
@@ -452,6 +463,47 @@ struct SessionParts {
     capabilities: Capabilities,
     limits: Vec<String>,
     deviations: BTreeMap<String, String>,
+}
+
+/// What the profile states, and what follows from the actions it names.
+fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
+    let mut all = device.statements.clone();
+    all.insert("long-action".to_owned(), device.long_action.is_some());
+    all.insert("uninterruptible-action".to_owned(), device.uninterruptible_action.is_some());
+    all
+}
+
+fn claims(device: &profile::Device) -> BTreeMap<String, bool> {
+    let one = |claim: &Claim| match claim {
+        Claim::Action { name, scope: None } => (format!("action {name}"), true),
+        Claim::Action { name, scope: Some(scope) } => (format!("action {name} {scope}"), true),
+        Claim::NoAction(name) => (format!("action {name}"), false),
+        Claim::Optional(path) => (format!("optional {path}"), true),
+        Claim::NoOptional(path) => (format!("optional {path}"), false),
+        Claim::Limit { name, value } => (format!("limit {name}"), *value > 0),
+        Claim::Statement(name) => (name.clone(), true),
+        Claim::NoStatement(name) => (name.clone(), false),
+    };
+    device.claims.iter().map(one).collect()
+}
+
+/// `device.longAction` and `device.uninterruptibleAction`: an actionType, and its parameters as JSON.
+fn own_actions(device: &profile::Device) -> Result<serde_json::Map<String, serde_json::Value>, Problem> {
+    let mut all = serde_json::Map::new();
+    let named = [
+        ("longAction", "device.long-action", &device.long_action),
+        ("uninterruptibleAction", "device.uninterruptible-action", &device.uninterruptible_action),
+    ];
+    for (name, setting, text) in named {
+        let Some(text) = text else { continue };
+        let (kind, parameters) = text.trim().split_once(char::is_whitespace).unwrap_or((text.trim(), "{}"));
+        let parameters: serde_json::Map<String, serde_json::Value> = serde_json::from_str(parameters).map_err(|error| {
+            let diagnostic = Diagnostic::whole("bad-value", format!("`{setting}`: the parameters are not a JSON object: {error}"));
+            Problem::from(diagnostic.hint("write it like: beep {\"duration\": 1.5}"))
+        })?;
+        all.insert(name.to_owned(), serde_json::json!({ "type": kind, "parameters": parameters }));
+    }
+    Ok(all)
 }
 
 fn settings(effective: &Effective) -> Vec<Setting> {
@@ -496,7 +548,7 @@ fn layout_of(profile: &Profile) -> Result<Option<Layout>, Problem> {
 }
 
 /// Hooks of the built-in device: commands to its driver.
-struct Commands(DeviceHandle);
+struct Commands(RunningDevice);
 
 impl Operator for Commands {
     fn hooks(&self) -> Vec<String> {
@@ -507,13 +559,10 @@ impl Operator for Commands {
         if !ReferenceAgv::HOOKS.contains(&hook) {
             return HookOutcome::Missing;
         }
-        let command = DeviceCommand {
-            name: hook.to_owned(),
-            parameters: serde_json::Value::Object(parameters),
-        };
-        match self.0.command(command).await {
-            Ok(()) => HookOutcome::Done("done by the built-in device".to_owned()),
-            Err(error) => HookOutcome::Failed(error),
+        if self.0.command(hook, serde_json::Value::Object(parameters)) {
+            HookOutcome::Done("done by the built-in device".to_owned())
+        } else {
+            HookOutcome::Failed("the built-in device is not running any more".to_owned())
         }
     }
 }

@@ -8,7 +8,8 @@ use crate::diagnostic::Diagnostic;
 use crate::judge::Rules;
 use crate::pack::{Assets, Catalogue, Packs, Role};
 use crate::suite::model::Test;
-use crate::suite::{CheckInfo, Suites};
+use crate::profile::HOOKS;
+use crate::suite::{CheckInfo, HookFacts, Suites};
 
 /// The loaded data.
 pub struct Library {
@@ -33,15 +34,7 @@ impl Library {
         };
         let packs = Packs::load(&assets).map_err(|error| vec![Diagnostic::whole("pack", error.to_string())])?;
         let catalogue = Catalogue::load(&assets)?;
-        let checks: Vec<CheckInfo> = checks::registry()
-            .iter()
-            .map(|check| CheckInfo {
-                name: check.name,
-                decides: check.decides,
-                arguments: check.arguments,
-            })
-            .collect();
-        let suites = Suites::load(&assets, &packs, &catalogue, &checks)?;
+        let suites = Suites::load(&assets, &packs, &catalogue, &check_infos(), &hook_facts())?;
         let sha256 = assets.sha256().to_owned();
         Ok(Self {
             assets,
@@ -71,4 +64,48 @@ impl Library {
             .cloned()
             .collect()
     }
+
+    /// Checks the text of one test, state or monitor, and says what it is.
+    ///
+    /// # Errors
+    /// Every mistake in it.
+    pub fn check_suite(&self, name: &str, text: &str) -> Result<String, Vec<Diagnostic>> {
+        let rules = &self.rules;
+        let found = Suites::load_test_text(
+            name,
+            text,
+            &self.assets,
+            &rules.packs,
+            &rules.catalogue,
+            &check_infos(),
+            &hook_facts(),
+        )?;
+        Ok(match (found.tests.len(), found.monitors.len()) {
+            (0, 0) => "a state".to_owned(),
+            (0, _) => "a monitor".to_owned(),
+            (1, _) => "a test".to_owned(),
+            (rows, _) => format!("a table of {rows} tests"),
+        })
+    }
+}
+
+fn check_infos() -> Vec<CheckInfo> {
+    let all = checks::registry().iter();
+    all.map(|check| CheckInfo {
+        name: check.name,
+        decides: check.decides,
+        arguments: check.arguments,
+    })
+    .collect()
+}
+
+fn hook_facts() -> Vec<HookFacts> {
+    HOOKS
+        .iter()
+        .map(|hook| HookFacts {
+            name: hook.name,
+            role: hook.role,
+            parameters: hook.parameters,
+        })
+        .collect()
 }

@@ -5,7 +5,7 @@
 //! unproven, and is said so by name.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::library::Library;
@@ -14,6 +14,7 @@ use crate::engine::EngineError;
 use crate::pack::Pack;
 use crate::reference::Fault;
 use crate::report::result::RunResult;
+use crate::suite::model::Test;
 use crate::verdict::Verdict;
 
 /// A clause of a test, or a monitor, deciding one requirement.
@@ -153,13 +154,27 @@ pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
 ///
 /// # Errors
 /// When a run cannot be carried out.
-pub fn qualify(
+pub fn qualify(library: &Library, pack: &Pack, faults: &[Fault]) -> Result<Qualification, EngineError> {
+    let tests = library.tests(crate::pack::Role::Agv, &pack.id);
+    qualify_tests(library, pack, &tests, faults, &|_| {})
+}
+
+/// Qualifies some tests. `told` hears the name of each fault as its turn comes.
+///
+/// # Errors
+/// When a run cannot be carried out.
+pub fn qualify_tests(
     library: &Library,
     pack: &Pack,
+    tests: &[Arc<Test>],
     faults: &[Fault],
     told: &(dyn Fn(&str) + Sync),
 ) -> Result<Qualification, EngineError> {
-    let Finished { result, .. } = run_silently(library, pack, VirtualRun::of(library, pack))?;
+    let request = VirtualRun {
+        tests: tests.to_vec(),
+        ..VirtualRun::of(library, pack)
+    };
+    let Finished { result, .. } = run_silently(library, pack, request.clone())?;
     let mut blemishes = Vec::new();
     let mut deciders = BTreeSet::new();
     for (decider, verdict) in decided(&result) {
@@ -188,7 +203,7 @@ pub fn qualify(
                 while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
                     told(fault.name);
                     let at = faults.iter().position(|other| other == fault).unwrap_or_default();
-                    let kill = kill(library, pack, *fault);
+                    let kill = kill(library, pack, &request, *fault);
                     if let Ok(mut all) = kills.lock() {
                         all.push((at, kill));
                     }
@@ -205,8 +220,8 @@ pub fn qualify(
     })
 }
 
-fn kill(library: &Library, pack: &Pack, fault: Fault) -> Result<Kill, EngineError> {
-    let mut request = VirtualRun::of(library, pack);
+fn kill(library: &Library, pack: &Pack, request: &VirtualRun, fault: Fault) -> Result<Kill, EngineError> {
+    let mut request = request.clone();
     request.faults = vec![fault.name.to_owned()];
     let finished = run_silently(library, pack, request)?;
     let mut deciders = BTreeSet::new();

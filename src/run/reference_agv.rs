@@ -93,6 +93,9 @@ impl ReferenceAgv {
             ("node-bound", !stops),
             ("interruptible-actions", self.config.interruptible),
             ("uninterruptible-actions", true),
+            ("long-action", true),
+            ("uninterruptible-action", true),
+            ("edge-actions", true),
             ("line-guided", false),
             ("free-navigation", true),
         ]
@@ -109,6 +112,16 @@ impl ReferenceAgv {
         all.insert("longAction".to_owned(), action("beep"));
         all.insert("uninterruptibleAction".to_owned(), action("calibrate"));
         all
+    }
+
+    /// Gives it another name.
+    pub fn rename(&mut self, manufacturer: &str, serial_number: &str, topic_template: Option<&str>, pack: &Pack) {
+        manufacturer.clone_into(&mut self.subject.manufacturer);
+        serial_number.clone_into(&mut self.subject.serial_number);
+        self.subject.topic_template = topic_template.map(str::to_owned);
+        self.config.manufacturer.clone_from(&self.subject.manufacturer);
+        self.config.serial_number.clone_from(&self.subject.serial_number);
+        self.config.topics = self.subject.topics(pack);
     }
 
     /// The hooks it understands as commands.

@@ -69,6 +69,12 @@ impl<W: Write, E: Write> Terminal<W, E> {
         self.results.is_closed()
     }
 
+    /// Takes the bar away.
+    pub fn clear(&mut self) {
+        self.bar.finish_and_clear();
+        self.bar = ProgressBar::hidden();
+    }
+
     fn result(&mut self, text: &str) {
         if self.options.results {
             // A full disk behind the pipe loses the line, not the run: the report has it as well.
