@@ -12,7 +12,7 @@ use super::problem::Problem;
 use super::screen::Screen;
 use crate::clock::WallClock;
 use crate::course::Layout;
-use crate::diagnostic::{Diagnostic, Source};
+use crate::diagnostic::Diagnostic;
 use crate::engine::{Composer, Engine, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, Occurrence, Setting};
 use crate::judge::RunJudge;
@@ -20,7 +20,7 @@ use crate::link::mqtt::endpoint::{Credentials, Endpoint};
 use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
 use crate::link::{LinkError, Vantage};
 use crate::pack::Pack;
-use crate::profile::{self, Claim, Effective, LayoutSource, Profile, Surroundings, TimeLimits};
+use crate::profile::{self, Claim, Effective, Profile, Surroundings, TimeLimits};
 use crate::reference::agv::Agv;
 use crate::report::text;
 use crate::run::device_driver::RunningDevice;
@@ -246,7 +246,7 @@ impl Job {
     async fn device(self, arguments: &args::Run, interrupt: watch::Receiver<bool>, surroundings: &Surroundings) -> Result<Exit, Problem> {
         let profile = self.effective.profile.clone();
         let subject = self.subject(&profile)?;
-        let layout = layout_of(&profile)?;
+        let layout = Layout::of_profile(&profile)?;
         let password = profile.bench.password.password(surroundings);
         let password = password.map_err(|error| Problem::from(Diagnostic::whole("password", error.to_string())))?;
         let credentials = profile.bench.username.clone().map(|username| Credentials {
@@ -293,7 +293,7 @@ impl Job {
         let session = SessionParts {
             subject,
             time: profile.time.clone(),
-            device: own_actions(&profile.device)?,
+            device: profile.device.bindings(),
             layout,
             capabilities,
             limits,
@@ -487,25 +487,6 @@ fn claims(device: &profile::Device) -> BTreeMap<String, bool> {
     device.claims.iter().map(one).collect()
 }
 
-/// `device.longAction` and `device.uninterruptibleAction`: an actionType, and its parameters as JSON.
-fn own_actions(device: &profile::Device) -> Result<serde_json::Map<String, serde_json::Value>, Problem> {
-    let mut all = serde_json::Map::new();
-    let named = [
-        ("longAction", "device.long-action", &device.long_action),
-        ("uninterruptibleAction", "device.uninterruptible-action", &device.uninterruptible_action),
-    ];
-    for (name, setting, text) in named {
-        let Some(text) = text else { continue };
-        let (kind, parameters) = text.trim().split_once(char::is_whitespace).unwrap_or((text.trim(), "{}"));
-        let parameters: serde_json::Map<String, serde_json::Value> = serde_json::from_str(parameters).map_err(|error| {
-            let diagnostic = Diagnostic::whole("bad-value", format!("`{setting}`: the parameters are not a JSON object: {error}"));
-            Problem::from(diagnostic.hint("write it like: beep {\"duration\": 1.5}"))
-        })?;
-        all.insert(name.to_owned(), serde_json::json!({ "type": kind, "parameters": parameters }));
-    }
-    Ok(all)
-}
-
 fn settings(effective: &Effective) -> Vec<Setting> {
     effective.settings.clone()
 }
@@ -523,28 +504,6 @@ fn broker_choice(url: Option<&str>, profile: &Profile, credentials: Option<Crede
             credentials,
         },
     })
-}
-
-fn layout_of(profile: &Profile) -> Result<Option<Layout>, Problem> {
-    let layout = match &profile.layout.source {
-        LayoutSource::None => return Ok(None),
-        LayoutSource::List(list) => Layout::from_list(list),
-        LayoutSource::Lif { file, vehicle_type } => {
-            let text = std::fs::read_to_string(file).map_err(|error| {
-                let title = format!("the layout {} cannot be read: {error}", file.display());
-                Problem::from(Diagnostic::whole("unreadable", title))
-            })?;
-            Layout::from_lif(&Source::new(file.display().to_string(), text), vehicle_type.as_deref())?
-        }
-    };
-    let layout = match &profile.layout.allow_list {
-        None => layout,
-        Some(allowed) => layout.only(allowed).map_err(|error| Problem::from(Diagnostic::whole("layout", error.to_string())))?,
-    };
-    Ok(Some(match profile.motion.max_speed {
-        Some(cap) => layout.slower_than(cap),
-        None => layout,
-    }))
 }
 
 /// Hooks of the built-in device: commands to its driver.

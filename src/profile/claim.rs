@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::key::STATEMENTS;
+use super::key::{SAMPLE_ACTIONS, STATEMENTS, Statement};
 use crate::diagnostic;
 
 /// One claim of `device.claims`.
@@ -30,7 +30,7 @@ pub enum Claim {
     },
     /// A name of [`STATEMENTS`].
     Statement(String),
-    /// `no` and a name of [`STATEMENTS`].
+    /// `no` and a name of [`STATEMENTS`] or [`SAMPLE_ACTIONS`].
     NoStatement(String),
 }
 
@@ -68,8 +68,8 @@ impl FromStr for Claim {
                     "such as `limit NAME = 10`".to_owned(),
                 )),
             },
-            ["no", name] => statement(name).map(Self::NoStatement),
-            [name] => statement(name).map(Self::Statement),
+            ["no", name] => statement(name, STATEMENTS.iter().chain(SAMPLE_ACTIONS)).map(Self::NoStatement),
+            [name] => statement(name, STATEMENTS.iter()).map(Self::Statement),
             _ => Err((
                 format!("`{text}` is not a claim"),
                 "a claim is `action NAME`, `action NAME NODE`, `no action NAME`, `optional PATH`, `no optional PATH`, \
@@ -80,15 +80,17 @@ impl FromStr for Claim {
     }
 }
 
-fn statement(name: &str) -> Result<String, (String, String)> {
-    let names = STATEMENTS.iter().map(|statement| statement.name);
+fn statement<'a>(name: &str, known: impl Iterator<Item = &'a Statement> + Clone) -> Result<String, (String, String)> {
+    let names = known.map(|statement| statement.name);
     if names.clone().any(|known| known == name) {
         return Ok(name.to_owned());
     }
-    Err((
-        format!("there is no statement `{name}`"),
-        diagnostic::did_you_mean(name, names),
-    ))
+    let hint = if SAMPLE_ACTIONS.iter().any(|action| action.name == name) {
+        format!("say which action it is: `{name} = {{ type = … }}`")
+    } else {
+        diagnostic::did_you_mean(name, names)
+    };
+    Err((format!("there is no statement `{name}`"), hint))
 }
 
 impl Claim {
@@ -148,6 +150,7 @@ mod tests {
             "limit maxArrayLens.order.nodes = 10",
             "line-guided",
             "no line-guided",
+            "no uninterruptible-action",
         ] {
             assert_eq!(text.parse::<Claim>().expect("a claim").to_string(), text);
         }
@@ -160,6 +163,7 @@ mod tests {
             "action",
             "action pick NODES",
             "line-guidet",
+            "long-action",
             "limit x = y",
             "limit x 10",
             "a b c",

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::hooks::{self, HookAction};
-use super::key::{KEYS, STATEMENTS};
+use super::key::{KEYS, SAMPLE_ACTIONS, STATEMENTS};
 use super::layer::Layer;
 use super::value::Value;
-use super::{Bench, Claim, Device, Layout, LayoutSource, Motion, PasswordSource, Profile, Setting, TimeLimits};
+use super::{
+    Bench, Claim, Device, Layout, LayoutSource, Motion, PasswordSource, Profile, SampleAction, Setting, TimeLimits,
+};
 use crate::diagnostic::{self, Diagnostic, Span};
 use crate::pack::Role;
 
@@ -91,6 +93,13 @@ impl Taken<'_> {
         }
     }
 
+    fn action(&self, path: &str) -> Option<SampleAction> {
+        match self.value(path)? {
+            Value::Action(action) => Some(action.clone()),
+            _ => None,
+        }
+    }
+
     fn role(&self) -> Role {
         match self.text("device.role") {
             Some(word) if word == Role::MasterControl.word() => Role::MasterControl,
@@ -138,7 +147,11 @@ impl Taken<'_> {
             Claim::NoStatement(name) => Some((name, false)),
             _ => None,
         });
-        claims.chain(flags).collect()
+        let actions = SAMPLE_ACTIONS.iter().filter_map(|action| {
+            self.action(&format!("device.{}", action.name))?;
+            Some((action.name.to_owned(), true))
+        });
+        claims.chain(flags).chain(actions).collect()
     }
 
     fn profile(&self) -> Profile {
@@ -163,6 +176,8 @@ impl Taken<'_> {
                 protocol: self.text("device.protocol"),
                 topic_template: self.text("device.topic-template"),
                 command: self.texts("device.command"),
+                long_action: self.action("device.long-action"),
+                uninterruptible_action: self.action("device.uninterruptible-action"),
                 statements: self.statements(),
                 claims: self.claims(),
             },
@@ -311,7 +326,9 @@ impl Taken<'_> {
                 continue;
             };
             let claimed = matches!(claim, Claim::Statement(_));
-            if self.flag(&format!("device.{name}")).is_some_and(|flag| flag != claimed) {
+            let path = format!("device.{name}");
+            let said = self.flag(&path).or_else(|| self.action(&path).map(|_| true));
+            if said.is_some_and(|said| said != claimed) {
                 let title = format!("`device.claims` and `device.{name}` say the opposite of each other");
                 wrong.push(self.at("device.claims", title, "the claims"));
             }

@@ -41,6 +41,8 @@ pub enum Kind {
     Version,
     /// A program and its arguments, as a list or as one line.
     Command,
+    /// An action and its parameters; its type alone when it has none.
+    Action,
     /// Statements about capabilities.
     Claims,
     /// Several names.
@@ -74,11 +76,11 @@ pub const STATEMENTS: &[Statement] = &[
     },
     Statement {
         name: "interruptible-actions",
-        doc: "The vehicle has an action that can be interrupted while it is running.",
+        doc: "The long action can be interrupted while it is running.",
     },
     Statement {
-        name: "uninterruptible-actions",
-        doc: "The vehicle has an action that cannot be interrupted while it is running.",
+        name: "edge-actions",
+        doc: "The long action can be done on an edge as well.",
     },
     Statement {
         name: "line-guided",
@@ -98,6 +100,19 @@ pub const STATEMENTS: &[Statement] = &[
     },
 ];
 
+/// Actions of the vehicle that tests may use; `needs: profile NAME` of a test asks for one, and
+/// `${device.…}` holds it.
+pub const SAMPLE_ACTIONS: &[Statement] = &[
+    Statement {
+        name: "long-action",
+        doc: "An action on a node that runs for some seconds and does no harm.",
+    },
+    Statement {
+        name: "uninterruptible-action",
+        doc: "An action on a node that runs for some seconds and cannot be interrupted.",
+    },
+];
+
 const fn key(path: &'static str, kind: Kind) -> Key {
     Key { path, kind }
 }
@@ -113,11 +128,13 @@ pub const KEYS: &[Key] = &[
     key("device.stops-between-nodes", Kind::Flag),
     key("device.node-bound", Kind::Flag),
     key("device.interruptible-actions", Kind::Flag),
-    key("device.uninterruptible-actions", Kind::Flag),
+    key("device.edge-actions", Kind::Flag),
     key("device.line-guided", Kind::Flag),
     key("device.free-navigation", Kind::Flag),
     key("device.carries-load", Kind::Flag),
     key("device.charges", Kind::Flag),
+    key("device.long-action", Kind::Action),
+    key("device.uninterruptible-action", Kind::Action),
     key("device.claims", Kind::Claims),
     key("bench.listen", Kind::Address),
     key("bench.tap", Kind::Flag),
@@ -203,6 +220,9 @@ impl Kind {
             ),
             Self::Version => "a text such as \"1.2\" or \"1.2.3\"".to_owned(),
             Self::Command => "a list such as [\"./agv\", \"--broker\", \"{broker-host}:{broker-port}\"]".to_owned(),
+            Self::Action => {
+                "an action such as \"beep\" or { type = \"wait\", parameters = { seconds = 20 } }".to_owned()
+            }
             Self::Claims => "a list of texts such as \"action pick NODE\", \"no action drop\", \"optional PATH\", \
                              \"limit NAME = 10\", or names of statements"
                 .to_owned(),

@@ -21,11 +21,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
 
 pub use claim::Claim;
 pub use effective::Effective;
 pub use hooks::{HOOKS, Hook, HookAction, HookInfo, RESTART_DEVICE, fill, find as find_hook, placeholders};
-pub use key::{COMMON_PLACEHOLDERS, KEYS, Key, Kind, PASSWORD_VARIABLE, STATEMENTS, Statement};
+pub use key::{COMMON_PLACEHOLDERS, KEYS, Key, Kind, PASSWORD_VARIABLE, SAMPLE_ACTIONS, STATEMENTS, Statement};
 pub use layer::{Surroundings, check, load};
 pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 
@@ -85,7 +86,11 @@ pub struct Device {
     pub topic_template: Option<String>,
     /// Program and arguments that start the device itself, with [`COMMON_PLACEHOLDERS`].
     pub command: Option<Vec<String>>,
-    /// What the vehicle is like; a name of [`STATEMENTS`] that is missing is not known.
+    /// An action on a node that runs for some seconds and does no harm.
+    pub long_action: Option<SampleAction>,
+    /// An action on a node that runs for some seconds and cannot be interrupted.
+    pub uninterruptible_action: Option<SampleAction>,
+    /// What the vehicle is like; a name of [`STATEMENTS`] or [`SAMPLE_ACTIONS`] that is missing is not known.
     pub statements: BTreeMap<String, bool>,
     /// What it can do, beside its factsheet or against it.
     pub claims: Vec<Claim>,
@@ -96,6 +101,47 @@ impl Device {
     #[must_use]
     pub fn states(&self, statement: &str) -> Option<bool> {
         self.statements.get(statement).copied()
+    }
+
+    /// What suites know as `device.…` from the profile alone: `manufacturer`, `serialNumber`, and of each
+    /// sample action `longAction.type` and `longAction.parameters`. What is not known is absent.
+    #[must_use]
+    pub fn bindings(&self) -> Map<String, Value> {
+        let texts = [
+            ("manufacturer", &self.manufacturer),
+            ("serialNumber", &self.serial_number),
+        ];
+        let texts = texts
+            .into_iter()
+            .filter_map(|(name, text)| Some((name, Value::from(text.as_deref()?))));
+        let actions = [
+            ("longAction", &self.long_action),
+            ("uninterruptibleAction", &self.uninterruptible_action),
+        ];
+        let actions = actions
+            .into_iter()
+            .filter_map(|(name, action)| Some((name, action.as_ref()?.value())));
+        texts
+            .chain(actions)
+            .map(|(name, value)| (name.to_owned(), value))
+            .collect()
+    }
+}
+
+/// An action of the vehicle that tests may use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleAction {
+    /// actionType.
+    pub action_type: String,
+    /// Key and value of each of its actionParameters.
+    pub parameters: Map<String, Value>,
+}
+
+impl SampleAction {
+    /// `{ type, parameters }`.
+    #[must_use]
+    pub fn value(&self) -> Value {
+        json!({ "type": self.action_type, "parameters": self.parameters })
     }
 }
 

@@ -3,8 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use super::*;
 use crate::diagnostic::{Diagnostic, Source};
 
@@ -161,7 +159,9 @@ fn the_schema_for_editors_refuses_what_a_schema_can_refuse() {
         "slow-after-react",
         "statements-contradict",
     ];
-    const ALSO_BEYOND: [&str; 3] = [
+    const ALSO_BEYOND: [&str; 5] = [
+        "action-claimed",
+        "action-claimed-absent",
         "no-tap-no-broker",
         "topic-template-placeholder",
         "vehicle-type-of-nothing",
@@ -211,7 +211,7 @@ fn the_schema_for_editors_knows_the_same_names_as_the_reader() {
 
 #[test]
 fn every_statement_is_a_setting_of_the_device() {
-    for statement in STATEMENTS {
+    for statement in STATEMENTS.iter().chain(SAMPLE_ACTIONS) {
         assert!(
             Key::find(&format!("device.{}", statement.name)).is_some(),
             "{}",
@@ -235,6 +235,15 @@ fn a_full_profile_arrives_whole() {
     assert_eq!(profile.device.states("node-bound"), Some(false));
     assert_eq!(profile.device.states("line-guided"), None);
     assert_eq!(profile.device.claims.len(), 4);
+    assert_eq!(profile.device.states("long-action"), Some(true));
+    let bindings = serde_json::Value::Object(profile.device.bindings());
+    let expected = serde_json::json!({
+        "manufacturer": "ACME",
+        "serialNumber": "carrier_07",
+        "longAction": { "type": "wait", "parameters": { "seconds": 20, "quiet": true } },
+        "uninterruptibleAction": { "type": "finePositioning", "parameters": {} },
+    });
+    assert_eq!(bindings, expected);
     assert_eq!(profile.motion.max_speed, Some(0.4));
     assert_eq!(profile.maps, [PathBuf::from("site/hall-v2.map")]);
     assert_eq!(profile.deviations[0].requirement.as_str(), "MQTT-04");

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use toml::de::DeValue;
+use toml::de::{DeTable, DeValue};
 
+use super::SampleAction;
 use super::claim::Claim;
 use super::hooks;
 use super::key::{COMMON_PLACEHOLDERS, Kind, TEMPLATE_PLACEHOLDERS};
@@ -22,6 +23,7 @@ pub(super) enum Value {
     Paths(Vec<PathBuf>),
     Texts(Vec<String>),
     Claims(Vec<Claim>),
+    Action(SampleAction),
 }
 
 /// Why a value is refused.
@@ -89,6 +91,7 @@ impl Value {
         };
         match (kind, value) {
             (Kind::Flag, DeValue::Boolean(flag)) => Ok(Self::Flag(*flag)),
+            (Kind::Action, DeValue::Table(table)) => action(table),
             (Kind::Speed, _) => speed(number(value).ok_or_else(wrong_type)?),
             (Kind::Files | Kind::Claims | Kind::Names | Kind::Command, DeValue::Array(items)) => {
                 let mut texts = Vec::with_capacity(items.len());
@@ -139,6 +142,10 @@ impl Value {
                 .parse::<crate::pack::Version>()
                 .map(|_| Self::Text(text.to_owned()))
                 .map_err(|_| expected("not a version".to_owned())),
+            Kind::Action => Ok(Self::Action(SampleAction {
+                action_type: text.to_owned(),
+                parameters: serde_json::Map::new(),
+            })),
             Kind::Command => {
                 let words = shlex::split(text).ok_or_else(|| expected("a quote is left open".to_owned()))?;
                 Self::from_list(kind, words, folder)
@@ -208,9 +215,73 @@ impl Value {
                 .collect::<Vec<_>>()
                 .join(", "),
             Self::Texts(texts) => texts.join(", "),
+            Self::Action(action) if action.parameters.is_empty() => action.action_type.clone(),
+            Self::Action(action) => {
+                let parameters = serde_json::Value::Object(action.parameters.clone());
+                format!("{} {parameters}", action.action_type)
+            }
             Self::Claims(claims) => claims.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         }
     }
+}
+
+fn action(table: &DeTable<'_>) -> Result<Value, Refusal> {
+    let expected = |label: String| Refusal::bad(label).hint(format!("expected {}", Kind::Action.hint()));
+    let mut action_type = None;
+    let mut parameters = serde_json::Map::new();
+    for (name, value) in table {
+        match (name.get_ref().as_ref(), value.get_ref()) {
+            ("type", DeValue::String(text)) if !text.trim().is_empty() => action_type = Some(text.clone().into_owned()),
+            ("type", _) => return Err(expected("`type` is the name of an action".to_owned())),
+            ("parameters", DeValue::Table(table)) => {
+                for (key, value) in table {
+                    let value = json(value.get_ref()).ok_or_else(|| {
+                        expected(format!(
+                            "parameter `{}` is {}",
+                            key.get_ref(),
+                            type_name(value.get_ref())
+                        ))
+                    })?;
+                    parameters.insert(key.get_ref().clone().into_owned(), value);
+                }
+            }
+            ("parameters", _) => return Err(expected("`parameters` is a table".to_owned())),
+            (other, _) => {
+                return Err(Refusal {
+                    code: "unknown-key",
+                    ..Refusal::bad(format!("an action has no `{other}`"))
+                        .hint(diagnostic::did_you_mean(other, ["type", "parameters"]))
+                });
+            }
+        }
+    }
+    let action_type = action_type.ok_or_else(|| expected("`type` is missing".to_owned()))?;
+    Ok(Value::Action(SampleAction {
+        action_type,
+        parameters,
+    }))
+}
+
+/// The JSON value of a parameter. A date has none.
+fn json(value: &DeValue<'_>) -> Option<serde_json::Value> {
+    Some(match value {
+        DeValue::String(text) => text.as_ref().into(),
+        DeValue::Boolean(flag) => (*flag).into(),
+        DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix()).ok()?.into(),
+        DeValue::Float(_) => number(value)?.into(),
+        DeValue::Array(items) => items
+            .iter()
+            .map(|item| json(item.get_ref()))
+            .collect::<Option<Vec<_>>>()?
+            .into(),
+        DeValue::Table(table) => {
+            let members = table
+                .iter()
+                .map(|(name, value)| Some((name.get_ref().to_string(), json(value.get_ref())?)));
+            members.collect::<Option<serde_json::Map<_, _>>>()?.into()
+        }
+        DeValue::Datetime(_) => return None,
+    })
 }
 
 /// Refuses `{name}` that stands for nothing.
