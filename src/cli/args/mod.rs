@@ -15,7 +15,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub use run::{Certify, Qualify, Run, Shard};
-pub use simulate::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
+pub use simulate::{ConnectionArgs, Simulate, Simulated, SimulatedAgv};
 
 const AFTER_HELP: &str = "\
 Examples:

@@ -15,8 +15,6 @@ pub struct Simulate {
 pub enum Simulated {
     /// A reference AGV: the best-behaved vehicle there is, unless it is given faults
     Agv(SimulatedAgv),
-    /// A reference master control that dispatches transports to the vehicles it sees
-    MasterControl(SimulatedMasterControl),
 }
 
 /// How a simulated device reaches its broker.
@@ -34,12 +32,6 @@ pub struct ConnectionArgs {
     /// How topics begin, with {majorVersion}, {manufacturer} and {serialNumber}
     #[arg(long, value_name = "TEMPLATE")]
     pub topic_template: Option<String>,
-    /// Make identifiers and the order of events repeatable
-    #[arg(long, value_name = "NUMBER")]
-    pub seed: Option<u64>,
-    /// Say more: every message; twice, with its content
-    #[arg(short, long, action = clap::ArgAction::Count)]
-    pub verbose: u8,
 }
 
 const SIMULATE_AGV_HELP: &str = "\
@@ -66,34 +58,6 @@ pub struct SimulatedAgv {
     /// How many of them
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub count: u32,
-    /// Give it a defect; may be repeated (see `list faults`)
-    #[arg(long, value_name = "NAME")]
-    pub fault: Vec<String>,
-    /// Let it behave in a way a master control has to cope with
-    #[arg(long, value_name = "NAME")]
-    pub persona: Option<String>,
-}
-
-const SIMULATE_MASTER_CONTROL_HELP: &str = "\
-Examples:
-  vda5050-tck simulate master-control --broker mqtt://127.0.0.1:1883
-  vda5050-tck simulate master-control --manufacturer ACME --serial 0001
-
-Runs until it is interrupted (Ctrl-C).";
-
-/// `simulate master-control`.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = SIMULATE_MASTER_CONTROL_HELP)]
-pub struct SimulatedMasterControl {
-    /// The broker.
-    #[command(flatten)]
-    pub connection: ConnectionArgs,
-    /// Only vehicles of this manufacturer
-    #[arg(long, value_name = "NAME")]
-    pub manufacturer: Option<String>,
-    /// Only the vehicle with this serial number
-    #[arg(long, value_name = "NUMBER")]
-    pub serial: Option<String>,
     /// Give it a defect; may be repeated (see `list faults`)
     #[arg(long, value_name = "NAME")]
     pub fault: Vec<String>,
