@@ -201,6 +201,7 @@ impl<'a> Pump<'a> {
         let connection = self.connection;
         let mut fate = Fate::Forward;
         let mut is_connect = false;
+        let evidence = piece.evidence();
         let event = match piece.content {
             Ok(packet) => {
                 match &packet {
@@ -229,7 +230,7 @@ impl<'a> Pump<'a> {
             Err(reason) => {
                 self.garbage += 1;
                 is_connect = piece.raw.first().is_some_and(|first| first >> 4 == 1);
-                let bytes = Payload::keep(piece.raw.clone());
+                let bytes = Payload::keep(evidence);
                 (self.garbage <= GARBAGE_LIMIT).then_some(Event::Undecodable {
                     connection,
                     reason,
