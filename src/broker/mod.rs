@@ -109,7 +109,14 @@ impl EmbeddedBroker {
         self.shutdown.shutdown();
         if tokio::time::timeout(STOP_LIMIT, &mut self.running).await.is_err() {
             self.running.abort();
-            let _ = self.running.await;
+            let _ = (&mut self.running).await;
         }
+    }
+}
+
+impl Drop for EmbeddedBroker {
+    fn drop(&mut self) {
+        self.shutdown.shutdown();
+        self.running.abort();
     }
 }

@@ -156,7 +156,10 @@ impl<'a> Tester<'a> {
             Ok(Some(ClientEvent::Message {
                 payload, qos, retain, ..
             })) => Ok(Got::new(&payload, qos, retain)),
-            Ok(Some(ClientEvent::Lost(reason))) => Err(self.endpoint.lost(reason)),
+            Ok(Some(ClientEvent::Lost(reason))) => Err(broken(
+                self.endpoint,
+                &format!("it ends the connection where {what} should arrive ({reason})"),
+            )),
             Ok(Some(ClientEvent::Connected) | None) => Err(self.endpoint.lost("the connection ended")),
             Err(_) => Err(broken(self.endpoint, &format!("{what} never arrives"))),
         }

@@ -104,9 +104,15 @@ impl MapServer {
     }
 
     /// Closes the port.
-    pub async fn stop(self) {
+    pub async fn stop(mut self) {
         self.serving.abort();
-        let _ = self.serving.await;
+        let _ = (&mut self.serving).await;
+    }
+}
+
+impl Drop for MapServer {
+    fn drop(&mut self) {
+        self.serving.abort();
     }
 }
 

@@ -122,9 +122,15 @@ impl Tap {
     }
 
     /// Closes the port and all connections.
-    pub async fn stop(self) {
+    pub async fn stop(mut self) {
         self.accepting.abort();
-        let _ = self.accepting.await;
+        let _ = (&mut self.accepting).await;
+    }
+}
+
+impl Drop for Tap {
+    fn drop(&mut self) {
+        self.accepting.abort();
     }
 }
 

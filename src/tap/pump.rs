@@ -21,6 +21,8 @@ use crate::journal::event::{Close, Direction, Event, Packet, Payload, Source};
 
 /// How much is held back before the tap stops reading, which lets TCP slow the sender down.
 const HELD_LIMIT: usize = 64 << 20;
+/// How many bytes are read at once. An empty buffer without room would be read 64 bytes at a time.
+const READ_SIZE: usize = 64 << 10;
 /// How many bytes go into one write.
 const WRITE_SIZE: usize = 64 << 10;
 /// How many pieces of garbage of one connection are reported; the rest is only forwarded.
@@ -85,7 +87,7 @@ impl<'a> Pump<'a> {
     {
         self.restores = control.borrow_and_update().restores;
         let mut ended = false;
-        let mut bytes = BytesMut::new();
+        let mut bytes = BytesMut::with_capacity(READ_SIZE);
         loop {
             if self.forward(&mut to).await.is_err() {
                 // The other side is gone; its own direction says how.
@@ -201,6 +203,7 @@ impl<'a> Pump<'a> {
         let connection = self.connection;
         let mut fate = Fate::Forward;
         let mut is_connect = false;
+        let evidence = piece.evidence();
         let event = match piece.content {
             Ok(packet) => {
                 match &packet {
@@ -229,7 +232,7 @@ impl<'a> Pump<'a> {
             Err(reason) => {
                 self.garbage += 1;
                 is_connect = piece.raw.first().is_some_and(|first| first >> 4 == 1);
-                let bytes = Payload::keep(piece.raw.clone());
+                let bytes = Payload::keep(evidence);
                 (self.garbage <= GARBAGE_LIMIT).then_some(Event::Undecodable {
                     connection,
                     reason,

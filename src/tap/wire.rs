@@ -14,6 +14,11 @@ use crate::journal::event::{Filter, Packet, Payload, Will};
 /// Longest packet that is held until it is complete. Longer ones are forwarded as they come and not decoded.
 pub const LONGEST_PACKET: usize = 64 << 20;
 
+/// Packet type of CONNECT.
+const CONNECT: u8 = 1;
+/// Fixed header, protocol name and level, flags and keep-alive of a CONNECT have at least this many bytes.
+const HARMLESS: usize = 12;
+
 /// A part of the stream.
 #[derive(Clone, Debug)]
 pub struct Piece {
@@ -21,6 +26,25 @@ pub struct Piece {
     pub raw: Bytes,
     /// The packet in them, or what is wrong with them.
     pub content: Result<Packet, String>,
+    /// Whether a password may be among the bytes: a CONNECT that could not be read.
+    secret: bool,
+}
+
+impl Piece {
+    fn new(raw: Bytes, content: Result<Packet, String>, secret: bool) -> Self {
+        let secret = secret || raw.first().is_some_and(|first| first >> 4 == CONNECT);
+        Self { raw, content, secret }
+    }
+
+    /// The bytes as they may be recorded: those of a CONNECT only as far as no password can be among them.
+    #[must_use]
+    pub fn evidence(&self) -> Bytes {
+        if self.secret {
+            self.raw.slice(..self.raw.len().min(HARMLESS))
+        } else {
+            self.raw.clone()
+        }
+    }
 }
 
 /// Cuts one direction of a connection into pieces.
@@ -31,6 +55,8 @@ pub struct Reader {
     level: Option<u8>,
     /// Why the stream cannot be cut into packets any more.
     lost: Option<String>,
+    /// Whether that happened in a CONNECT.
+    lost_in_connect: bool,
     aliases: HashMap<u16, String>,
 }
 
@@ -58,15 +84,17 @@ impl Reader {
         }
         if let Some(reason) = &self.lost {
             let reason = reason.clone();
-            return Some(Piece {
-                raw: self.buffer.split().freeze(),
-                content: Err(reason),
-            });
+            return Some(Piece::new(
+                self.buffer.split().freeze(),
+                Err(reason),
+                self.lost_in_connect,
+            ));
         }
         let (head, body) = match frame(&self.buffer) {
             Frame::Partial => return None,
             Frame::Whole { head, body } => (head, body),
             Frame::Broken(reason) => {
+                self.lost_in_connect = self.buffer[0] >> 4 == CONNECT;
                 self.lost = Some(reason);
                 return self.next_piece();
             }
@@ -77,7 +105,7 @@ impl Reader {
         }
         let raw = self.buffer.split_to(head + body).freeze();
         let content = self.decode(raw[0], &raw.slice(head..));
-        Some(Piece { raw, content })
+        Some(Piece::new(raw, content, false))
     }
 
     /// What is left when the stream ends: the beginning of a packet that never became whole.
@@ -85,10 +113,8 @@ impl Reader {
         if self.buffer.is_empty() {
             return None;
         }
-        Some(Piece {
-            raw: self.buffer.split().freeze(),
-            content: Err("the connection ended in the middle of a packet".to_owned()),
-        })
+        let reason = "the connection ended in the middle of a packet".to_owned();
+        Some(Piece::new(self.buffer.split().freeze(), Err(reason), false))
     }
 
     fn decode(&mut self, first: u8, body: &Bytes) -> Result<Packet, String> {
@@ -259,4 +285,144 @@ fn convert(packet: Decoded, level: Option<u8>) -> Result<Packet, String> {
         Decoded::PingResp => Packet::Pingresp,
         Decoded::Auth(_) => Packet::Auth,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn pieces(reader: &mut Reader) -> Vec<Piece> {
+        std::iter::from_fn(|| reader.next_piece()).collect()
+    }
+
+    fn one(bytes: &[u8]) -> Result<Packet, String> {
+        let mut reader = Reader::default();
+        reader.push(bytes);
+        let mut all = pieces(&mut reader);
+        assert_eq!(all.len(), 1, "{all:?}");
+        all.remove(0).content
+    }
+
+    #[test]
+    fn a_connect_with_everything_in_it_is_read_and_its_password_is_not_kept() {
+        let raw = b"\x10\x27\x00\x04MQTT\x04\xee\x00\x0f\x00\x02id\x00\x03d/c\x00\x06broken\x00\x02me\x00\x06\xffsecre";
+        let packet = one(raw).unwrap();
+        let Packet::Connect {
+            level,
+            client_id,
+            keep_alive,
+            clean_session,
+            username,
+            has_password,
+            will,
+        } = &packet
+        else {
+            panic!("{packet:?}");
+        };
+        assert_eq!(
+            (*level, client_id.as_str(), *keep_alive, *clean_session),
+            (4, "id", 15, true)
+        );
+        assert_eq!((username.as_deref(), *has_password), (Some("me"), true));
+        let will = will.as_ref().unwrap();
+        assert_eq!(
+            (will.topic.as_str(), will.payload.bytes(), will.qos, will.retain),
+            ("d/c", &b"broken"[..], 1, true)
+        );
+        assert!(!serde_json::to_string(&packet).unwrap().contains("secre"));
+    }
+
+    #[test]
+    fn a_password_is_not_kept_from_a_connect_that_cannot_be_read() {
+        for raw in [
+            &b"\x10\x17\x00\x04MQTT\x04\xc3\x00\x0f\x00\x02id\x00\x01u\x00\x04s3cr"[..],
+            b"\x10\xff\xff\xff\xff\x04MQTT\x04\xc3\x00\x0f\x00\x02id\x00\x01u\x00\x04s3cr",
+            b"\x10\x70\x00\x04MQTT\x04\xc2\x00\x0f\x00\x02id\x00\x01u\x00\x04s3cr",
+        ] {
+            let mut reader = Reader::default();
+            reader.push(raw);
+            let piece = reader.next_piece().or_else(|| reader.rest()).unwrap();
+            assert!(piece.content.is_err());
+            assert!(!piece.evidence().windows(4).any(|part| part == b"s3cr"), "{piece:?}");
+            assert_eq!(piece.raw, raw, "it is forwarded untouched");
+        }
+    }
+
+    #[test]
+    fn an_unknown_protocol_level_is_named() {
+        let error = one(b"\x10\x0e\x00\x04MQTT\x06\x02\x00\x00\x00\x02id").unwrap_err();
+        assert!(error.contains("level 6"), "{error}");
+    }
+
+    #[test]
+    fn what_is_left_over_after_a_packet_is_named() {
+        let error = one(b"\xc0\x01x").unwrap_err();
+        assert!(error.contains("1 bytes are left over after PINGREQ"), "{error}");
+    }
+
+    #[test]
+    fn a_broken_packet_does_not_end_the_stream() {
+        let mut reader = Reader::default();
+        reader.push(b"\x30\x05\x00\x03\xff\xfe\xfd\xc0\x00");
+        let all = pieces(&mut reader);
+        assert!(all[0].content.is_err());
+        assert_eq!(all[1].content, Ok(Packet::Pingreq));
+    }
+
+    #[test]
+    fn a_length_that_cannot_be_turns_the_rest_into_garbage() {
+        let mut reader = Reader::default();
+        reader.push(b"\xc0\x00\x30\xff\xff\xff\xff\xff\xc0\x00");
+        let all = pieces(&mut reader);
+        assert_eq!(all.len(), 2);
+        assert!(all[0].content.is_ok() && all[1].content.is_err());
+    }
+
+    #[test]
+    fn a_topic_alias_of_mqtt_5_is_given_back_its_topic() {
+        let mut reader = Reader::default();
+        reader.set_level(5);
+        reader.push(b"\x30\x09\x00\x01t\x03\x23\x00\x01hi\x30\x08\x00\x00\x03\x23\x00\x01ho");
+        let topics: Vec<_> = (pieces(&mut reader).into_iter())
+            .map(|piece| match piece.content.unwrap() {
+                Packet::Publish { topic, .. } => topic,
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert_eq!(topics, ["t", "t"]);
+    }
+
+    proptest! {
+        #[test]
+        fn pieces_are_the_bytes_received_whatever_they_are(
+            bytes in proptest::collection::vec(any::<u8>(), 0..400),
+            cut in 0_usize..400,
+            level in 0_u8..6,
+        ) {
+            let cut = cut.min(bytes.len());
+            let mut reader = Reader::default();
+            if level > 2 {
+                reader.set_level(level);
+            }
+            let mut raw = Vec::new();
+            for part in [&bytes[..cut], &bytes[cut..]] {
+                reader.push(part);
+                raw.extend(pieces(&mut reader).into_iter().flat_map(|piece| piece.raw));
+            }
+            raw.extend(reader.rest().into_iter().flat_map(|piece| piece.raw));
+            prop_assert_eq!(raw, bytes);
+        }
+
+        #[test]
+        fn almost_valid_packets_never_panic(kind in 1_u8..16, flags in 0_u8..16, body in proptest::collection::vec(any::<u8>(), 0..120), level in 3_u8..6) {
+            let mut reader = Reader::default();
+            reader.set_level(level);
+            let mut packet = vec![kind << 4 | flags, u8::try_from(body.len()).unwrap()];
+            packet.extend(body);
+            reader.push(&packet);
+            prop_assert_eq!(pieces(&mut reader).len(), 1);
+        }
+    }
 }

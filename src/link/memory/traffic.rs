@@ -215,6 +215,7 @@ impl MemoryLink {
             pieces.push(piece);
         }
         for piece in pieces {
+            let evidence = piece.evidence();
             match piece.content {
                 Ok(Packet::Publish {
                     topic,
@@ -246,7 +247,7 @@ impl MemoryLink {
                             Err(reason) => Event::Undecodable {
                                 connection: id,
                                 reason,
-                                bytes: Payload::keep(piece.raw),
+                                bytes: Payload::keep(evidence),
                             },
                         };
                         self.report(Source::Tap, Some(Direction::FromDevice), event);

@@ -108,7 +108,6 @@ impl MqttBench {
     /// [`LinkError::Setup`] when certificates do not work or the broker fails its self-test.
     pub async fn start(options: BenchOptions) -> Result<(MqttLink, BenchInfo), LinkError> {
         let (reporter, inbox) = inbox(options.clock);
-        // The port for the device first: that it is taken is what goes wrong most often.
         let tls = options.tls.as_ref().map(tls::server).transpose()?;
         let (embedded, endpoint) = match &options.broker {
             BrokerChoice::Embedded => {
@@ -133,9 +132,10 @@ impl MqttBench {
         let run = uuid::Uuid::new_v4().simple().to_string();
         let standing = standing(&endpoint, &run, &options, &reporter).await?;
         // Last, so that nothing of the device can be missed.
-        let tap = match options.tap {
-            true => Some(Tap::start(&options.listen, tls, upstream, reporter.clone()).await?),
-            false => None,
+        let tap = if options.tap {
+            Some(Tap::start(&options.listen, tls, upstream, reporter.clone()).await?)
+        } else {
+            None
         };
         let info = BenchInfo {
             device_address: tap

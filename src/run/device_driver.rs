@@ -1,0 +1,280 @@
+//! Runs a reference device against a real broker or tap.
+//!
+//! The device decides everything; the driver owns the sockets and the clock. Messages of a device without a
+//! connection are dropped. Files are fetched by plain threads, so that a server that stalls keeps nobody
+//! waiting at the end.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde_json::Value;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, sleep_until};
+
+use super::device_peer::outgoing;
+use crate::clock::{Moment, WallClock};
+use crate::journal::event::{Direction, Event, Payload, Source};
+use crate::link::mqtt::Reporter;
+use crate::link::mqtt::client::{Client, ClientEvent, ClientOptions};
+use crate::link::mqtt::endpoint::Endpoint;
+use crate::maps::FETCH_TIMEOUT;
+use crate::reference::{Device, Download, Input, Output, Publication};
+
+/// A device that wants to be woken again and again at the same moment gets on in steps of this.
+const LEAST_WAKE: Duration = Duration::from_millis(1);
+/// Largest file a device fetches.
+const LARGEST_FILE: u64 = 256 << 20;
+/// How long a file may take once its first byte is here.
+const TRANSFER_LIMIT: Duration = Duration::from_secs(120);
+
+/// A command for a running device: name and parameter.
+pub type Command = (String, Value);
+
+/// A device that runs in a task of its own.
+pub struct RunningDevice {
+    commands: mpsc::UnboundedSender<Command>,
+    running: JoinHandle<()>,
+}
+
+impl RunningDevice {
+    /// Runs `device` against `endpoint`; see [`run_device`].
+    #[must_use]
+    pub fn start(
+        device: impl Device + Send + 'static,
+        endpoint: Endpoint,
+        clock: WallClock,
+        sent: Option<Reporter>,
+    ) -> Self {
+        let (commands, receiver) = mpsc::unbounded_channel();
+        let running = tokio::spawn(run_device(device, endpoint, clock, receiver, sent));
+        Self { commands, running }
+    }
+
+    /// Does something to the device. `false` when it is not running any more.
+    pub fn command(&self, name: &str, value: Value) -> bool {
+        self.commands.send((name.to_owned(), value)).is_ok()
+    }
+
+    /// Ends the device with DISCONNECT.
+    pub async fn stop(self) {
+        drop(self.commands);
+        let _ = self.running.await;
+    }
+
+    /// Ends the device as if its power were cut.
+    pub async fn kill(self) {
+        self.running.abort();
+        let _ = self.running.await;
+    }
+}
+
+/// Runs `device` until the senders of `commands` are gone, and then disconnects it in order. What a device of
+/// the harness itself publishes is reported to `sent`.
+pub async fn run_device<D: Device>(
+    device: D,
+    endpoint: Endpoint,
+    clock: WallClock,
+    commands: mpsc::UnboundedReceiver<Command>,
+    sent: Option<Reporter>,
+) {
+    let (downloads, progress) = mpsc::unbounded_channel();
+    let driver = Driver {
+        device,
+        endpoint,
+        clock,
+        sent,
+        connection: None,
+        client_id: String::new(),
+        established: false,
+        downloads,
+    };
+    driver.run(commands, progress).await;
+}
+
+type Progress = (u64, Download);
+
+struct Driver<D> {
+    device: D,
+    endpoint: Endpoint,
+    clock: WallClock,
+    sent: Option<Reporter>,
+    connection: Option<(Client, mpsc::Receiver<ClientEvent>)>,
+    client_id: String,
+    established: bool,
+    downloads: mpsc::UnboundedSender<Progress>,
+}
+
+impl<D: Device> Driver<D> {
+    async fn run(
+        mut self,
+        mut commands: mpsc::UnboundedReceiver<Command>,
+        mut progress: mpsc::UnboundedReceiver<Progress>,
+    ) {
+        self.give(Input::Time).await;
+        let mut earliest = Moment::START;
+        loop {
+            let wake_up = self.device.wake_up().map(|wake_up| wake_up.max(earliest));
+            let now = self.clock.now().moment;
+            if wake_up.is_some_and(|wake_up| wake_up <= now) {
+                earliest = now + LEAST_WAKE;
+                self.give(Input::Time).await;
+                continue;
+            }
+            let alarm = Instant::from_std(self.clock.instant(wake_up.unwrap_or_default()));
+            tokio::select! {
+                event = next_event(&mut self.connection) => self.happened(event).await,
+                Some((token, progress)) = progress.recv() => self.give(Input::Download { token, progress }).await,
+                command = commands.recv() => match command {
+                    Some((name, value)) => self.give(Input::Command(name, value)).await,
+                    None => break,
+                },
+                () = sleep_until(alarm), if wake_up.is_some() => {}
+            }
+        }
+        if let Some((client, events)) = self.connection.take() {
+            drop(events);
+            client.disconnect().await;
+        }
+    }
+
+    async fn happened(&mut self, event: ClientEvent) {
+        match event {
+            ClientEvent::Connected => {
+                self.established = true;
+                self.give(Input::Connected).await;
+            }
+            ClientEvent::Message { topic, payload, .. } => self.give(Input::Message { topic, payload }).await,
+            ClientEvent::Lost(reason) => {
+                tracing::debug!(client = self.client_id, reason, "a device lost its connection");
+                self.connection = None;
+                self.established = false;
+                self.give(Input::ConnectionLost).await;
+            }
+        }
+    }
+
+    /// Gives the device an input and does what it wants.
+    async fn give(&mut self, input: Input) {
+        let mut wanted = Vec::new();
+        self.device.handle(self.clock.now(), input, &mut wanted);
+        for output in wanted {
+            match output {
+                Output::Publish(publication) => self.publish(publication).await,
+                Output::Fetch { token, url } => fetch(token, url, self.downloads.clone()),
+                Output::Connect => self.connect(),
+                Output::Disconnect => {
+                    self.established = false;
+                    if let Some((client, events)) = self.connection.take() {
+                        drop(events);
+                        client.disconnect().await;
+                    }
+                }
+                Output::Drop => {
+                    self.established = false;
+                    self.connection = None;
+                }
+                Output::Raw(bytes) => {
+                    let (endpoint, id) = (self.endpoint.clone(), format!("{}-raw", self.client_id));
+                    tokio::spawn(async move {
+                        if let Err(error) = send_raw(&endpoint, &id, &bytes).await {
+                            tracing::debug!(%error, "raw bytes could not be sent");
+                        }
+                    });
+                }
+            }
+        }
+    }
+
+    fn connect(&mut self) {
+        let options = self.device.connect_options(self.clock.now());
+        self.client_id.clone_from(&options.client_id);
+        self.established = false;
+        self.connection = Some(Client::open(&ClientOptions {
+            endpoint: self.endpoint.clone(),
+            client_id: options.client_id,
+            keep_alive: options.keep_alive,
+            clean_session: options.clean_session,
+            will: options.will.map(outgoing),
+            subscriptions: options.subscriptions,
+        }));
+    }
+
+    async fn publish(&mut self, publication: Publication) {
+        let Some((client, _)) = self.connection.as_ref().filter(|_| self.established) else {
+            return;
+        };
+        let message = outgoing(publication);
+        if let Some(reporter) = &self.sent {
+            let event = Event::Sent {
+                topic: message.topic.clone(),
+                qos: message.qos,
+                retain: message.retain,
+                payload: Payload::keep(message.payload.clone()),
+            };
+            reporter.report(Source::Harness, Some(Direction::ToDevice), event).await;
+        }
+        client.publish(message);
+    }
+}
+
+async fn next_event(connection: &mut Option<(Client, mpsc::Receiver<ClientEvent>)>) -> ClientEvent {
+    match connection {
+        Some((_, events)) => {
+            let event = events.recv().await;
+            event.unwrap_or_else(|| ClientEvent::Lost("the connection ended".to_owned()))
+        }
+        None => std::future::pending().await,
+    }
+}
+
+/// Fetches a file in a thread of its own.
+fn fetch(token: u64, url: String, progress: mpsc::UnboundedSender<Progress>) {
+    std::thread::spawn(move || {
+        let end = match download(&url, || drop(progress.send((token, Download::Begun)))) {
+            Ok(body) => Download::Done(body),
+            Err(error) => Download::Failed(error.to_string()),
+        };
+        let _ = progress.send((token, end));
+    });
+}
+
+fn download(url: &str, begun: impl FnOnce()) -> Result<Bytes, ureq::Error> {
+    let agent: ureq::Agent = ureq::Agent::config_builder()
+        .timeout_connect(Some(FETCH_TIMEOUT))
+        .timeout_recv_response(Some(FETCH_TIMEOUT))
+        .timeout_recv_body(Some(TRANSFER_LIMIT))
+        .build()
+        .into();
+    let response = agent.get(url).call()?;
+    begun();
+    let body = response
+        .into_body()
+        .into_with_config()
+        .limit(LARGEST_FILE)
+        .read_to_vec()?;
+    Ok(body.into())
+}
+
+/// Sends bytes that no client library would send. They cannot go over the device's own connection, which
+/// rumqttc owns, so they get one of their own, opened with a CONNECT of MQTT 3.1.1.
+async fn send_raw(endpoint: &Endpoint, client_id: &str, bytes: &[u8]) -> std::io::Result<()> {
+    let mut socket = TcpStream::connect((endpoint.host.as_str(), endpoint.port)).await?;
+    socket.set_nodelay(true)?;
+    let plain = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'-';
+    let id: Vec<u8> = client_id.bytes().filter(plain).take(100).collect();
+    let length = u8::try_from(id.len()).unwrap_or_default();
+    let mut connect = vec![0x10, 12 + length, 0, 4, b'M', b'Q', b'T', b'T', 4, 2, 0, 0, 0, length];
+    connect.extend_from_slice(&id);
+    socket.write_all(&connect).await?;
+    let mut connack = [0; 4];
+    socket.read_exact(&mut connack).await?;
+    socket.write_all(bytes).await?;
+    // The broker closes after what it cannot read; when it could read it, the connection has done its work.
+    let mut rest = [0; 256];
+    let closed = async { while socket.read(&mut rest).await.is_ok_and(|length| length > 0) {} };
+    let _ = tokio::time::timeout(Duration::from_secs(1), closed).await;
+    Ok(())
+}
