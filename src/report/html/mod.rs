@@ -8,6 +8,7 @@ mod escape;
 mod matrix;
 mod messages;
 mod pretty;
+mod source_view;
 mod test_view;
 mod view;
 
