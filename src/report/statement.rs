@@ -212,14 +212,25 @@ pub fn statement(result: &RunResult) -> String {
         Some(Verdict::Error) => format!(
             "No statement on {who} and {standard} can be made, because the harness or its environment broke; {of_decided} nevertheless, none of them broken."
         ),
-        Some(Verdict::Inconclusive) => format!(
-            "{who} was not found to break {standard} as {role}, but conformance is not shown either: {} could not be decided, {of_decided}.",
-            many(counts.inconclusive, "requirement"),
-        ),
-        Some(Verdict::Warning) => format!(
-            "{who} broke no binding requirement of {standard} as {role}, with {}: {of_decided}{rest}.",
-            many(counts.warning, "remark"),
-        ),
+        Some(Verdict::Inconclusive) => {
+            let undecided = match counts.inconclusive {
+                0 => "not every test could be completed".to_owned(),
+                count => format!("{} could not be decided", many(count, "requirement")),
+            };
+            format!(
+                "{who} was not found to break {standard} as {role}, but conformance is not shown either: {undecided}; {of_decided}, none of them broken."
+            )
+        }
+        Some(Verdict::Warning) => {
+            let remarks = match counts.warning {
+                0 => "remarks".to_owned(),
+                count => many(count, "remark"),
+            };
+            format!("{who} broke no binding requirement of {standard} as {role}, with {remarks}: {of_decided}{rest}.")
+        }
+        Some(Verdict::Pass) if result.partial => {
+            format!("Until then {who} broke nothing of {standard} as {role}: {of_decided}{rest}.")
+        }
         Some(Verdict::Pass) => {
             format!("{who} conforms to {standard} as {role} in all it was tested for: {of_decided}, none broken{rest}.")
         }
