@@ -50,7 +50,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
     record.receive("instantActions", &json!({ "actions": [{ "actionType": HOSTILE }] }));
     record.receive_bytes("state", HOSTILE.as_bytes());
     record.receive_bytes("state", &[0xff, 0xfe, 0]);
-    let huge = format!("{{\"a\":\"{}\"}}", HOSTILE.escape_unicode()).repeat(40_000);
+    let huge = format!("{{\"a\":\"{}\"}}", HOSTILE.escape_unicode()).repeat(4_000);
     record.receive_bytes("state", huge.as_bytes());
     record.harness(Event::Fault {
         fault: LinkFault::Drop {
