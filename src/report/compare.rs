@@ -4,6 +4,7 @@
 //! whatever makes them different in kind (device, version, suites) is stated first.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 use super::clean::line;
 use super::result::RunResult;
@@ -178,11 +179,11 @@ impl Comparison {
     pub fn text(&self) -> String {
         let mut text = String::new();
         for note in &self.notes {
-            text.push_str(&format!("note: {note}\n"));
+            let _ = writeln!(text, "note: {note}");
         }
         if let Some((before, after)) = self.verdict {
             let (before, after) = (Standing::of(before).word(), Standing::of(after).word());
-            text.push_str(&format!("verdict: {before} -> {after}\n"));
+            let _ = writeln!(text, "verdict: {before} -> {after}");
         }
         if self.is_empty() {
             text.push_str("no verdict changed\n");
@@ -195,7 +196,7 @@ impl Comparison {
             if changes.is_empty() {
                 continue;
             }
-            text.push_str(&format!("\n{} changed\n", many(changes.len(), title)));
+            let _ = writeln!(text, "\n{} changed", many(changes.len(), title));
             for (trend, word) in [
                 (Trend::Worse, "worse"),
                 (Trend::Better, "better"),
@@ -203,7 +204,7 @@ impl Comparison {
             ] {
                 for change in changes.iter().filter(|change| change.trend() == trend) {
                     let steps = format!("{} -> {}", change.before.word(), change.after.word());
-                    text.push_str(&format!("  {word:<7} {steps:<28} {}\n", line(&change.id)));
+                    let _ = writeln!(text, "  {word:<7} {steps:<28} {}", line(&change.id));
                 }
             }
         }

@@ -2,6 +2,8 @@
 //!
 //! About the suites, not about a run: `list coverage` prints it. What a run decided stands in its result.
 
+use std::fmt::Write as _;
+
 use super::clean::line;
 use super::sources::{HowDecided, RequirementText, Sources};
 use crate::pack::Role;
@@ -172,15 +174,16 @@ impl Coverage {
             if at == self.chapters.len() {
                 text.push_str(&rule);
             }
-            text.push_str(&format!(
-                "{:<width$}  {:>5}  {:>7}  {:>8}  {:>12}  {:>9}\n",
+            let _ = writeln!(
+                text,
+                "{:<width$}  {:>5}  {:>7}  {:>8}  {:>12}  {:>9}",
                 line(&row.title),
                 row.total(),
                 dot(row.decided),
                 dot(row.operator),
                 dot(row.not_testable),
                 dot(row.uncovered),
-            ));
+            );
         }
         if self.uncovered.is_empty() {
             text.push_str("\nEvery testable requirement is decided by a test or a monitor.\n");
@@ -199,12 +202,7 @@ impl Coverage {
             text: sentence,
         } in &self.uncovered
         {
-            text.push_str(&format!(
-                "  {:<width$}  {:<6}  {}\n",
-                line(id),
-                line(mood),
-                line(sentence)
-            ));
+            let _ = writeln!(text, "  {:<width$}  {:<6}  {}", line(id), line(mood), line(sentence));
         }
         text
     }

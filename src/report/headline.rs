@@ -16,15 +16,15 @@ const MEMBERS: usize = 3;
 /// The last level of the topic of a message: `state`, `order`, …
 #[must_use]
 pub fn topic(entry: &Entry) -> Option<String> {
-    let topic = match entry.event() {
-        Event::Message { topic, .. }
-        | Event::Sent { topic, .. }
-        | Event::Retained { topic, .. }
-        | Event::Packet {
-            packet: Packet::Publish { topic, .. },
-            ..
-        } => topic,
-        _ => return None,
+    let (Event::Message { topic, .. }
+    | Event::Sent { topic, .. }
+    | Event::Retained { topic, .. }
+    | Event::Packet {
+        packet: Packet::Publish { topic, .. },
+        ..
+    }) = entry.event()
+    else {
+        return None;
     };
     Some(short(&line(topic.rsplit('/').next().unwrap_or(topic)), VALUE).into_owned())
 }
@@ -43,6 +43,7 @@ pub fn kind(entry: &Entry) -> String {
         Event::Served { .. } | Event::Fetched { .. } => "map server".to_owned(),
         Event::Hook { hook, .. } => format!("hook {}", short(&line(hook), VALUE)),
         Event::Answer { .. } => "operator".to_owned(),
+        Event::StepBegun { .. } | Event::StepEnded { .. } | Event::Mark { .. } => "step".to_owned(),
         Event::Note { .. } => "note".to_owned(),
         Event::Trouble { .. } => "trouble".to_owned(),
         _ => "record".to_owned(),

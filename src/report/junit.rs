@@ -11,6 +11,8 @@
 //! of them stand in its text), properties, and a `skipped` count on the suite. It always writes a
 //! timestamp: ours is the start of the run, and its constructors that read the clock are not used.
 
+use std::fmt::Write as _;
+
 use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult as Outcome, TestSuite};
 
 use super::clean;
@@ -183,7 +185,7 @@ fn test_case(test: &TestResult) -> TestCase {
     };
     let mut findings: Vec<&Decision> = test.decisions.iter().filter(|d| d.verdict != Verdict::Pass).collect();
     findings.sort_by_key(|decision| std::cmp::Reverse(decision.verdict));
-    let text = findings
+    let details = findings
         .iter()
         .map(|decision| finding(decision))
         .collect::<Vec<_>>()
@@ -194,8 +196,8 @@ fn test_case(test: &TestResult) -> TestCase {
         class: test.id.split_once('/').map_or("tests", |(group, _)| group),
         file: place.and_then(|place| place.rsplit_once(':')).map(|(file, _)| file),
         seconds: test.seconds,
-        outcome: outcome(verdict, kind, message, &text),
-        out: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{text}")),
+        outcome: outcome(verdict, kind, message, &details),
+        out: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{details}")),
     }
     .build()
 }
@@ -211,13 +213,14 @@ fn finding(decision: &Decision) -> String {
     } = decision;
     let mut text = format!("{verdict}: {requirement}: {message}\n{clause} at {place}");
     if let Some(witness) = decision.witness {
-        text.push_str(&format!("\ndecided by message #{witness}"));
+        let _ = write!(text, "\ndecided by message #{witness}");
     }
     if let Some(nearest) = &decision.nearest {
-        text.push_str(&format!(
+        let _ = write!(
+            text,
             "\nclosest: #{} {}: {} (expected {})",
             nearest.seq, nearest.path, nearest.found, nearest.expected
-        ));
+        );
     }
     if let Some(explanation) = &decision.explanation {
         text.push('\n');
@@ -235,7 +238,7 @@ fn monitor_case(monitor: &MonitorResult) -> TestCase {
         (_, None) => "there was nothing to judge",
         (None, Some(_)) => monitor.title.as_str(),
     };
-    let text = findings
+    let lines = findings
         .iter()
         .map(|finding| {
             let first = finding
@@ -256,8 +259,8 @@ fn monitor_case(monitor: &MonitorResult) -> TestCase {
         class: "monitors",
         file: None,
         seconds: 0.0,
-        outcome: outcome(monitor.verdict, kind, message, &text),
-        out: (monitor.verdict == Some(Verdict::Warning)).then_some(text),
+        outcome: outcome(monitor.verdict, kind, message, &lines),
+        out: (monitor.verdict == Some(Verdict::Warning)).then_some(lines),
     }
     .build()
 }

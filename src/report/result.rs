@@ -158,6 +158,19 @@ pub struct Decision {
     pub interpretation: Option<String>,
 }
 
+impl Decision {
+    /// Whether it wants to be shown in full: something was seen that should not be, or a search can show what
+    /// came closest. What merely could not be decided is listed.
+    #[must_use]
+    pub fn is_finding(&self) -> bool {
+        match self.verdict {
+            Verdict::Pass => false,
+            Verdict::Warning | Verdict::Fail => true,
+            Verdict::Inconclusive | Verdict::Error => self.explanation.is_some() || self.nearest.is_some(),
+        }
+    }
+}
+
 /// The message that came closest to what was expected.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

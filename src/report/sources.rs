@@ -207,3 +207,116 @@ impl MonitorSource {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::diagnostic::Source;
+    use crate::pack::RequirementId;
+    use crate::pattern::{Term, TermKind};
+    use crate::suite::model::{Assertion, Binding, CourseNeed, Expect, From, Maturity, Operator, Selection, TimeTerm};
+
+    const TEXT: &str = "steps:\n  - expect: state\n    checks: [B-1]\n    assert:\n      A-1:\n        x: 1\n";
+
+    fn span(source: &Arc<Source>, text: &str) -> Span {
+        let start = source.text.find(text).expect("text");
+        Span::new(source, start, start + text.len())
+    }
+
+    fn step(span: Span, verb: Verb) -> Step {
+        Step {
+            path: "steps[0]".to_owned(),
+            title: None,
+            spec: None,
+            verb,
+            verb_span: span.clone(),
+            span,
+        }
+    }
+
+    fn test(source: &Arc<Source>, steps: Vec<Step>) -> Test {
+        Test {
+            id: "group/name".to_owned(),
+            group: "group".to_owned(),
+            title: "Title".to_owned(),
+            device: Role::Agv,
+            spec: ">=1".parse().expect("range"),
+            needs: Vec::new(),
+            moves: false,
+            maturity: Maturity::Reviewed,
+            why: "because".to_owned(),
+            given: Vec::new(),
+            steps,
+            finally: Vec::new(),
+            source: Arc::clone(source),
+            course: CourseNeed::default(),
+        }
+    }
+
+    fn expect(source: &Arc<Source>) -> Step {
+        let id = |id: &str| RequirementId::from(id);
+        let verb = Verb::Expect(Box::new(Expect {
+            topic: "state".to_owned(),
+            checks: vec![Binding {
+                requirement: id("B-1"),
+                span: span(source, "B-1"),
+            }],
+            selection: Selection::default(),
+            within: TimeTerm {
+                term: Term {
+                    kind: TermKind::Variable("time.react".to_owned()),
+                    span: span(source, "state"),
+                },
+            },
+            from: From::Usual,
+            assert: vec![Assertion {
+                requirement: id("A-1"),
+                selection: Selection::default(),
+                span: span(source, "A-1:\n        x: 1\n"),
+            }],
+            prefer: Vec::new(),
+            save: Vec::new(),
+        }));
+        step(span(source, &TEXT[TEXT.find("expect").expect("step")..]), verb)
+    }
+
+    #[test]
+    fn every_clause_of_a_test_knows_its_lines_and_those_of_its_step() {
+        let source = Source::new("x.yaml", TEXT);
+        let found = TestSource::of(&test(&source, vec![expect(&source)]));
+        let clauses: Vec<_> = found
+            .clauses
+            .iter()
+            .map(|clause| {
+                (
+                    clause.requirement.as_str(),
+                    clause.path.as_str(),
+                    clause.lines,
+                    clause.step,
+                )
+            })
+            .collect();
+        let expected = [
+            ("B-1", "steps[0].checks", (3, 3), (2, 6)),
+            ("A-1", "steps[0].assert", (5, 6), (2, 6)),
+        ];
+        assert_eq!(clauses, expected);
+        assert!(!found.operator);
+    }
+
+    #[test]
+    fn a_hook_makes_it_a_test_with_operator_and_a_step_of_another_file_decides_nothing_here() {
+        let (source, other) = (Source::new("x.yaml", TEXT), Source::new("state.yaml", TEXT));
+        let hook = Verb::Operator(Operator {
+            hook: "power-cycle".to_owned(),
+            with: Vec::new(),
+            within: None,
+        });
+        let hook = step(span(&source, "steps"), hook);
+        let found = TestSource::of(&test(&source, vec![hook, expect(&other)]));
+        assert!(found.operator);
+        assert!(found.clauses.is_empty());
+    }
+}

@@ -118,15 +118,36 @@ pub fn gap(requirement: &RequirementResult) -> Option<Gap> {
     }
 }
 
+/// How many requirements have no verdict, by the reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Gaps {
+    /// [`Gap::NotApplicable`].
+    pub not_applicable: usize,
+    /// [`Gap::NotTestable`].
+    pub not_testable: usize,
+    /// [`Gap::NotDecided`].
+    pub not_decided: usize,
+}
+
+/// How many requirements have no verdict, by the reason.
+#[must_use]
+pub fn gaps(result: &RunResult) -> Gaps {
+    let mut gaps = Gaps::default();
+    for requirement in &result.requirements {
+        match gap(requirement) {
+            Some(Gap::NotApplicable) => gaps.not_applicable += 1,
+            Some(Gap::NotTestable) => gaps.not_testable += 1,
+            Some(Gap::NotDecided) => gaps.not_decided += 1,
+            None => {}
+        }
+    }
+    gaps
+}
+
 /// How many requirements apply and were not decided one way or the other.
 fn undecided(result: &RunResult) -> usize {
     let counts = requirements(result);
-    let apart = result
-        .requirements
-        .iter()
-        .filter(|entry| gap(entry) == Some(Gap::NotApplicable))
-        .count();
-    counts.total() - counts.decided() - apart
+    counts.total() - counts.decided() - gaps(result).not_applicable
 }
 
 /// `1 requirement`, `2 requirements`.
@@ -191,14 +212,25 @@ pub fn statement(result: &RunResult) -> String {
         Some(Verdict::Error) => format!(
             "No statement on {who} and {standard} can be made, because the harness or its environment broke; {of_decided} nevertheless, none of them broken."
         ),
-        Some(Verdict::Inconclusive) => format!(
-            "{who} was not found to break {standard} as {role}, but conformance is not shown either: {} could not be decided, {of_decided}.",
-            many(counts.inconclusive, "requirement"),
-        ),
-        Some(Verdict::Warning) => format!(
-            "{who} broke no binding requirement of {standard} as {role}, with {}: {of_decided}{rest}.",
-            many(counts.warning, "remark"),
-        ),
+        Some(Verdict::Inconclusive) => {
+            let undecided = match counts.inconclusive {
+                0 => "not every test could be completed".to_owned(),
+                count => format!("{} could not be decided", many(count, "requirement")),
+            };
+            format!(
+                "{who} was not found to break {standard} as {role}, but conformance is not shown either: {undecided}; {of_decided}, none of them broken."
+            )
+        }
+        Some(Verdict::Warning) => {
+            let remarks = match counts.warning {
+                0 => "remarks".to_owned(),
+                count => many(count, "remark"),
+            };
+            format!("{who} broke no binding requirement of {standard} as {role}, with {remarks}: {of_decided}{rest}.")
+        }
+        Some(Verdict::Pass) if result.partial => {
+            format!("Until then {who} broke nothing of {standard} as {role}: {of_decided}{rest}.")
+        }
         Some(Verdict::Pass) => {
             format!("{who} conforms to {standard} as {role} in all it was tested for: {of_decided}, none broken{rest}.")
         }
@@ -243,11 +275,11 @@ pub fn limits(result: &RunResult) -> Vec<String> {
         .filter(|test| test.maturity == "watchlist" && matches!(test.verdict, Some(Verdict::Fail | Verdict::Warning)))
         .count();
     if young > 0 {
-        all.push(format!(
-            "{} with a finding {} still on the watchlist: its evidence wants a second look by a person.",
-            many(young, "test"),
-            if young == 1 { "is" } else { "are" },
-        ));
+        let tests = many(young, "test");
+        all.push(match young {
+            1 => format!("{tests} with a finding is still on the watchlist: its evidence wants a second look."),
+            _ => format!("{tests} with a finding are still on the watchlist: their evidence wants a second look."),
+        });
     }
     for limit in &result.limits {
         let limit = line(limit).into_owned();
@@ -258,20 +290,26 @@ pub fn limits(result: &RunResult) -> Vec<String> {
     all
 }
 
-/// Seconds for people: `0.412 s`, `31.9 s`, `12 min 5 s`.
+/// Seconds for people: `0.412 s`, `31.9 s`, `12 min 5 s`, `2 h 1 min`.
 #[must_use]
 pub fn seconds(seconds: f64) -> String {
-    if !seconds.is_finite() || seconds < 0.0 {
+    // A result may have been read from a file that anybody wrote.
+    if !(0.0..1e9).contains(&seconds) {
         return "?".to_owned();
     }
-    if seconds < 1.0 {
+    if seconds < 0.9995 {
         format!("{seconds:.3} s")
-    } else if seconds < 60.0 {
+    } else if seconds < 59.95 {
         format!("{seconds:.1} s")
     } else {
         let whole = seconds.round();
         let minutes = (whole / 60.0).floor();
-        format!("{minutes:.0} min {:.0} s", whole - minutes * 60.0)
+        let hours = (minutes / 60.0).floor();
+        if hours > 0.0 {
+            format!("{hours:.0} h {:.0} min", minutes - hours * 60.0)
+        } else {
+            format!("{minutes:.0} min {:.0} s", whole - minutes * 60.0)
+        }
     }
 }
 
@@ -285,7 +323,10 @@ mod tests {
         assert_eq!(seconds(0.4119), "0.412 s");
         assert_eq!(seconds(31.94), "31.9 s");
         assert_eq!(seconds(725.2), "12 min 5 s");
+        assert_eq!(seconds(59.96), "1 min 0 s");
+        assert_eq!(seconds(7_260.0), "2 h 1 min");
         assert_eq!(seconds(f64::NAN), "?");
+        assert_eq!(seconds(f64::MAX), "?");
         assert_eq!(seconds(-1.0), "?");
     }
 

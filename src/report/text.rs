@@ -4,6 +4,8 @@
 //! When and where to print is left to the command line. Device strings are cleaned before they get here or
 //! here; colour is added last and only on request.
 
+use std::fmt::Write as _;
+
 use console::{Style, measure_text_width};
 
 use super::clean::{block, line, short};
@@ -78,23 +80,41 @@ pub fn test_line(test: &TestResult, color: Color) -> String {
     format!("{tag}{id}{gap}{}\n", color.dim().apply_to(time))
 }
 
-/// The line of a test, and a block for everything it found.
+/// The line of a test, and a block for everything it found; what merely could not be decided is listed.
 #[must_use]
 pub fn test(test: &TestResult, sources: &Sources, journal: Option<&Journal>, color: Color) -> String {
-    let mut text = test_line(test, color);
-    let findings: Vec<&Decision> = test
+    let mut whole = test_line(test, color);
+    let verdict = statement::test_verdict(test);
+    let (blocks, undecided): (Vec<&Decision>, Vec<&Decision>) = test
         .decisions
         .iter()
         .filter(|decision| decision.verdict != Verdict::Pass)
-        .collect();
-    if findings.is_empty() && !matches!(statement::test_verdict(test), Some(Verdict::Pass) | None) {
-        let reason = test.reason.as_deref().unwrap_or("the test decided nothing");
-        text.push_str(&format!("      {}\n", line(reason)));
+        .partition(|decision| decision.is_finding());
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    if blocks.is_empty() && !matches!(verdict, Some(Verdict::Pass) | None) {
+        let reason = test.reason.as_deref();
+        reasons.extend(reason.map(|reason| (reason, Vec::new())));
+        if reason.is_none() && undecided.is_empty() {
+            reasons.push(("the test decided nothing", Vec::new()));
+        }
     }
-    for finding in findings {
-        text.push_str(&decision(finding, sources, journal, color));
+    for decision in undecided {
+        match reasons.iter_mut().find(|(reason, _)| *reason == decision.message) {
+            Some((_, ids)) => ids.push(&decision.requirement),
+            None => reasons.push((&decision.message, vec![&decision.requirement])),
+        }
     }
-    text
+    for finding in blocks {
+        whole.push_str(&decision(finding, sources, journal, color));
+    }
+    for (reason, ids) in reasons {
+        let _ = writeln!(whole, "      {}", short(&line(reason), 400));
+        if !ids.is_empty() {
+            let ids = color.dim().apply_to(line(&ids.join(", ")).into_owned());
+            let _ = writeln!(whole, "      undecided: {ids}");
+        }
+    }
+    whole
 }
 
 /// The block of one decision, below the line of its test: requirement, clause with caret, what was awaited,
@@ -104,24 +124,22 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
     let id = line(&decision.requirement);
     let known = sources.requirement(&decision.requirement);
     let origin = known.map_or(String::new(), |known| {
-        format!("{}, §{}", line(&known.mood), line(&known.section))
+        format!("   {}, §{}", line(&known.mood), line(&known.section))
     });
     let styled = color.verdict(Some(decision.verdict)).apply_to(&id);
-    let gap = " ".repeat(37_usize.saturating_sub(measure_text_width(&id)).max(1));
-    let origin = format!("{origin}  {}", decision.verdict);
-    let mut text = format!("      {styled}{gap}{}\n\n", color.dim().apply_to(origin.trim_start()));
-    let gutter = match &decision.explanation {
-        Some(explanation) => explained(explanation, decision.verdict, color, &mut text),
-        None => {
-            text.push_str(&format!("   --> {}\n    |\n", line(&decision.place)));
-            text.push_str(&format!("    | {}\n    |\n", line(&decision.message)));
-            4
-        }
+    let origin = color.dim().apply_to(format!("{}{origin}", decision.verdict));
+    let mut text = format!("      {styled}   {origin}\n\n");
+    let gutter = if let Some(explanation) = &decision.explanation {
+        explained(explanation, decision.verdict, color, &mut text)
+    } else {
+        let _ = writeln!(text, "   --> {}\n    |", line(&decision.place));
+        let _ = writeln!(text, "    | {}\n    |", line(&decision.message));
+        4
     };
     let mut note = |name: &str, value: String| {
         let lead = format!("{}=", " ".repeat(gutter));
         let lead = color.gutter().apply_to(lead);
-        text.push_str(&format!("{lead} {name:<8} {value}\n"));
+        let _ = writeln!(text, "{lead} {name:<8} {value}");
     };
     let find = |seq| journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
     if let Some(Waited {
@@ -136,7 +154,9 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
             format!("{} after {}; {came} came", seconds(time), reference(find(since), since)),
         );
     }
-    if let Some(witness) = decision.witness {
+    // Where the message that decided is the nearest miss, the line below says more about it.
+    let is_nearest = |seq| decision.nearest.as_ref().is_some_and(|nearest| nearest.seq == seq);
+    if let Some(witness) = decision.witness.filter(|witness| !is_nearest(*witness)) {
         note("decided", format!("by {}", reference(find(witness), witness)));
     }
     if let Some(nearest) = &decision.nearest {
@@ -209,8 +229,8 @@ pub fn monitor(monitor: &MonitorResult, color: Color) -> String {
         let id = color
             .verdict(Some(finding.verdict))
             .apply_to(line(&finding.requirement));
-        text.push_str(&format!("      {id}  {times}, first at {}\n", first.join(", ")));
-        text.push_str(&format!("      {}\n", short(&line(&finding.message), 400)));
+        let _ = writeln!(text, "      {id}  {times}, first at {}", first.join(", "));
+        let _ = writeln!(text, "      {}", short(&line(&finding.message), 400));
     }
     text
 }
@@ -228,50 +248,61 @@ pub struct Bundle<'a> {
 #[must_use]
 pub fn summary(result: &RunResult, bundle: Bundle<'_>, color: Color) -> String {
     let mut text = String::new();
+    let gaps = statement::gaps(result);
     let rows = [
-        ("tests", statement::tests(result), "not applicable"),
-        ("monitors", statement::monitors(result), "nothing to judge"),
-        ("requirements", statement::requirements(result), "not decided"),
+        (
+            "tests",
+            statement::tests(result),
+            vec![(statement::tests(result).none, "not applicable")],
+        ),
+        (
+            "monitors",
+            statement::monitors(result),
+            vec![(statement::monitors(result).none, "nothing to judge")],
+        ),
+        (
+            "requirements",
+            statement::requirements(result),
+            vec![
+                (gaps.not_decided, "not decided"),
+                (gaps.not_testable, "not testable"),
+                (gaps.not_applicable, "not applicable"),
+            ],
+        ),
     ];
     for (name, counts, without) in rows.into_iter().filter(|(_, counts, _)| counts.total() > 0) {
-        text.push_str(&format!("{name:<13} {}\n", numbers(counts, without, color)));
+        let _ = writeln!(text, "{name:<13} {}", numbers(counts, &without, color));
     }
     let style = color.verdict(result.verdict);
     let word = result
         .verdict
         .map_or("NOTHING DECIDED".to_owned(), |verdict| verdict.word().to_uppercase());
-    text.push_str(&format!(
-        "\n{}  {}\n",
-        style.apply_to(word),
-        statement::statement(result)
-    ));
+    let _ = writeln!(text, "\n{}  {}", style.apply_to(word), statement::statement(result));
     if result.partial {
         let reason = result
             .partial_reason
             .as_deref()
             .unwrap_or("the run ended before its plan did");
         let style = color.verdict(Some(Verdict::Error));
-        text.push_str(&format!("{}  {}\n", style.apply_to("PARTIAL"), line(reason)));
+        let _ = writeln!(text, "{}  {}", style.apply_to("PARTIAL"), line(reason));
     }
     if let Some(report) = bundle.report {
-        text.push_str(&format!("\nreport  {}\n", line(report)));
+        let _ = writeln!(text, "\nreport  {}", line(report));
     }
     if let Some(root) = bundle.root {
-        text.push_str(&format!("root    sha256:{}\n", line(root)));
+        let _ = writeln!(text, "root    sha256:{}", line(root));
     }
     text
 }
 
 /// `12 pass, 1 warning, 1 fail, 2 not applicable`, worst last; noughts left out.
-fn numbers(counts: Counts, without: &'static str, color: Color) -> String {
-    let verdicts = Verdict::ALL.into_iter().map(Some).chain([None]);
-    verdicts
-        .filter(|verdict| counts.get(*verdict) > 0)
-        .map(|verdict| {
-            let word = verdict.map_or(without, Verdict::word);
-            let text = format!("{} {word}", counts.get(verdict));
-            color.verdict(verdict).apply_to(text).to_string()
-        })
+fn numbers(counts: Counts, without: &[(usize, &'static str)], color: Color) -> String {
+    let with = Verdict::ALL.map(|verdict| (counts.get(Some(verdict)), Some(verdict), verdict.word()));
+    let without = without.iter().map(|(count, word)| (*count, None, *word));
+    with.into_iter()
+        .chain(without)
+        .filter(|(count, ..)| *count > 0)
+        .map(|(count, verdict, word)| color.verdict(verdict).apply_to(format!("{count} {word}")).to_string())
         .collect::<Vec<_>>()
         .join(", ")
 }

@@ -34,7 +34,7 @@ fn named<'a>(document: &'a Document<'a>, name: &'a str) -> impl Iterator<Item = 
 fn text(node: Node<'_, '_>) -> String {
     let all: String = node
         .descendants()
-        .filter(|node| node.is_text())
+        .filter(Node::is_text)
         .filter_map(|node| node.text())
         .collect();
     all.split_whitespace().collect::<Vec<_>>().join(" ")

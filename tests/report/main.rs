@@ -1,5 +1,6 @@
 //! The renderings of a result, held against three sample runs: one that passes, one that fails with a nearest
 //! miss, and a partial one in which every string is hostile.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test says what it expected")]
 
 mod html;
 mod json;

@@ -83,3 +83,38 @@ fn coverage_counts_what_decides_what_and_lists_what_nothing_decides() {
         "requirements of the vehicle do not concern the other side"
     );
 }
+
+/// The sentence a customer reads first must never claim more than was decided.
+#[test]
+fn the_statement_says_what_was_shown_and_nothing_more() {
+    use vda5050_tck::report::statement::statement;
+    use vda5050_tck::verdict::Verdict;
+
+    let with = |verdict: Option<Verdict>, found: &[Option<Verdict>], partial: bool| {
+        let mut result = samples::pass().0;
+        let mut one = result.requirements[0].clone();
+        result.requirements.clear();
+        for verdict in found {
+            one.verdict = *verdict;
+            result.requirements.push(one.clone());
+        }
+        result.verdict = verdict;
+        result.partial = partial;
+        statement(&result)
+    };
+    let (pass, warning, fail) = (Some(Verdict::Pass), Some(Verdict::Warning), Some(Verdict::Fail));
+    let (open, error) = (Some(Verdict::Inconclusive), Some(Verdict::Error));
+    let all = [
+        with(pass, &[pass, pass], false),
+        with(pass, &[pass, None], true),
+        with(warning, &[pass, warning], false),
+        with(open, &[pass, open, None], false),
+        with(open, &[pass], false),
+        with(error, &[pass, error], false),
+        with(fail, &[fail], false),
+        with(fail, &[fail, fail, pass, None, open], false),
+        with(fail, &[pass], false),
+        with(None, &[None], false),
+    ];
+    insta::assert_snapshot!("statements", all.join("\n"));
+}

@@ -12,7 +12,6 @@ pub struct ChapterView {
     pub anchor: String,
     pub title: String,
     pub decided: usize,
-    pub total: usize,
     /// Whether the table is shown unfolded.
     pub open: bool,
     pub rows: Vec<RequirementView>,
@@ -42,29 +41,22 @@ pub fn chapters(result: &RunResult, sources: &Sources, anchors: &Anchors) -> Vec
         let known = sources.requirement(&requirement.id);
         let title = known.map_or_else(|| group(&requirement.id), |known| known.chapter.clone());
         let row = row(requirement, known, result, anchors);
-        match chapters.iter_mut().find(|chapter| chapter.title == title) {
-            Some(chapter) => chapter.rows.push(row),
-            None => {
-                let anchor = format!("chapter-{}", chapters.len() + 1);
-                chapters.push(ChapterView {
-                    anchor,
-                    title,
-                    decided: 0,
-                    total: 0,
-                    open: false,
-                    rows: vec![row],
-                });
-            }
+        let known_chapter = chapters.iter().position(|chapter| chapter.title == title);
+        let at = known_chapter.unwrap_or(chapters.len());
+        if known_chapter.is_none() {
+            let anchor = format!("chapter-{}", at + 1);
+            chapters.push(ChapterView {
+                anchor,
+                title,
+                decided: 0,
+                open: false,
+                rows: Vec::new(),
+            });
         }
-        let verdict = requirement.verdict;
-        let at = chapters
-            .iter_mut()
-            .find(|chapter| chapter.rows.iter().any(|row| row.id == requirement.id));
-        if let Some(chapter) = at {
-            chapter.total += 1;
-            chapter.decided += Counts::of([verdict]).decided();
-            chapter.open |= matches!(verdict, Some(verdict) if verdict != Verdict::Pass);
-        }
+        let chapter = &mut chapters[at];
+        chapter.rows.push(row);
+        chapter.decided += Counts::of([requirement.verdict]).decided();
+        chapter.open |= requirement.verdict.is_some_and(|verdict| verdict != Verdict::Pass);
     }
     chapters
 }

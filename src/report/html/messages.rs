@@ -8,7 +8,7 @@ use crate::report::clean::line;
 use crate::report::headline::{headline, kind};
 
 /// Most messages of one page.
-const PAGE_LIMIT: usize = 1_500;
+const PAGE_LIMIT: usize = 600;
 /// Most bytes of a payload that are set on lines.
 const PAYLOAD_LIMIT: usize = 64 * 1024;
 

@@ -8,6 +8,7 @@ mod escape;
 mod matrix;
 mod messages;
 mod pretty;
+mod source_view;
 mod test_view;
 mod view;
 
@@ -39,7 +40,12 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
     let monitor_messages = gallery.take();
     let shown_tests = tests.iter().filter(|test| !test.not_applicable).count();
     Page {
-        title: format!("{}: {}", statement::device(result), view::verdict_title(result.verdict)),
+        title: format!(
+            "{}: {}{}",
+            statement::device(result),
+            if result.partial { "partial run, " } else { "" },
+            view::verdict_title(result)
+        ),
         badge: Badge::of(result.verdict),
         statement: statement::statement(result),
         partial: result.partial.then(|| {

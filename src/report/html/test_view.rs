@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Anchors;
 use super::messages::{Gallery, MessageView};
+use super::source_view::{SourceView, source_view};
 use super::view::Badge;
 use crate::journal::Event;
 use crate::report::headline::reference;
 use crate::report::result::{Decision, RunResult, TestResult};
-use crate::report::sources::{Sources, TestSource};
+use crate::report::sources::Sources;
 use crate::report::statement::{many, seconds, test_verdict};
 use crate::report::{clean, sequence};
 use crate::verdict::Verdict;
@@ -17,8 +18,6 @@ use crate::verdict::Verdict;
 const MESSAGES: usize = 24;
 /// Stimuli shown before and after each deciding message.
 const STIMULI: usize = 3;
-/// Longest source shown, in lines.
-const SOURCE_LINES: usize = 600;
 
 /// One test.
 pub struct TestView {
@@ -45,7 +44,8 @@ pub struct TestView {
 /// One decision.
 pub struct DecisionView {
     pub badge: Badge,
-    pub pass: bool,
+    /// Whether it is shown in full, and not only in the list.
+    pub full: bool,
     pub requirement: String,
     pub link: Option<String>,
     pub origin: String,
@@ -84,23 +84,6 @@ pub struct StepView {
     pub class: &'static str,
     pub took: Option<(u64, bool)>,
     pub seconds: String,
-}
-
-/// The file of a test.
-pub struct SourceView {
-    pub file: String,
-    pub lines: Vec<SourceLine>,
-    pub cut: bool,
-}
-
-/// One line of it.
-pub struct SourceLine {
-    pub number: usize,
-    pub text: String,
-    /// `deciding`, `step` or nothing.
-    pub class: &'static str,
-    /// What stands beside a deciding line.
-    pub notes: Vec<(Badge, String)>,
 }
 
 pub fn views(
@@ -216,7 +199,8 @@ fn marked(test: &TestResult) -> BTreeMap<u64, String> {
     marked
 }
 
-fn findings(test: &TestResult) -> impl Iterator<Item = &Decision> {
+/// The decisions that are not a pass.
+pub fn findings(test: &TestResult) -> impl Iterator<Item = &Decision> {
     test.decisions
         .iter()
         .filter(|decision| decision.verdict != Verdict::Pass)
@@ -311,7 +295,7 @@ fn decision_view(
     let see = |seq: u64| reference(gallery.entry(seq), seq);
     DecisionView {
         badge: Badge::of(Some(decision.verdict)),
-        pass: decision.verdict == Verdict::Pass,
+        full: decision.is_finding(),
         requirement: decision.requirement.clone(),
         link: anchors.requirement(&decision.requirement),
         origin: known
@@ -350,61 +334,4 @@ fn decision_view(
         interpretation: decision.interpretation.clone(),
         deviation: result.deviations.get(&decision.requirement).cloned(),
     }
-}
-
-fn source_view(source: &TestSource, test: &TestResult) -> SourceView {
-    let mut notes: BTreeMap<usize, Vec<(Badge, String)>> = BTreeMap::new();
-    let mut deciding = BTreeSet::new();
-    let mut around = BTreeSet::new();
-    for decision in findings(test) {
-        let clause = source
-            .clauses
-            .iter()
-            .find(|clause| clause.path == decision.clause && clause.requirement == decision.requirement);
-        let lines = match clause {
-            Some(clause) => {
-                around.extend(clause.step.0..=clause.step.1.min(clause.step.0 + SOURCE_LINES));
-                clause.lines
-            }
-            None => match place_line(&decision.place, &source.file) {
-                Some(line) => (line, line),
-                None => continue,
-            },
-        };
-        deciding.extend(lines.0..=lines.1.min(lines.0 + SOURCE_LINES));
-        notes
-            .entry(lines.0)
-            .or_default()
-            .push((Badge::of(Some(decision.verdict)), decision.requirement.clone()));
-    }
-    let lines = source
-        .text
-        .lines()
-        .take(SOURCE_LINES)
-        .enumerate()
-        .map(|(at, text)| {
-            let number = at + 1;
-            SourceLine {
-                number,
-                text: clean::line(text).into_owned(),
-                class: match (deciding.contains(&number), around.contains(&number)) {
-                    (true, _) => "deciding",
-                    (false, true) => "step",
-                    (false, false) => "",
-                },
-                notes: notes.remove(&number).unwrap_or_default(),
-            }
-        })
-        .collect();
-    SourceView {
-        file: source.file.clone(),
-        lines,
-        cut: source.text.lines().count() > SOURCE_LINES,
-    }
-}
-
-/// The line of `file:line`, when it is that file.
-fn place_line(place: &str, file: &str) -> Option<usize> {
-    let (name, line) = place.rsplit_once(':')?;
-    (name == file).then(|| line.parse().ok()).flatten()
 }

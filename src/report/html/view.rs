@@ -72,8 +72,9 @@ impl Badge {
 }
 
 /// What stands in the title bar.
-pub fn verdict_title(verdict: Option<Verdict>) -> &'static str {
-    match verdict {
+pub fn verdict_title(result: &RunResult) -> &'static str {
+    match result.verdict {
+        Some(Verdict::Pass | Verdict::Warning) if result.partial => "nothing broken until it ended",
         Some(Verdict::Fail) => "does not conform",
         Some(Verdict::Pass) => "conforms in all it was tested for",
         Some(Verdict::Warning) => "conforms with remarks in all it was tested for",

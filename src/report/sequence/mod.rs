@@ -1,10 +1,11 @@
 //! A window of the journal as a sequence diagram (SVG).
 //!
-//! Three lanes: harness, broker (with the tap before it), device. [`rows`] decides what is worth a row, this
-//! module places it. The picture stands alone, and inside an HTML page it takes the page's colours; its arrows
+//! Three lanes: harness, broker (with the tap before it), device. [`rows`] says what a record looks like, [`thin`]
+//! what is left out, this module places the rest. The picture stands alone, and inside an HTML page it takes the page's colours; its arrows
 //! link to `#m<number>` where the page shows that message.
 
 mod rows;
+mod thin;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -47,8 +48,8 @@ pub struct Options<'a> {
 pub fn render(journal: &Journal, window: (u64, u64), options: &Options<'_>) -> Result<String, askama::Error> {
     let found = rows::collect(journal, window, options);
     let mut top = HEAD;
-    let mut placed = Vec::with_capacity(found.rows.len());
-    for row in &found.rows {
+    let mut placed = Vec::with_capacity(found.drawn.len());
+    for row in &found.drawn {
         let height = height(row);
         placed.push(place(row, top, height, options));
         top += height;
@@ -78,19 +79,19 @@ fn height(row: &Row) -> usize {
     }
 }
 
-fn description(found: &rows::Rows) -> String {
+fn description(found: &rows::Found) -> String {
     let arrows = found
-        .rows
+        .drawn
         .iter()
         .filter(|row| matches!(row.what, What::Arrow { .. }))
         .count();
     format!(
         "Sequence diagram with three lanes, harness, broker and device, read from top to bottom: {arrows} arrows in {} rows. The same messages are listed as text below it.",
-        found.rows.len()
+        found.drawn.len()
     )
 }
 
-fn hidden(found: &rows::Rows) -> String {
+fn hidden(found: &rows::Found) -> String {
     let mut parts = Vec::new();
     if found.acknowledgements > 0 {
         parts.push(format!("{} MQTT acknowledgements and pings", found.acknowledgements));
@@ -172,12 +173,12 @@ fn place(row: &Row, top: usize, height: usize, options: &Options<'_>) -> RowView
     let room = match row.what {
         What::Step | What::Gap => 112,
         What::Arrow { .. } => from.abs_diff(to) * 10 / 62,
-        What::Box(_) => 32,
+        What::Box(_) => 28,
     };
     let title = short(&row.title, room).into_owned();
     let left = room.saturating_sub(title.chars().count() + 3);
     let detail = match row.what {
-        What::Box(_) => short(&row.detail, 34).into_owned(),
+        What::Box(_) => short(&row.detail, 32).into_owned(),
         _ if left < 6 => String::new(),
         _ => short(&row.detail, left).into_owned(),
     };

@@ -1,21 +1,16 @@
-//! What of a journal window is worth a row of the diagram.
-//!
-//! The tap and the standing subscription both see a message; that is one arrow from end to end. States that
-//! say nothing new are counted, not drawn again. When there are too many rows, those next to the marked
-//! records stay.
+//! What each record of a journal window looks like as a row of the diagram. Leaving rows out is left to
+//! [`super::thin`].
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::HashMap;
 
 use serde_json::Value;
 
 use super::Options;
+use super::thin::{flagged, repeats, shorten, twins};
 use crate::journal::event::{Close, LinkFault, StepEnd};
 use crate::journal::{Direction, Entry, Event, Journal, Packet};
 use crate::report::clean::{line, short};
 use crate::report::headline::{self, headline};
-
-/// How many records apart the two sightings of one message may be.
-const TWIN_DISTANCE: usize = 12;
 
 /// A vertical line of the diagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,11 +53,11 @@ pub struct Row {
     pub class: &'static str,
     /// Whether the step set the mark.
     pub mark: bool,
-    count: u32,
-    last: u64,
-    headline: String,
-    topic: Option<String>,
-    stimulus: bool,
+    pub count: u32,
+    pub last: u64,
+    pub headline: String,
+    pub topic: Option<String>,
+    pub stimulus: bool,
 }
 
 /// The shape of a row.
@@ -83,13 +78,13 @@ pub enum What {
 }
 
 /// The rows of a window, and what was not drawn.
-pub struct Rows {
-    pub rows: Vec<Row>,
+pub struct Found {
+    pub drawn: Vec<Row>,
     pub acknowledgements: usize,
     pub probes: usize,
 }
 
-pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'_>) -> Rows {
+pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'_>) -> Found {
     let entries = journal.entries();
     let from = entries.partition_point(|entry| entry.seq() < first);
     let to = entries.partition_point(|entry| entry.seq() <= last);
@@ -100,8 +95,8 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
         .iter()
         .any(|entry| matches!(entry.event(), Event::Packet { .. } | Event::Opened { .. }));
     let twins = twins(entries);
-    let mut found = Rows {
-        rows: Vec::new(),
+    let mut found = Found {
+        drawn: Vec::new(),
         acknowledgements: 0,
         probes: 0,
     };
@@ -115,7 +110,7 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
             } => found.acknowledgements += 1,
             _ => {}
         }
-        if twins.hidden.contains(&at) || flagged(&mut found.rows, entry) {
+        if twins.hidden.contains(&at) || flagged(&mut found.drawn, entry) {
             continue;
         }
         let topic = headline::topic(entry);
@@ -127,67 +122,17 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
         if let (Some(topic), Some(json)) = (topic, entry.json()) {
             before.insert(topic, json);
         }
-        if !repeats(&mut found.rows, &row, options) {
-            found.rows.push(row);
+        if !repeats(&mut found.drawn, &row, options) {
+            found.drawn.push(row);
         }
     }
-    for row in &mut found.rows {
+    for row in &mut found.drawn {
         if row.count > 1 {
             row.detail = format!("{} × {}, unchanged up to #{}", row.detail, row.count, row.last);
         }
     }
-    shorten(&mut found.rows, options);
+    shorten(&mut found.drawn, options);
     found
-}
-
-/// Which records are second sightings of a message, and which first sightings have one.
-struct Twins {
-    hidden: BTreeSet<usize>,
-    seen: BTreeSet<usize>,
-}
-
-fn twins(entries: &[std::sync::Arc<Entry>]) -> Twins {
-    let mut twins = Twins {
-        hidden: BTreeSet::new(),
-        seen: BTreeSet::new(),
-    };
-    let tap = |entry: &Entry, way: Direction| {
-        matches!(
-            entry.event(),
-            Event::Packet {
-                packet: Packet::Publish { .. },
-                ..
-            }
-        ) && entry.record.direction == Some(way)
-    };
-    let same = |a: &Entry, b: &Entry| full_topic(a) == full_topic(b) && a.payload() == b.payload();
-    for (at, entry) in entries.iter().enumerate() {
-        let twin = match entry.event() {
-            Event::Message { .. } => (at.saturating_sub(TWIN_DISTANCE)..at)
-                .rev()
-                .find(|other| tap(&entries[*other], Direction::FromDevice) && same(entry, &entries[*other])),
-            Event::Sent { .. } => (at + 1..entries.len().min(at + TWIN_DISTANCE + 1))
-                .find(|other| tap(&entries[*other], Direction::ToDevice) && same(entry, &entries[*other])),
-            _ => None,
-        };
-        if let Some(twin) = twin.filter(|twin| !twins.hidden.contains(twin)) {
-            twins.hidden.insert(twin);
-            twins.seen.insert(at);
-        }
-    }
-    twins
-}
-
-fn full_topic(entry: &Entry) -> Option<&str> {
-    match entry.event() {
-        Event::Message { topic, .. }
-        | Event::Sent { topic, .. }
-        | Event::Packet {
-            packet: Packet::Publish { topic, .. },
-            ..
-        } => Some(topic),
-        _ => None,
-    }
 }
 
 fn plain(entry: &Entry, what: What, title: impl Into<String>, detail: impl Into<String>) -> Row {
@@ -360,9 +305,8 @@ fn packet_row(entry: &Entry, packet: &Packet, message: &impl Fn(What) -> Row) ->
             more => format!("{} filters", more.len()),
         },
         Packet::Unsubscribe { filters, .. } => format!("{} filters", filters.len()),
-        Packet::Disconnect { code: 0 } => String::new(),
+        Packet::Disconnect { code: 0 } | Packet::Auth => String::new(),
         Packet::Disconnect { code } => format!("reason {code}"),
-        Packet::Auth => String::new(),
         Packet::Ack { .. } | Packet::Suback { .. } | Packet::Pingreq | Packet::Pingresp => return None,
     };
     let mut row = plain(entry, way, headline::packet_name(packet), detail);
@@ -398,93 +342,4 @@ fn link_fault(fault: &LinkFault) -> (&'static str, String) {
         LinkFault::Refuse => ("link refuses", "new connections".to_owned()),
         LinkFault::Restore => ("link restored", String::new()),
     }
-}
-
-/// Counts a message that says nothing new onto the row that said it; nothing but other messages of the
-/// device may have come in between.
-fn repeats(rows: &mut [Row], row: &Row, options: &Options<'_>) -> bool {
-    let pointed_out = |seq: u64| options.linked.contains(&seq) || options.marked.contains_key(&seq);
-    if row.topic.is_none() || row.stimulus || pointed_out(row.seq) {
-        return false;
-    }
-    let earlier = rows
-        .iter_mut()
-        .rev()
-        .take_while(|earlier| earlier.topic.is_some() && !earlier.stimulus)
-        .find(|earlier| earlier.topic == row.topic);
-    let Some(earlier) = earlier else { return false };
-    if earlier.headline != row.headline || earlier.what != row.what || pointed_out(earlier.seq) {
-        return false;
-    }
-    earlier.count += 1;
-    earlier.last = row.seq;
-    true
-}
-
-/// A mark is shown on the band of its step, where that is drawn.
-fn flagged(rows: &mut [Row], entry: &Entry) -> bool {
-    let Event::Mark { path } = entry.event() else {
-        return false;
-    };
-    let path = line(path);
-    let step = rows.iter_mut().rev().find(|row| row.what == What::Step);
-    step.filter(|row| row.title == path)
-        .map(|row| row.mark = true)
-        .is_some()
-}
-
-/// Keeps at most the given number of rows: those nearest to what is marked, or both ends when nothing is.
-fn shorten(rows: &mut Vec<Row>, options: &Options<'_>) {
-    let limit = options.limit.max(2);
-    if rows.len() <= limit {
-        return;
-    }
-    let mut anchors: Vec<usize> = (0..rows.len())
-        .filter(|at| options.marked.contains_key(&rows[*at].seq))
-        .collect();
-    if anchors.is_empty() {
-        anchors = vec![0, rows.len() - 1];
-    }
-    let mut by_distance: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for at in 0..rows.len() {
-        let distance = anchors.iter().map(|anchor| anchor.abs_diff(at)).min().unwrap_or(0);
-        by_distance.entry(distance).or_default().push(at);
-    }
-    let kept: BTreeSet<usize> = by_distance.into_values().flatten().take(limit).collect();
-    let mut shortened = Vec::with_capacity(limit + 8);
-    let mut left_out = 0;
-    for (at, row) in rows.drain(..).enumerate() {
-        if kept.contains(&at) {
-            push_gap(&mut shortened, &mut left_out);
-            shortened.push(row);
-        } else {
-            left_out += 1;
-        }
-    }
-    push_gap(&mut shortened, &mut left_out);
-    *rows = shortened;
-}
-
-fn push_gap(rows: &mut Vec<Row>, left_out: &mut usize) {
-    if *left_out > 0 {
-        let title = format!(
-            "{} left out; the journal has them",
-            crate::report::statement::many(*left_out, "row")
-        );
-        rows.push(Row {
-            seq: 0,
-            time: None,
-            what: What::Gap,
-            title,
-            detail: String::new(),
-            class: "",
-            mark: false,
-            count: 1,
-            last: 0,
-            headline: String::new(),
-            topic: None,
-            stimulus: false,
-        });
-    }
-    *left_out = 0;
 }

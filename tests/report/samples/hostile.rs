@@ -1,0 +1,238 @@
+//! A run in which every string is hostile.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+use vda5050_tck::journal::event::{Close, LinkFault, StepEnd};
+use vda5050_tck::journal::{Direction, Event, Journal, Packet, Payload};
+use vda5050_tck::pack::Role;
+use vda5050_tck::report::result::{
+    Capability, Decision, DeviceIdentity, MonitorFinding, MonitorResult, NearestMiss, RequirementResult, RunResult,
+    StepResult, TestResult, Waited,
+};
+use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
+use vda5050_tck::verdict::Verdict;
+
+use super::parts::{header, run, setting};
+use super::record::Recorder;
+
+/// What a device may choose to be called.
+pub const HOSTILE: &str = "<script>alert(1)</script>\"'&]]>\u{1b}[31m\u{0}\u{202e}\u{ffff}{{ 7 }}";
+
+/// A partial run in which every string is hostile.
+pub fn hostile() -> (RunResult, Journal, Sources) {
+    let evil = || HOSTILE.to_owned();
+    let mut record = Recorder::new();
+    record.harness(header(&[HOSTILE]));
+    let first = record.step(HOSTILE);
+    record.mark(HOSTILE);
+    record.packet(
+        Direction::FromDevice,
+        Packet::Connect {
+            level: 4,
+            client_id: evil(),
+            keep_alive: 0,
+            clean_session: false,
+            username: Some(evil()),
+            has_password: true,
+            will: None,
+        },
+    );
+    record.send(HOSTILE, &json!({ HOSTILE: HOSTILE }));
+    let witness = record.receive(
+        "state",
+        &json!({
+            "orderId": HOSTILE, "lastNodeId": HOSTILE, "operatingMode": HOSTILE,
+            "errors": [{ "errorType": HOSTILE }], "actionStates": [{ "actionId": HOSTILE, "actionStatus": HOSTILE }]
+        }),
+    );
+    record.receive("order", &json!({ "orderId": HOSTILE, "nodes": 7 }));
+    record.receive("instantActions", &json!({ "actions": [{ "actionType": HOSTILE }] }));
+    record.receive_bytes("state", HOSTILE.as_bytes());
+    record.receive_bytes("state", &[0xff, 0xfe, 0]);
+    let huge = format!("{{\"a\":\"{}\"}}", HOSTILE.escape_unicode()).repeat(4_000);
+    record.receive_bytes("state", huge.as_bytes());
+    record.harness(Event::Fault {
+        fault: LinkFault::Drop {
+            topic: Some(evil()),
+            count: 2,
+            direction: None,
+        },
+    });
+    record.harness(Event::Hook {
+        hook: evil(),
+        ok: false,
+        detail: evil(),
+    });
+    record.harness(Event::Answer {
+        prompt: evil(),
+        answer: evil(),
+        ok: true,
+    });
+    record.harness(Event::Note { text: evil() });
+    record.harness(Event::Trouble { text: evil() });
+    record.harness(Event::Served {
+        name: evil(),
+        url: evil(),
+        behaviour: evil(),
+    });
+    record.harness(Event::Fetched {
+        name: evil(),
+        request: evil(),
+        status: Some(404),
+        phase: evil(),
+    });
+    record.harness(Event::Opened {
+        connection: 1,
+        peer: evil(),
+    });
+    record.harness(Event::Undecodable {
+        connection: 1,
+        reason: evil(),
+        bytes: Payload::keep(vec![0xff].into()),
+    });
+    record.harness(Event::Closed {
+        connection: 1,
+        how: Close::DeviceReset,
+    });
+    let last = record.end(HOSTILE, StepEnd::Broken(evil()));
+
+    let decide = |verdict| Decision {
+        requirement: evil(),
+        verdict,
+        clause: evil(),
+        place: format!("{HOSTILE}:3"),
+        witness: Some(witness),
+        message: evil(),
+        expected: Some(evil()),
+        nearest: Some(NearestMiss {
+            seq: witness,
+            path: evil(),
+            found: evil(),
+            expected: evil(),
+        }),
+        waited: Some(Waited {
+            seconds: 1.0,
+            since: first,
+            messages: 1,
+        }),
+        explanation: Some(format!("{HOSTILE}\n | {HOSTILE}\n | ^^^ {HOSTILE}")),
+        interpretation: Some(evil()),
+    };
+    let tests = Verdict::ALL
+        .into_iter()
+        .map(Some)
+        .chain([None])
+        .map(|verdict| TestResult {
+            id: format!("{HOSTILE}/{}", verdict.map_or("none", Verdict::word)),
+            title: evil(),
+            verdict,
+            not_applicable: verdict.is_none().then(evil),
+            seconds: f64::MAX,
+            reason: Some(evil()),
+            maturity: "watchlist".to_owned(),
+            journal: Some((first, last)),
+            decisions: verdict.map(decide).into_iter().collect(),
+            steps: vec![StepResult {
+                path: evil(),
+                verb: evil(),
+                title: Some(evil()),
+                place: evil(),
+                outcome: evil(),
+                journal: Some((first, last)),
+                took: Some(witness),
+                seconds: -1.0,
+            }],
+        })
+        .collect::<Vec<_>>();
+    let monitors = vec![MonitorResult {
+        id: evil(),
+        title: evil(),
+        verdict: Some(Verdict::Fail),
+        judged: u64::MAX,
+        findings: vec![MonitorFinding {
+            requirement: evil(),
+            verdict: Verdict::Fail,
+            count: u64::MAX,
+            first: vec![witness, u64::MAX],
+            message: evil(),
+            interpretation: Some(evil()),
+        }],
+    }];
+    let result = RunResult {
+        tool: evil(),
+        run: evil(),
+        started: evil(),
+        role: evil(),
+        protocol: evil(),
+        partial: true,
+        partial_reason: Some(evil()),
+        device: DeviceIdentity {
+            manufacturer: evil(),
+            serial_number: evil(),
+            series_name: Some(evil()),
+        },
+        vantage: evil(),
+        suites_sha256: evil(),
+        suites_modified: true,
+        journal: evil(),
+        requirements: vec![
+            RequirementResult {
+                id: evil(),
+                verdict: Some(Verdict::Fail),
+                decided_by: vec![evil()],
+                not_decided: None,
+            },
+            RequirementResult {
+                id: "X Y".to_owned(),
+                verdict: None,
+                decided_by: Vec::new(),
+                not_decided: Some(evil()),
+            },
+        ],
+        capabilities: vec![Capability {
+            name: evil(),
+            value: evil(),
+            source: evil(),
+        }],
+        limits: vec![evil()],
+        deviations: BTreeMap::from([(evil(), evil())]),
+        settings: vec![setting(HOSTILE, HOSTILE, HOSTILE)],
+        ..run(tests, monitors)
+    };
+    let sources = Sources {
+        requirements: vec![RequirementText {
+            id: evil(),
+            chapter: evil(),
+            text: evil(),
+            role: evil(),
+            mood: evil(),
+            section: evil(),
+            interpretation: Some(evil()),
+            decided: HowDecided::NotTestable(evil()),
+        }],
+        tests: vec![TestSource {
+            id: format!("{HOSTILE}/fail"),
+            role: Role::Agv,
+            title: evil(),
+            why: evil(),
+            operator: true,
+            file: evil(),
+            text: format!("{HOSTILE}\n{HOSTILE}\n{HOSTILE}"),
+            clauses: vec![ClauseSource {
+                requirement: evil(),
+                path: evil(),
+                lines: (1, usize::MAX - 1),
+                step: (0, usize::MAX - 1),
+            }],
+        }],
+        monitors: vec![MonitorSource {
+            id: evil(),
+            role: None,
+            title: evil(),
+            why: evil(),
+            requirements: vec![evil()],
+        }],
+    };
+    (result, record.journal, sources)
+}
