@@ -259,6 +259,9 @@ pub struct SendAction {
     pub name: Option<String>,
     /// Parameters.
     pub with: Vec<(String, Term)>,
+    /// `withAll:`, an object whose members are parameters as well, below those of `with`: parameters that
+    /// only the profile knows.
+    pub with_all: Option<Term>,
     /// blockingType; `HARD` unless said.
     pub blocking: Option<Term>,
     /// Where it is written.

@@ -11,7 +11,7 @@ use crate::journal::event::{Direction, LinkFault};
 use crate::yaml::{Kind, Node};
 
 pub(super) const SEND_KEYS: &[&str] = &[
-    "route", "payload", "action", "as", "with", "blocking", "actions", "patch", "raw", "qos", "retain",
+    "route", "payload", "action", "as", "with", "withAll", "blocking", "actions", "patch", "raw", "qos", "retain",
 ];
 pub(super) const SERVE_KEYS: &[&str] = &["file", "behaviour"];
 pub(super) const OPERATOR_KEYS: &[&str] = &["with", "within"];
@@ -53,7 +53,7 @@ pub(super) fn send(topic: &str, fields: &Fields<'_>, at: &Span, problems: &mut P
         problems,
     );
     exclusive(fields, "actions", &["action"], problems);
-    for key in ["as", "with", "blocking"] {
+    for key in ["as", "with", "withAll", "blocking"] {
         if let Some(name) = fields.key(key)
             && !fields.has("action")
         {
@@ -210,6 +210,7 @@ fn send_action(action: &Node, fields: &Fields<'_>, at: &Span, problems: &mut Pro
             .get("with", problems)
             .map(|node| named_terms(node, problems))
             .unwrap_or_default(),
+        with_all: fields.get("withAll", problems).map(|node| term(node, problems)),
         blocking: fields.get("blocking", problems).map(|node| term(node, problems)),
         span: at.clone(),
     }
@@ -217,7 +218,7 @@ fn send_action(action: &Node, fields: &Fields<'_>, at: &Span, problems: &mut Pro
 
 fn send_action_item(node: &Node, problems: &mut Problems) -> Option<SendAction> {
     let fields = Fields::of(node, problems)?;
-    fields.only(&[&["action", "as", "with", "blocking"]], problems);
+    fields.only(&[&["action", "as", "with", "withAll", "blocking"]], problems);
     let action = fields.need("action", &node.span, problems)?;
     Some(send_action(action, &fields, &node.span, problems))
 }

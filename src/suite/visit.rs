@@ -68,6 +68,7 @@ impl Step {
 fn action<'a>(action: &'a SendAction, visit: &mut dyn FnMut(&'a Term)) {
     visit(&action.action);
     action.with.iter().for_each(|(_, term)| visit(term));
+    action.with_all.iter().for_each(&mut *visit);
     action.blocking.iter().for_each(visit);
 }
 
