@@ -2,6 +2,27 @@
 //!
 //! A [`Check`] is a small state machine over the journal entries of a run or of a window. Tests and monitors
 //! refer to it by name. It documents the requirements it can decide and never reads a clock.
+//!
+//! One file per topic group; [`registry`] lists them all. A check is told everything that happened and must
+//! not accuse anybody falsely: states coalesce, links break, wills are old by nature, retained messages are
+//! stale, and tests send broken messages on purpose. Memory is bounded whatever a device sends.
+
+mod connection;
+mod errors;
+mod header;
+mod header_id;
+mod message;
+mod mqtt;
+mod orders;
+mod state_actions;
+mod state_maps;
+mod state_period;
+mod state_route;
+mod state_values;
+mod topic;
+#[cfg(test)]
+mod trace;
+mod traffic;
 
 use std::time::Duration;
 
@@ -80,4 +101,59 @@ pub struct Check {
     pub arguments: &'static [&'static str],
     /// Starts it.
     pub start: fn(&CheckContext<'_>) -> Box<dyn Running>,
+}
+
+/// Every named check, in the order they are listed and run.
+#[must_use]
+pub fn registry() -> &'static [Check] {
+    &REGISTRY
+}
+
+/// The check of that name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Check> {
+    REGISTRY.iter().find(|check| check.name == name)
+}
+
+static REGISTRY: [Check; 25] = [
+    message::SCHEMA,
+    message::ENCODING,
+    header_id::ID_RISES,
+    header::TIMESTAMP,
+    header::IDENTITY,
+    header::VERSION,
+    topic::NAMES,
+    topic::STRUCTURE,
+    topic::OWN_SIDE,
+    mqtt::QUALITY,
+    mqtt::CONNECT,
+    connection::ONLINE_AFTER_CONNECT,
+    connection::VALUES,
+    state_period::PERIOD,
+    state_period::OWN_LIMITS,
+    state_actions::TRANSITIONS,
+    state_actions::KEPT,
+    state_route::REMAINING_ROUTE,
+    state_route::LAST_NODE,
+    state_values::IDLE_EMPTY,
+    state_maps::MAPS,
+    state_values::POSITION_RANGE,
+    state_values::IDENTIFIERS,
+    state_values::DRIVING,
+    errors::PERSIST,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_every_check_documents_what_it_decides() {
+        for (at, check) in registry().iter().enumerate() {
+            assert!(registry()[at + 1..].iter().all(|other| other.name != check.name));
+            assert!(!check.decides.is_empty() && !check.doc.is_empty(), "{}", check.name);
+            assert!(find(check.name).is_some());
+        }
+        assert!(find("no/such-check").is_none());
+    }
 }

@@ -1,0 +1,226 @@
+//! `errors/persist-until-new-order`: the report of a rejected order stays until a new order is accepted.
+//!
+//! Whether an order had to be rejected, and with which words, is left to the tests.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::orders::number;
+use super::traffic::{Traffic, actions, broken, elements, outside_influence, state, text, to_vehicle};
+use super::{Check, CheckContext, CheckFinding, Running};
+use crate::journal::Entry;
+use crate::journal::event::{Event, Packet};
+
+/// How many actionIds of instant actions are kept in mind.
+const ACTIONS: usize = 256;
+
+/// See the module.
+pub(super) const PERSIST: Check = Check {
+    name: "errors/persist-until-new-order",
+    decides: &["ORD-REJ-03", "ORD-REJ-08"],
+    doc: "A validationError or orderError warning that answers an order is listed in every state until the vehicle \
+          shows another orderId or orderUpdateId. Errors that answer an instant action are not held to this, and a \
+          restart or a change of operating mode ends the watch.",
+    arguments: &[],
+    start: |_| Box::new(Persist::default()),
+};
+
+#[derive(Default)]
+struct Persist {
+    traffic: Traffic,
+    /// Whether the last thing sent to the vehicle was an order.
+    after_order: bool,
+    instant: Vec<String>,
+    /// What the last state showed: order, update, mode.
+    shown: Option<(String, Option<u64>, String)>,
+    /// Error types listed in the last state.
+    listed: Vec<String>,
+    /// Error types that have to stay, and the entry in which they appeared.
+    watched: BTreeMap<&'static str, u64>,
+}
+
+/// The requirement that demands of an error type to stay.
+fn requirement(error_type: &str) -> Option<(&'static str, &'static str)> {
+    // One check for all versions: later ones spell these in capitals.
+    match error_type {
+        "validationError" | "VALIDATION_FAILURE" => Some(("validation", "ORD-REJ-03")),
+        "orderError" | "INVALID_ORDER_ACTION" | "UNSUPPORTED_PARAMETER" => Some(("order", "ORD-REJ-08")),
+        _ => None,
+    }
+}
+
+impl Running for Persist {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.sent(entry, context);
+        if outside_influence(entry)
+            || matches!(
+                entry.event(),
+                Event::Packet {
+                    packet: Packet::Connect { .. },
+                    ..
+                }
+            )
+        {
+            self.watched.clear();
+            self.shown = None;
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        if !state.get("errors").is_some_and(Value::is_array) {
+            return false;
+        }
+        let shown = (
+            text(state, "orderId").chars().take(512).collect(),
+            number(state, "orderUpdateId"),
+            text(state, "operatingMode").chars().take(64).collect(),
+        );
+        let before = self.shown.replace(shown);
+        if before.is_none() || before != self.shown {
+            self.watched.clear();
+        }
+        let now: Vec<(String, bool)> = elements(state, "errors")
+            .take(ACTIONS)
+            .filter(|error| requirement(text(error, "errorType")).is_some())
+            .map(|error| (text(error, "errorType").to_owned(), self.is_of_instant_action(error)))
+            .collect();
+        let judged = !self.watched.is_empty();
+        let gone: Vec<(&'static str, u64)> = self
+            .watched
+            .iter()
+            .map(|(kind, since)| (*kind, *since))
+            .filter(|(kind, _)| {
+                !now.iter()
+                    .any(|(listed, _)| requirement(listed).is_some_and(|found| found.0 == *kind))
+            })
+            .collect();
+        for (kind, since) in gone {
+            self.watched.remove(kind);
+            let (name, id) = if kind == "order" {
+                ("orderError", "ORD-REJ-08")
+            } else {
+                ("validationError", "ORD-REJ-03")
+            };
+            let text = format!("the {name} of message #{since} is gone, although no new order was accepted");
+            findings.push(broken(id, entry.seq(), text));
+        }
+        // The first state of a run tells nothing about what an error answers.
+        if before.is_some() && self.after_order {
+            for (listed, instant) in &now {
+                let new = !self.listed.contains(listed);
+                if let Some((kind, _)) = requirement(listed).filter(|_| new && !instant) {
+                    self.watched.insert(kind, entry.seq());
+                }
+            }
+        }
+        self.listed = now.into_iter().map(|(listed, _)| listed).collect();
+        judged
+    }
+}
+
+impl Persist {
+    fn sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        if let Event::Sent { topic, .. } = entry.event() {
+            match context.topic_name(topic) {
+                Some("order") => self.after_order = true,
+                Some("instantActions") => self.after_order = false,
+                _ => {}
+            }
+        }
+        if let Some(message) = to_vehicle("instantActions", entry, context) {
+            self.after_order = false;
+            self.instant
+                .extend(actions(message).map(|action| text(action, "actionId").to_owned()));
+            let excess = self.instant.len().saturating_sub(ACTIONS);
+            self.instant.drain(..excess);
+        } else if to_vehicle("order", entry, context).is_some() {
+            self.after_order = true;
+        }
+    }
+
+    fn is_of_instant_action(&self, error: &Value) -> bool {
+        elements(error, "errorReferences").any(|reference| {
+            let value = text(reference, "referenceValue");
+            self.instant.iter().any(|id| id == value)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::Trace;
+
+    const CHECK: &str = "errors/persist-until-new-order";
+
+    fn with(errors: &[&str]) -> Value {
+        let errors: Vec<Value> = errors
+            .iter()
+            .map(|error| json!({ "errorType": error, "errorLevel": "WARNING" }))
+            .collect();
+        json!({ "errors": errors })
+    }
+
+    fn rejected(error: &str) -> Trace {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&json!({}))
+            .sent("order", &json!({ "orderId": 7 }))
+            .state(&with(&[error]));
+        trace
+    }
+
+    #[test]
+    fn a_report_that_stays_until_a_new_order_is_right() {
+        let mut trace = rejected("validationError");
+        trace
+            .instant("stateRequest", "x", &json!([]))
+            .state(&with(&["other", "validationError"]));
+        trace
+            .state(&json!({ "orderId": "o" }))
+            .state(&json!({ "orderId": "o" }));
+        let outcome = trace.judge(CHECK);
+        assert!(outcome.findings.is_empty());
+        assert_eq!(outcome.judged, 1);
+    }
+
+    #[test]
+    fn reports_that_vanish_are_found() {
+        let mut trace = rejected("validationError");
+        trace.state(&json!({})).state(&json!({}));
+        assert_eq!(trace.judge(CHECK).summary(), ["ORD-REJ-03"]);
+        let mut trace = rejected("orderError");
+        trace.state(&with(&["orderError"])).state(&with(&["validationError"]));
+        assert_eq!(trace.judge(CHECK).summary(), ["ORD-REJ-08"]);
+    }
+
+    #[test]
+    fn other_errors_and_answers_to_instant_actions_may_go() {
+        let mut trace = rejected("orderUpdateError");
+        trace.state(&json!({}));
+        let error = json!({ "errorType": "orderError", "errorLevel": "WARNING",
+            "errorReferences": [{ "referenceKey": "actionId", "referenceValue": "x" }] });
+        trace
+            .instant("dance", "x", &json!([]))
+            .state(&json!({ "errors": [error] }))
+            .state(&json!({}));
+        trace
+            .instant("jump", "y", &json!([]))
+            .state(&with(&["validationError"]))
+            .state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
+    fn a_restart_or_a_change_of_mode_ends_the_watch() {
+        let mut trace = rejected("validationError");
+        trace.hook().state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
+        let mut trace = rejected("validationError");
+        trace.state(&json!({ "operatingMode": "MANUAL" }));
+        assert!(trace.judge(CHECK).findings.is_empty());
+    }
+}

@@ -1,0 +1,316 @@
+//! `header/timestamp`, `header/identity`, `header/version`: the form and sense of header fields.
+//!
+//! That they are present and of the right type is left to `message/schema`, counting to `header/id-rises`.
+
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use regex::Regex;
+
+use super::traffic::{Traffic, broken, quote, remark, says_broken};
+use super::{Check, CheckContext, CheckFinding, Running};
+use crate::journal::Entry;
+
+/// How far the clock of a device may be off before it is remarked on.
+const CLOCK_TOLERANCE: Duration = Duration::from_secs(300);
+
+/// `header/timestamp`.
+pub(super) const TIMESTAMP: Check = Check {
+    name: "header/timestamp",
+    decides: &["HDR-03"],
+    doc: "timestamp is a point in time in UTC, written with T and Z. Another number of fraction digits than two is a \
+          warning, as is a clock more than five minutes away from the harness's; the will is not held to the clock.",
+    arguments: &[],
+    start: |_| Box::new(Timestamp::default()),
+};
+
+/// `header/identity`.
+pub(super) const IDENTITY: Check = Check {
+    name: "header/identity",
+    decides: &["HDR-05", "TOPIC-04", "TOPIC-05", "TOPIC-06"],
+    doc: "manufacturer and serialNumber name the vehicle, the same one in every message. Empty, or other than in the \
+          topic, is a warning. The serial number keeps to its characters, and neither holds a slash.",
+    arguments: &[],
+    start: |_| Box::new(Identity::default()),
+};
+
+/// `header/version`.
+pub(super) const VERSION: Check = Check {
+    name: "header/version",
+    decides: &["HDR-04"],
+    doc: "version is three numbers with dots, and its first two are those of the protocol version the device is \
+          judged by.",
+    arguments: &[],
+    start: |_| Box::new(Version::default()),
+};
+
+static TIMESTAMP_FORM: LazyLock<Option<Regex>> =
+    LazyLock::new(|| Regex::new(r"^\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}(?:\.(\d+))?Z$").ok());
+
+#[derive(Default)]
+struct Timestamp {
+    traffic: Traffic,
+}
+
+impl Running for Timestamp {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let Some(message) = self.traffic.delivered(entry, context) else {
+            return false;
+        };
+        let Some(value) = entry.json() else { return false };
+        let Some(written) = value.get("timestamp").and_then(|written| written.as_str()) else {
+            return false;
+        };
+        let form = TIMESTAMP_FORM.as_ref().and_then(|form| form.captures(written));
+        let (Some(form), Ok(time)) = (form, written.parse::<jiff::Timestamp>()) else {
+            let text = format!("timestamp {} on {} is no time in UTC", quote(written), message.name);
+            findings.push(broken("HDR-03", entry.seq(), text));
+            return true;
+        };
+        let digits = form.get(1).map_or(0, |digits| digits.len());
+        if digits != 2 {
+            let text = format!("timestamp {} has {digits} fraction digits instead of 2", quote(written));
+            findings.push(remark("HDR-03", entry.seq(), text));
+        }
+        let apart = time.duration_since(entry.at().utc).unsigned_abs();
+        // The broker sends the will long after it was written.
+        let will = message.name == "connection" && says_broken(value);
+        if apart > CLOCK_TOLERANCE && !will {
+            let text = format!(
+                "timestamp {} is {} s away from the clock of the harness",
+                quote(written),
+                apart.as_secs()
+            );
+            findings.push(remark("HDR-03", entry.seq(), text));
+        }
+        true
+    }
+}
+
+#[derive(Default)]
+struct Identity {
+    traffic: Traffic,
+    seen: Option<(String, String)>,
+}
+
+impl Running for Identity {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let Some(message) = self.traffic.delivered(entry, context) else {
+            return false;
+        };
+        let field = |name| entry.json()?.get(name)?.as_str();
+        let (Some(manufacturer), Some(serial)) = (field("manufacturer"), field("serialNumber")) else {
+            return false;
+        };
+        let seq = entry.seq();
+        for (name, value, own) in [
+            ("manufacturer", manufacturer, context.identity.0),
+            ("serialNumber", serial, context.identity.1),
+        ] {
+            if value.is_empty() {
+                findings.push(remark("HDR-05", seq, format!("{name} on {} is empty", message.name)));
+            } else if value != own {
+                let text = format!(
+                    "{name} {} on {} is not the {} of the topic",
+                    quote(value),
+                    message.name,
+                    quote(own)
+                );
+                findings.push(remark("TOPIC-04", seq, text));
+            }
+            if value.contains('/') {
+                findings.push(broken(
+                    "TOPIC-06",
+                    seq,
+                    format!("{name} {} holds a slash", quote(value)),
+                ));
+            }
+        }
+        if !serial.bytes().all(serial_character) {
+            let text = format!("serialNumber {} holds characters that are not allowed", quote(serial));
+            findings.push(broken("TOPIC-05", seq, text));
+        }
+        let identity = (bounded(manufacturer), bounded(serial));
+        match &self.seen {
+            None => self.seen = Some(identity),
+            Some(seen) if *seen != identity => {
+                let text = format!(
+                    "{} on {} names {} {}, an earlier message named {} {}",
+                    "the header",
+                    message.name,
+                    quote(manufacturer),
+                    quote(serial),
+                    quote(&seen.0),
+                    quote(&seen.1)
+                );
+                findings.push(broken("HDR-05", seq, text));
+            }
+            Some(_) => {}
+        }
+        true
+    }
+}
+
+/// Whether a serial number may hold this character.
+pub(super) fn serial_character(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'.' | b':' | b'-')
+}
+
+fn bounded(text: &str) -> String {
+    text.chars().take(256).collect()
+}
+
+#[derive(Default)]
+struct Version {
+    traffic: Traffic,
+}
+
+impl Running for Version {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let Some(message) = self.traffic.delivered(entry, context) else {
+            return false;
+        };
+        let Some(written) = entry.json().and_then(|value| value.get("version")?.as_str()) else {
+            return false;
+        };
+        let parts: Vec<Option<u64>> = written
+            .split('.')
+            .map(|part| {
+                let digits = !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+                digits.then(|| part.parse().ok()).flatten()
+            })
+            .take(4)
+            .collect();
+        let [Some(major), Some(minor), Some(_)] = parts[..] else {
+            let text = format!(
+                "version {} on {} is not three numbers with dots",
+                quote(written),
+                message.name
+            );
+            findings.push(broken("HDR-04", entry.seq(), text));
+            return true;
+        };
+        let expected = context.pack.version;
+        if (major, minor) != (expected.major, expected.minor) {
+            let text = format!(
+                "version {} on {} is another one than {}.{}, by which the device is judged",
+                quote(written),
+                message.name,
+                expected.major,
+                expected.minor
+            );
+            findings.push(broken("HDR-04", entry.seq(), text));
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::super::trace::{Trace, pack};
+
+    fn timestamps(all: &[&str]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        for timestamp in all {
+            trace.state(&json!({ "timestamp": timestamp }));
+        }
+        trace.judge("header/timestamp").summary()
+    }
+
+    #[test]
+    fn a_time_in_utc_with_two_digits_is_right() {
+        assert!(timestamps(&["2026-01-01T12:00:00.00Z", "2026-01-01T12:04:59.99Z"]).is_empty());
+    }
+
+    #[test]
+    fn offsets_missing_zones_and_impossible_times_are_found() {
+        let wrong = [
+            "2026-01-01T12:00:00.00+00:00",
+            "2026-01-01T12:00:00.00",
+            "2026-01-01 12:00:00.00Z",
+            "2026-13-01T12:00:00.00Z",
+            "",
+            "١٢٣٤-01-01T12:00:00.00Z",
+        ];
+        for timestamp in wrong {
+            assert_eq!(timestamps(&[timestamp]), ["HDR-03"], "{timestamp}");
+        }
+    }
+
+    #[test]
+    fn other_digit_counts_and_a_clock_that_is_off_are_remarks() {
+        assert_eq!(timestamps(&["2026-01-01T12:00:00.000Z"]), ["HDR-03 warning"]);
+        assert_eq!(timestamps(&["2026-01-01T12:00:00Z"]), ["HDR-03 warning"]);
+        assert_eq!(timestamps(&["2026-01-01T13:00:00.00Z"]), ["HDR-03 warning"]);
+    }
+
+    #[test]
+    fn the_will_may_be_old() {
+        let mut trace = Trace::subscriber();
+        let will = json!({ "timestamp": "2020-01-01T00:00:00.00Z", "connectionState": "CONNECTIONBROKEN" });
+        trace.message("connection", &will);
+        let outcome = trace.judge("header/timestamp");
+        assert!(outcome.findings.is_empty() && outcome.judged == 1);
+    }
+
+    fn identities(all: &[(&str, &str)]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        for (manufacturer, serial) in all {
+            trace.state(&json!({ "manufacturer": manufacturer, "serialNumber": serial }));
+        }
+        trace.judge("header/identity").summary()
+    }
+
+    #[test]
+    fn the_identity_of_the_topic_is_right() {
+        assert!(identities(&[("acme", "7"), ("acme", "7")]).is_empty());
+    }
+
+    #[test]
+    fn another_an_empty_a_changing_and_a_malformed_identity_are_found() {
+        assert_eq!(identities(&[("Acme", "7")]), ["TOPIC-04 warning"]);
+        assert_eq!(identities(&[("", "7")]), ["HDR-05 warning"]);
+        assert_eq!(
+            identities(&[("acme", "7"), ("acme", "8")]),
+            ["TOPIC-04 warning", "HDR-05"]
+        );
+        assert_eq!(identities(&[("acme", "7 b")]), ["TOPIC-04 warning", "TOPIC-05"]);
+        assert_eq!(
+            identities(&[("acme", "7/b")]),
+            ["TOPIC-04 warning", "TOPIC-06", "TOPIC-05"]
+        );
+    }
+
+    fn versions(version: &str) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({ "version": version }));
+        trace.judge("header/version").summary()
+    }
+
+    #[test]
+    fn any_patch_of_the_version_judged_by_is_right() {
+        let pack = pack();
+        assert!(versions(&format!("{}.{}.7", pack.version.major, pack.version.minor)).is_empty());
+    }
+
+    #[test]
+    fn another_form_and_another_version_are_found() {
+        let pack = pack();
+        let (major, minor) = (pack.version.major, pack.version.minor);
+        for version in [
+            format!("{major}.{minor}"),
+            format!("v{major}.{minor}.0"),
+            format!("{major}.{minor}.0-rc1"),
+            format!("{major}.{minor}.0.0"),
+            format!("{major}.{}.0", minor + 1),
+            String::new(),
+        ] {
+            assert_eq!(versions(&version), ["HDR-04"], "{version}");
+        }
+    }
+}

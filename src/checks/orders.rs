@@ -1,0 +1,162 @@
+//! The orders that were sent to the vehicle, as far as checks of the state need them.
+//!
+//! Whether the vehicle took one over is read from its states by the checks.
+
+use std::collections::VecDeque;
+
+use serde_json::Value;
+
+use super::CheckContext;
+use super::traffic::{elements, text, to_vehicle};
+use crate::journal::Entry;
+
+/// How many order messages are kept, and how many elements each may have.
+const MESSAGES: usize = 64;
+const ELEMENTS: usize = 4096;
+
+/// A node or edge of an order, or its state.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Element {
+    pub id: String,
+    pub sequence: u64,
+    pub released: bool,
+}
+
+impl Element {
+    fn read(value: &Value, id: &str) -> Option<Self> {
+        let id = value.get(id)?.as_str()?;
+        let number = value.get("sequenceId")?;
+        Some(Self {
+            id: id.chars().take(512).collect(),
+            sequence: number.as_u64().or_else(|| whole(number.as_f64()?))?,
+            released: value.get("released")?.as_bool()?,
+        })
+    }
+}
+
+/// A number written as `2.0` is the same number.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "range and fraction are checked"
+)]
+fn whole(number: f64) -> Option<u64> {
+    (number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number)).then_some(number as u64)
+}
+
+/// The elements of `list`; `None` when it is missing, too long, or one of them cannot be read.
+pub(super) fn read_elements(message: &Value, list: &str, id: &str) -> Option<Vec<Element>> {
+    let all = message.get(list)?.as_array()?;
+    if all.len() > ELEMENTS {
+        return None;
+    }
+    all.iter().map(|value| Element::read(value, id)).collect()
+}
+
+/// A whole number member of a message.
+pub(super) fn number(message: &Value, name: &str) -> Option<u64> {
+    let value = message.get(name)?;
+    value.as_u64().or_else(|| whole(value.as_f64()?))
+}
+
+/// One order message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct SentOrder {
+    pub order: String,
+    pub update: u64,
+    pub nodes: Vec<Element>,
+    pub edges: Vec<Element>,
+    /// Whether its graph is one that a vehicle may accept. Tests also send others, on purpose.
+    pub sound: bool,
+}
+
+impl SentOrder {
+    fn read(message: &Value) -> Option<Self> {
+        let order = message.get("orderId")?.as_str()?;
+        let update = number(message, "orderUpdateId")?;
+        let nodes = read_elements(message, "nodes", "nodeId");
+        let edges = read_elements(message, "edges", "edgeId");
+        let sound = nodes.is_some() && edges.is_some();
+        let mut sent = Self {
+            order: order.chars().take(512).collect(),
+            update,
+            nodes: nodes.unwrap_or_default(),
+            edges: edges.unwrap_or_default(),
+            sound,
+        };
+        sent.sound &= sent.is_chain();
+        Some(sent)
+    }
+
+    /// Whether nodes and edges alternate without gap, and nothing is released behind the horizon's start.
+    fn is_chain(&self) -> bool {
+        if self.nodes.is_empty() || self.edges.len() + 1 != self.nodes.len() {
+            return false;
+        }
+        let mut chain: Vec<&Element> = self.nodes.iter().chain(&self.edges).collect();
+        chain.sort_by_key(|element| element.sequence);
+        let ordered = |list: &[Element]| list.windows(2).all(|pair| pair[0].sequence + 2 == pair[1].sequence);
+        ordered(&self.nodes)
+            && ordered(&self.edges)
+            && chain.windows(2).all(|pair| pair[0].sequence + 1 == pair[1].sequence)
+            && chain.windows(2).all(|pair| pair[0].released || !pair[1].released)
+            && chain.first().is_some_and(|first| first.released)
+    }
+
+    /// The sequenceId of its first node.
+    pub fn first(&self) -> u64 {
+        self.nodes.first().map_or(0, |node| node.sequence)
+    }
+}
+
+/// All orders sent of late, oldest first.
+#[derive(Debug, Default)]
+pub(super) struct Orders {
+    sent: VecDeque<SentOrder>,
+}
+
+impl Orders {
+    /// Learns from an entry; returns whether it was an order.
+    pub fn note(&mut self, entry: &Entry, context: &CheckContext<'_>) -> bool {
+        let Some(sent) = to_vehicle("order", entry, context).and_then(SentOrder::read) else {
+            return false;
+        };
+        // The harness may see its own order come back through the broker.
+        if self.sent.back() == Some(&sent) {
+            return true;
+        }
+        if self.sent.len() == MESSAGES {
+            self.sent.pop_front();
+        }
+        self.sent.push_back(sent);
+        true
+    }
+
+    /// The messages with this orderId and orderUpdateId.
+    pub fn candidates(&self, order: &str, update: u64) -> impl Iterator<Item = &SentOrder> {
+        self.of(order).filter(move |sent| sent.update == update)
+    }
+
+    /// The messages with this orderId.
+    pub fn of(&self, order: &str) -> impl Iterator<Item = &SentOrder> {
+        self.sent.iter().filter(move |sent| sent.order == order)
+    }
+}
+
+/// Where a state says the vehicle was last: node and sequenceId.
+pub(super) fn last_node(state: &Value) -> Option<(String, u64)> {
+    let node = state.get("lastNodeId")?.as_str()?;
+    Some((node.chars().take(512).collect(), number(state, "lastNodeSequenceId")?))
+}
+
+/// Whether a state reports something that may end an order without a word: another operating mode than the
+/// automatic ones, an emergency stop, a fatal error, or a failed action.
+pub(super) fn may_abandon(state: &Value) -> bool {
+    let automatic = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
+    let stopped = state
+        .pointer("/safetyState/eStop")
+        .is_some_and(|stop| stop.as_str() != Some("NONE"));
+    let fatal = elements(state, "errors").any(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"));
+    let failed = elements(state, "actionStates").any(|action| text(action, "actionStatus") == "FAILED");
+    !automatic || stopped || fatal || failed
+}

@@ -1,0 +1,494 @@
+//! `state/remaining-route`, `state/last-node`: what a state says about the way, against the order it names.
+//!
+//! Which order had to be accepted is left to the tests: a state is held against the order whose ids it shows.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::orders::{Element, Orders, SentOrder, last_node, may_abandon, number, read_elements};
+use super::traffic::{Traffic, actions, broken, outside_influence, quote, remark, state, text, to_vehicle};
+use super::{Check, CheckContext, CheckFinding, Running};
+use crate::journal::Entry;
+
+/// `state/remaining-route`.
+pub(super) const REMAINING_ROUTE: Check = Check {
+    name: "state/remaining-route",
+    decides: &["STATE-12", "STATE-MSG-13", "NODE-03"],
+    doc: "nodeStates and edgeStates list, in sequence, exactly what the vehicle has still to traverse of the order \
+          whose ids the state shows, horizon included, released as in the order. The first node may be listed or \
+          not. Not judged after a cancelOrder, a change of mode, a fatal error or a failed action.",
+    arguments: &[],
+    start: |_| Box::new(RemainingRoute::default()),
+};
+
+/// `state/last-node`.
+pub(super) const LAST_NODE: Check = Check {
+    name: "state/last-node",
+    decides: &["STATE-MSG-04", "ORD-01", "ORD-07"],
+    doc: "lastNodeId and lastNodeSequenceId move along the order in its sequence, and never onto a node that was not \
+          released.",
+    arguments: &[],
+    start: |_| Box::new(LastNode::default()),
+};
+
+/// The order a vehicle shows in its states, and whether it can still be held against it.
+#[derive(Default)]
+struct Shown {
+    traffic: Traffic,
+    orders: Orders,
+    /// orderId of the last state.
+    order: Option<String>,
+    /// orderId of an order that was cancelled or may have been abandoned.
+    abandoned: Option<String>,
+    /// Last node of the state before the order changed: not yet progress in the new one.
+    carried: Option<(String, u64)>,
+    last: Option<(String, u64)>,
+}
+
+impl Shown {
+    /// Learns from an entry; gives back a state that can be held against its order.
+    fn state<'e>(&mut self, entry: &'e Entry, context: &CheckContext<'_>) -> Option<&'e Value> {
+        self.traffic.note(entry);
+        self.orders.note(entry, context);
+        let moved = to_vehicle("instantActions", entry, context).is_some_and(|message| {
+            actions(message).any(|action| {
+                let name = text(action, "actionType");
+                matches!(name, "cancelOrder" | "initPosition" | "initializePosition")
+            })
+        });
+        if moved || outside_influence(entry) {
+            self.abandoned.clone_from(&self.order);
+        }
+        let state = state(self.traffic, entry, context)?;
+        let order = state.get("orderId")?.as_str()?;
+        let last = last_node(state)?;
+        if self.order.as_deref() != Some(order) {
+            self.carried = self.last.take();
+            self.order = Some(order.chars().take(512).collect());
+            self.abandoned = None;
+        }
+        if self.carried.as_ref().is_some_and(|carried| *carried != last) {
+            self.carried = None;
+        }
+        self.last = Some(last);
+        if may_abandon(state) {
+            self.abandoned.clone_from(&self.order);
+        }
+        self.abandoned.is_none().then_some(state)
+    }
+}
+
+#[derive(Default)]
+struct RemainingRoute {
+    shown: Shown,
+    /// orderUpdateIds of the present order that states have shown.
+    adopted: BTreeSet<u64>,
+    of: Option<String>,
+}
+
+/// What is right to list at some progress.
+struct Remainder<'o> {
+    required: Vec<&'o Element>,
+    tolerated: Vec<&'o Element>,
+}
+
+impl Running for RemainingRoute {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(state) = self.shown.state(entry, context) else {
+            return false;
+        };
+        let (Some(update), Some(nodes), Some(edges)) = (
+            number(state, "orderUpdateId"),
+            read_elements(state, "nodeStates", "nodeId"),
+            read_elements(state, "edgeStates", "edgeId"),
+        ) else {
+            return false;
+        };
+        if self.of != self.shown.order {
+            self.of.clone_from(&self.shown.order);
+            self.adopted.clear();
+        }
+        if self.adopted.len() < 1024 {
+            self.adopted.insert(update);
+        }
+        let order = text(state, "orderId");
+        let candidates: Vec<&SentOrder> = self.shown.orders.candidates(order, update).collect();
+        // A vehicle that adopts an order it should have refused is the business of the tests.
+        if candidates.is_empty() || candidates.iter().any(|sent| !sent.sound) {
+            return false;
+        }
+        let seq = entry.seq();
+        let best = candidates
+            .into_iter()
+            .map(|sent| self.held_against(sent, &nodes, &edges, seq))
+            .min_by_key(Vec::len);
+        findings.extend(best.unwrap_or_default());
+        true
+    }
+}
+
+impl RemainingRoute {
+    fn held_against(&self, sent: &SentOrder, nodes: &[Element], edges: &[Element], seq: u64) -> Vec<CheckFinding> {
+        let progress = self.progress(sent);
+        let mut found = Vec::new();
+        let remainder = self.remainder(sent, progress, |order| &order.nodes);
+        compare("nodeStates", "node", &remainder, nodes, (progress, seq), &mut found);
+        let remainder = self.remainder(sent, progress, |order| &order.edges);
+        compare("edgeStates", "edge", &remainder, edges, (progress, seq), &mut found);
+        found
+    }
+
+    /// The sequenceId the vehicle has reached in the order; `None` while it has not begun.
+    fn progress(&self, sent: &SentOrder) -> Option<u64> {
+        let (node, sequence) = self.shown.last.as_ref()?;
+        let is_last = |element: &&Element| element.id == *node && element.sequence == *sequence;
+        if self.shown.carried.is_some() {
+            return sent.nodes.first().filter(is_last).map(|first| first.sequence);
+        }
+        let mut known = self
+            .shown
+            .orders
+            .of(&sent.order)
+            .filter(|other| other.update <= sent.update);
+        known
+            .find_map(|other| other.nodes.iter().find(is_last))
+            .map(|element| element.sequence)
+    }
+
+    fn remainder<'o>(
+        &'o self,
+        sent: &'o SentOrder,
+        progress: Option<u64>,
+        list: impl Fn(&'o SentOrder) -> &'o Vec<Element>,
+    ) -> Remainder<'o> {
+        let first = sent.first();
+        let mut all = Remainder {
+            required: Vec::new(),
+            tolerated: Vec::new(),
+        };
+        for earlier in self.shown.orders.of(&sent.order) {
+            if earlier.update >= sent.update {
+                continue;
+            }
+            let alone = self.shown.orders.candidates(&sent.order, earlier.update).count() == 1;
+            let certain = alone && earlier.sound && self.adopted.contains(&earlier.update);
+            for element in list(earlier)
+                .iter()
+                .filter(|element| element.released && element.sequence < first)
+            {
+                let ahead = progress.is_some_and(|progress| element.sequence > progress);
+                if certain && ahead && !all.required.contains(&element) {
+                    all.required.push(element);
+                } else if progress.is_none() || ahead {
+                    all.tolerated.push(element);
+                }
+            }
+        }
+        for element in list(sent) {
+            match progress {
+                Some(progress) if element.sequence > progress => all.required.push(element),
+                // The first node is reached already; whether it is listed is open.
+                _ if element.sequence == first => all.tolerated.push(element),
+                // The edge just left may go one state later.
+                Some(progress) if element.sequence + 1 == progress => all.tolerated.push(element),
+                Some(_) => {}
+                None => all.required.push(element),
+            }
+        }
+        all
+    }
+}
+
+fn compare(
+    name: &str,
+    kind: &str,
+    right: &Remainder<'_>,
+    listed: &[Element],
+    (progress, seq): (Option<u64>, u64),
+    found: &mut Vec<CheckFinding>,
+) {
+    if !listed.windows(2).all(|pair| pair[0].sequence < pair[1].sequence) {
+        found.push(broken(
+            "STATE-12",
+            seq,
+            format!("{name} is not in the sequence of the order"),
+        ));
+    }
+    let same = |a: &Element, b: &Element| a.id == b.id && a.sequence == b.sequence;
+    for element in listed {
+        let label = format!("{kind} {} with sequenceId {}", quote(&element.id), element.sequence);
+        let mut known = right.required.iter().chain(&right.tolerated);
+        match known.find(|other| same(other, element)) {
+            Some(other) if other.released != element.released => {
+                let text = format!(
+                    "{label} is listed with released {}, unlike in the order",
+                    element.released
+                );
+                found.push(broken("STATE-MSG-13", seq, text));
+            }
+            Some(_) => {}
+            None if kind == "node" && progress == Some(element.sequence) => {
+                let text = format!("{label} is the last node already and still listed");
+                found.push(remark("NODE-03", seq, text));
+            }
+            None => {
+                let text = format!("{name} lists {label}, which is not left to traverse");
+                found.push(broken("STATE-12", seq, text));
+            }
+        }
+    }
+    for element in &right.required {
+        if !listed.iter().any(|other| same(other, element)) {
+            let text = format!(
+                "{name} lacks {kind} {} with sequenceId {}, which is still to be traversed",
+                quote(&element.id),
+                element.sequence
+            );
+            found.push(broken("STATE-12", seq, text));
+        }
+    }
+    // One state tells one story; the first lines of it are enough.
+    found.truncate(4);
+}
+
+#[derive(Default)]
+struct LastNode {
+    shown: Shown,
+    before: Option<(String, String, u64)>,
+}
+
+impl Running for LastNode {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let seq = entry.seq();
+        let Some(state) = self.shown.state(entry, context) else {
+            if super::traffic::state(self.shown.traffic, entry, context).is_some() {
+                self.before = None;
+            }
+            return false;
+        };
+        let (Some(order), Some((node, sequence))) = (self.shown.order.clone(), self.shown.last.clone()) else {
+            return false;
+        };
+        if node.is_empty() && sequence != 0 {
+            let text = format!("lastNodeSequenceId is {sequence} although there is no last node");
+            findings.push(broken("STATE-MSG-04", seq, text));
+        }
+        let before = self.before.replace((order.clone(), node.clone(), sequence));
+        let Some((_, node_before, sequence_before)) = before.filter(|before| before.0 == order) else {
+            return false;
+        };
+        if (&node_before, sequence_before) == (&node, sequence) || text(state, "orderId").is_empty() {
+            return true;
+        }
+        let sent: Vec<&SentOrder> = self.shown.orders.of(&order).collect();
+        if sent.is_empty() || sent.iter().any(|sent| !sent.sound) {
+            return false;
+        }
+        let nodes = || sent.iter().flat_map(|sent| &sent.nodes);
+        let place = format!("node {} with sequenceId {sequence}", quote(&node));
+        let visits: Vec<&Element> = nodes()
+            .filter(|element| element.id == node && element.sequence == sequence)
+            .collect();
+        if visits.is_empty() {
+            let text = format!("the last node is {place}, which is not part of the order");
+            // A vehicle may know nodes on its way that the order leaves out.
+            findings.push(if nodes().any(|element| element.id == node) {
+                broken("STATE-MSG-04", seq, text)
+            } else {
+                remark("STATE-MSG-04", seq, text)
+            });
+            return true;
+        }
+        if visits.iter().all(|element| !element.released) {
+            findings.push(broken(
+                "ORD-07",
+                seq,
+                format!("the vehicle reached {place}, which was not released"),
+            ));
+        }
+        let was_in_order = nodes().any(|element| element.id == node_before && element.sequence == sequence_before);
+        if was_in_order && self.shown.carried.is_none() && sequence < sequence_before {
+            // The node before the order began may carry a higher number of an older order.
+            let begun = nodes().any(|element| element.sequence == sequence_before && element.released);
+            if begun {
+                let text = format!("the last node goes back from sequenceId {sequence_before} to {sequence}");
+                findings.push(broken("ORD-01", seq, text));
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::{Trace, merged};
+
+    /// Nodes and edges over `names` from `from`; the first `base` nodes are released.
+    fn route(names: &[&str], from: usize, base: usize) -> (Vec<Value>, Vec<Value>) {
+        let nodes = (0..names.len())
+            .map(|at| json!({ "nodeId": names[at], "sequenceId": from + 2 * at, "released": at < base }))
+            .collect();
+        let edges = (1..names.len())
+            .map(|at| json!({ "edgeId": format!("{}-{}", names[at - 1], names[at]), "sequenceId": from + 2 * at - 1, "released": at < base }))
+            .collect();
+        (nodes, edges)
+    }
+
+    fn order(update: u64, names: &[&str], from: usize, base: usize) -> Value {
+        let (nodes, edges) = route(names, from, base);
+        json!({ "orderId": "o", "orderUpdateId": update, "nodes": nodes, "edges": edges })
+    }
+
+    fn state(update: u64, last: (&str, u64), names: &[&str], from: usize, base: usize) -> Value {
+        let (nodes, edges) = route(names, from, base);
+        json!({
+            "orderId": "o", "orderUpdateId": update, "lastNodeId": last.0, "lastNodeSequenceId": last.1,
+            "nodeStates": nodes, "edgeStates": edges,
+        })
+    }
+
+    /// A state that has left `names[0]` at `from`: what remains is the rest and the edge towards it.
+    fn under_way(update: u64, names: &[&str], from: usize, base: usize) -> Value {
+        let mut state = state(update, (names[0], from as u64), names, from, base);
+        state["nodeStates"].as_array_mut().unwrap().remove(0);
+        state
+    }
+
+    fn route_of(build: impl Fn(&mut Trace)) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({ "lastNodeId": "a", "lastNodeSequenceId": 4 }));
+        build(&mut trace);
+        trace.judge("state/remaining-route").summary()
+    }
+
+    #[test]
+    fn the_remainder_of_an_order_with_horizon_and_update_is_right() {
+        let outcome = route_of(|trace| {
+            trace
+                .sent("order", &order(0, &["a", "b", "a"], 0, 2))
+                // Not accepted yet: an old state.
+                .state(&json!({ "lastNodeId": "a", "lastNodeSequenceId": 4 }))
+                // Accepted; the last node still carries the number of the old order, which the new one has, too.
+                .state(&state(0, ("a", 4), &["a", "b", "a"], 0, 2))
+                .state(&state(0, ("a", 0), &["a", "b", "a"], 0, 2))
+                .state(&under_way(0, &["a", "b", "a"], 0, 2))
+                .sent("order", &order(1, &["b", "c", "d"], 2, 2))
+                // The stitching node is still ahead, with the edge that leads to it.
+                .state(&merged(under_way(1, &["a", "b", "c", "d"], 0, 3), &json!({})))
+                .state(&under_way(1, &["b", "c", "d"], 2, 2))
+                .state(&under_way(1, &["c", "d"], 4, 1));
+        });
+        assert_eq!(outcome, Vec::<String>::new());
+    }
+
+    #[test]
+    fn the_edge_just_left_may_go_one_state_later() {
+        let outcome = route_of(|trace| {
+            trace.sent("order", &order(0, &["a", "b", "c"], 0, 3));
+            let mut late = under_way(0, &["b", "c"], 2, 2);
+            let edge = json!({ "edgeId": "a-b", "sequenceId": 1, "released": true });
+            late["edgeStates"].as_array_mut().unwrap().insert(0, edge);
+            trace.state(&under_way(0, &["a", "b", "c"], 0, 3)).state(&late);
+        });
+        assert_eq!(outcome, Vec::<String>::new());
+    }
+
+    #[test]
+    fn missing_surplus_swapped_and_wrongly_released_elements_are_found() {
+        let with = |change: fn(&mut Value)| {
+            route_of(|trace| {
+                trace.sent("order", &order(0, &["a", "b", "c"], 0, 2));
+                let mut state = under_way(0, &["a", "b", "c"], 0, 2);
+                change(&mut state);
+                trace.state(&state);
+            })
+        };
+        assert_eq!(with(|_| {}), Vec::<String>::new());
+        // The horizon is left out.
+        let lacks = with(|state| {
+            state["nodeStates"].as_array_mut().unwrap().pop();
+        });
+        assert_eq!(lacks, ["STATE-12"]);
+        let surplus = with(|state| {
+            let more = json!({ "nodeId": "d", "sequenceId": 6, "released": false });
+            state["nodeStates"].as_array_mut().unwrap().push(more);
+        });
+        assert_eq!(surplus, ["STATE-12"]);
+        assert_eq!(
+            with(|state| state["nodeStates"].as_array_mut().unwrap().reverse()),
+            ["STATE-12"]
+        );
+        assert_eq!(
+            with(|state| state["nodeStates"][1]["released"] = json!(true)),
+            ["STATE-MSG-13"]
+        );
+        assert_eq!(with(|state| state["edgeStates"] = json!([])), ["STATE-12", "STATE-12"]);
+    }
+
+    #[test]
+    fn a_node_that_is_reached_and_still_listed_is_a_remark() {
+        let outcome = route_of(|trace| {
+            trace.sent("order", &order(0, &["a", "b", "c"], 0, 3));
+            trace.state(&under_way(0, &["a", "b", "c"], 0, 3));
+            trace.state(&state(0, ("b", 2), &["b", "c"], 2, 2));
+        });
+        assert_eq!(outcome, ["NODE-03 warning"]);
+    }
+
+    #[test]
+    fn nothing_is_held_against_a_cancelled_or_a_refused_order() {
+        let outcome = route_of(|trace| {
+            trace.sent("order", &order(0, &["a", "b", "c"], 0, 3));
+            trace.state(&under_way(0, &["a", "b", "c"], 0, 3));
+            trace.instant("cancelOrder", "x", &json!([]));
+            trace.state(&json!({ "orderId": "o", "lastNodeId": "a" }));
+            trace.sent(
+                "order",
+                &json!({ "orderId": "p", "orderUpdateId": 0, "nodes": [], "edges": [] }),
+            );
+            trace.state(&json!({ "orderId": "p", "lastNodeId": "a" }));
+        });
+        assert_eq!(outcome, Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_refused_update_leaves_no_trace_in_what_is_required() {
+        let outcome = route_of(|trace| {
+            trace.sent("order", &order(0, &["a", "b", "c"], 0, 2));
+            trace.state(&under_way(0, &["a", "b", "c"], 0, 2));
+            // Starts at the wrong node, is refused; the next one is right.
+            trace.sent("order", &order(1, &["x", "y"], 0, 2));
+            trace.sent("order", &order(2, &["b", "c"], 2, 2));
+            trace.state(&under_way(2, &["a", "b", "c"], 0, 3));
+        });
+        assert_eq!(outcome, Vec::<String>::new());
+    }
+
+    fn last_nodes(base: usize, visits: &[(&str, u64)]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({ "lastNodeId": "a", "lastNodeSequenceId": 8 }));
+        trace.sent("order", &order(0, &["a", "b", "c"], 0, base));
+        for (node, sequence) in visits {
+            trace.state(&json!({ "orderId": "o", "lastNodeId": node, "lastNodeSequenceId": sequence }));
+        }
+        trace.judge("state/last-node").summary()
+    }
+
+    #[test]
+    fn progress_in_sequence_is_right() {
+        assert!(last_nodes(3, &[("a", 8), ("a", 0), ("b", 2), ("c", 4)]).is_empty());
+        assert!(last_nodes(3, &[("a", 0), ("c", 4)]).is_empty());
+    }
+
+    #[test]
+    fn going_back_entering_the_horizon_and_inventing_numbers_are_found() {
+        assert_eq!(last_nodes(3, &[("a", 0), ("c", 4), ("b", 2)]), ["ORD-01"]);
+        assert_eq!(last_nodes(2, &[("a", 0), ("b", 2), ("c", 4)]), ["ORD-07"]);
+        assert_eq!(last_nodes(3, &[("a", 0), ("b", 3)]), ["STATE-MSG-04"]);
+        assert_eq!(last_nodes(3, &[("a", 0), ("z", 2)]), ["STATE-MSG-04 warning"]);
+        assert_eq!(last_nodes(3, &[("", 5)]), ["STATE-MSG-04"]);
+    }
+}

@@ -1,0 +1,265 @@
+//! `topic/names`, `topic/structure`, `topic/own-side`: on which topics the device publishes.
+//!
+//! QoS and RETAIN are left to `mqtt`.
+
+use std::collections::BTreeSet;
+
+use super::header::serial_character;
+use super::traffic::{Traffic, broken, device_publish, quote, remark};
+use super::{Check, CheckContext, CheckFinding, Running};
+use crate::journal::Entry;
+use crate::journal::event::Event;
+use crate::pack::Role;
+
+/// How many different topics are remembered; a device that invents more is judged on the first ones.
+const TOPICS: usize = 64;
+
+/// `topic/names`.
+pub(super) const NAMES: Check = Check {
+    name: "topic/names",
+    decides: &["TOPIC-01"],
+    doc: "The last level of a protocol topic is spelled exactly as defined. Topics whose last level is no variant of \
+          a defined name are the vendor's own and not judged.",
+    arguments: &[],
+    start: |_| Box::new(Names::default()),
+};
+
+/// `topic/structure`.
+pub(super) const STRUCTURE: Check = Check {
+    name: "topic/structure",
+    decides: &["TOPIC-02", "TOPIC-03", "TOPIC-05", "TOPIC-07"],
+    doc: "Topics have five levels: interface, major version, manufacturer, serial number, name. The structure is only \
+          suggested: anything else is a warning, except characters that a serial number must not hold.",
+    arguments: &[],
+    start: |_| Box::new(Structure::default()),
+};
+
+/// `topic/own-side`.
+pub(super) const OWN_SIDE: Check = Check {
+    name: "topic/own-side",
+    decides: &["TOPIC-15"],
+    doc: "The device publishes only on the topics of its own side. Only the tap knows who published.",
+    arguments: &[],
+    start: |_| Box::new(OwnSide::default()),
+};
+
+/// Topics seen before, bounded.
+#[derive(Default)]
+struct Seen(BTreeSet<String>);
+
+impl Seen {
+    /// Whether the topic is new and worth a look.
+    fn first(&mut self, topic: &str) -> bool {
+        self.0.len() < TOPICS && topic.len() <= 1024 && self.0.insert(topic.to_owned())
+    }
+}
+
+#[derive(Default)]
+struct Names {
+    traffic: Traffic,
+    seen: Seen,
+}
+
+impl Running for Names {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let topic = match entry.event() {
+            Event::Message {
+                topic, retain: false, ..
+            } if !self.traffic.tap => topic,
+            _ => match device_publish(entry) {
+                Some((_, topic, ..)) => topic,
+                None => return false,
+            },
+        };
+        if context.topic_name(topic).is_some() {
+            return true;
+        }
+        let last = topic.rsplit('/').next().unwrap_or_default();
+        let Some(name) = context.topics.keys().find(|name| plain(name) == plain(last)) else {
+            return false;
+        };
+        if last != name && self.seen.first(topic) {
+            let text = format!("the last level of {} is no topic name; meant is {name:?}", quote(topic));
+            findings.push(broken("TOPIC-01", entry.seq(), text));
+        }
+        last != name
+    }
+}
+
+/// A name without what people vary: case, underscores, hyphens.
+fn plain(name: &str) -> String {
+    name.chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|character| character.to_ascii_lowercase())
+        .collect()
+}
+
+#[derive(Default)]
+struct Structure {
+    traffic: Traffic,
+    seen: Seen,
+}
+
+impl Running for Structure {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if self.traffic.delivered(entry, context).is_none() {
+            return false;
+        }
+        let Event::Message { topic, .. } = entry.event() else {
+            return false;
+        };
+        if !self.seen.first(topic) {
+            return false;
+        }
+        let seq = entry.seq();
+        if topic.contains('$') {
+            findings.push(remark("TOPIC-07", seq, format!("{} holds a dollar sign", quote(topic))));
+        }
+        let levels: Vec<&str> = topic.split('/').collect();
+        let [_, version, _, serial, _] = levels[..] else {
+            let text = format!("{} has {} levels instead of five", quote(topic), levels.len());
+            findings.push(remark("TOPIC-02", seq, text));
+            return true;
+        };
+        let expected = format!("v{}", context.pack.version.major);
+        if version != expected {
+            let text = format!("the second level of {} is not {expected:?}", quote(topic));
+            findings.push(remark("TOPIC-03", seq, text));
+        }
+        if serial == context.identity.1 && !serial.bytes().all(serial_character) {
+            let text = format!(
+                "the serial number in {} holds characters that are not allowed",
+                quote(topic)
+            );
+            findings.push(broken("TOPIC-05", seq, text));
+        }
+        true
+    }
+}
+
+#[derive(Default)]
+struct OwnSide {
+    traffic: Traffic,
+}
+
+impl Running for OwnSide {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let Some((_, topic, ..)) = device_publish(entry) else {
+            return false;
+        };
+        let Some(name) = context.topic_name(topic) else {
+            return false;
+        };
+        if self.traffic.published(entry, context).is_none() {
+            let owner = match self.traffic.role {
+                Role::Agv => "master control",
+                Role::MasterControl => "the vehicle",
+            };
+            let text = format!("the device publishes on {name}, which belongs to {owner}");
+            findings.push(broken("TOPIC-15", entry.seq(), text));
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::super::trace::Trace;
+    use crate::journal::event::{Direction, Event, Packet, Source};
+
+    fn at_tap(topic: &str) -> Trace {
+        let mut trace = Trace::tap();
+        let packet = Packet::Publish {
+            topic: topic.to_owned(),
+            qos: 0,
+            retain: false,
+            dup: false,
+            packet_id: None,
+            payload: crate::journal::Payload::keep(bytes::Bytes::from_static(b"{}")),
+        };
+        trace.packet(1, Direction::FromDevice, packet);
+        trace
+    }
+
+    #[test]
+    fn defined_names_and_the_vendors_own_topics_are_right() {
+        let mut trace = Trace::tap();
+        trace.publish(1, "state", 0, false, &json!({}));
+        assert!(trace.judge("topic/names").findings.is_empty());
+        let own = at_tap("acme/diagnostics").judge("topic/names");
+        assert!(own.findings.is_empty() && own.judged == 0);
+    }
+
+    #[test]
+    fn variants_of_a_name_are_found_once() {
+        for name in ["State", "instant_actions", "FactSheet"] {
+            assert_eq!(
+                at_tap(&format!("x/{name}")).judge("topic/names").summary(),
+                ["TOPIC-01"],
+                "{name}"
+            );
+        }
+        let mut trace = Trace::subscriber();
+        trace
+            .message("Connection", &json!({}))
+            .message("Connection", &json!({}));
+        assert_eq!(trace.judge("topic/names").summary(), ["TOPIC-01"]);
+    }
+
+    fn structure(prefix: &str) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        prefix.clone_into(&mut trace.prefix);
+        trace.state(&json!({})).state(&json!({}));
+        trace.judge("topic/structure").summary()
+    }
+
+    #[test]
+    fn five_levels_with_the_major_version_are_right() {
+        let trace = Trace::subscriber();
+        assert!(structure(&trace.prefix).is_empty());
+    }
+
+    #[test]
+    fn other_structures_are_remarked_on_once_per_topic() {
+        assert_eq!(structure("site/hall/agv7"), ["TOPIC-02 warning"]);
+        assert_eq!(structure("uagv/2/acme/7"), ["TOPIC-03 warning"]);
+        assert_eq!(structure("uagv/v2/ac$me/7"), ["TOPIC-07 warning"]);
+    }
+
+    #[test]
+    fn publishing_on_the_other_sides_topics_is_found() {
+        let mut trace = Trace::tap();
+        trace
+            .publish(1, "state", 0, false, &json!({}))
+            .sent("order", &json!({}));
+        assert!(trace.judge("topic/own-side").findings.is_empty());
+        trace.publish(1, "order", 0, false, &json!({}));
+        assert_eq!(trace.judge("topic/own-side").summary(), ["TOPIC-15"]);
+    }
+
+    #[test]
+    fn what_the_broker_delivers_to_the_device_is_not_published_by_it() {
+        let mut trace = Trace::tap();
+        let topic = trace.topic("order");
+        let packet = Packet::Publish {
+            topic,
+            qos: 0,
+            retain: false,
+            dup: false,
+            packet_id: None,
+            payload: crate::journal::Payload::keep(bytes::Bytes::from_static(b"{}")),
+        };
+        trace.add(
+            Source::Tap,
+            Some(Direction::ToDevice),
+            Event::Packet { connection: 1, packet },
+        );
+        let outcome = trace.judge("topic/own-side");
+        assert!(outcome.findings.is_empty() && outcome.judged == 0);
+    }
+}

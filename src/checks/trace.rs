@@ -1,0 +1,319 @@
+//! Traces for the tests of the checks: a recorded run in a few lines.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock};
+use std::time::Duration;
+
+use serde_json::{Map, Value, json};
+
+use super::{CheckContext, CheckFinding, find};
+use crate::clock::{Moment, Stamp};
+use crate::journal::event::{Close, Direction, Event, LinkFault, Occurrence, Packet, RunHeader, Source, Will};
+use crate::journal::{Entry, Journal, Payload};
+use crate::pack::{Assets, Pack, Packs};
+use crate::verdict::Verdict;
+
+/// A run under construction.
+pub(super) struct Trace {
+    journal: Journal,
+    at: Stamp,
+    next_header: u64,
+    /// Arguments of the check.
+    pub with: Map<String, Value>,
+    /// Name of the topic under which a name is configured otherwise than usual.
+    pub prefix: String,
+}
+
+/// What came out: requirement, verdict and message of each finding, and whether anything was judged.
+pub(super) struct Outcome {
+    pub findings: Vec<CheckFinding>,
+    pub judged: usize,
+}
+
+impl Outcome {
+    /// Requirement ids with the verdict where it departs from the mood, in order: `HDR-02`, `HDR-03 warning`.
+    pub fn summary(&self) -> Vec<String> {
+        self.findings
+            .iter()
+            .map(|finding| {
+                let id = finding.requirement.as_ref().map_or("-", |id| id.as_str());
+                match finding.verdict {
+                    None => id.to_owned(),
+                    Some(verdict) => format!("{id} {verdict}"),
+                }
+            })
+            .collect()
+    }
+}
+
+fn payload(value: &Value) -> Payload {
+    Payload::keep(bytes::Bytes::from(value.to_string().into_bytes()))
+}
+
+/// Lays `over` over `base`, member by member.
+pub(super) fn merged(mut base: Value, over: &Value) -> Value {
+    json_patch::merge(&mut base, over);
+    base
+}
+
+impl Trace {
+    /// A run seen by a subscriber.
+    pub fn subscriber() -> Self {
+        Self::new("subscriber")
+    }
+
+    /// A run seen at the tap.
+    pub fn tap() -> Self {
+        Self::new("tap")
+    }
+
+    fn new(vantage: &str) -> Self {
+        let utc: jiff::Timestamp = "2026-01-01T12:00:00Z".parse().unwrap();
+        let mut trace = Self {
+            journal: Journal::new(),
+            at: Stamp {
+                moment: Moment::START,
+                utc,
+            },
+            next_header: 0,
+            with: Map::new(),
+            prefix: format!("uagv/v{}/acme/7", pack().version.major),
+        };
+        let header = RunHeader {
+            vantage: vantage.to_owned(),
+            role: "agv".to_owned(),
+            ..RunHeader::default()
+        };
+        trace.add(
+            Source::Harness,
+            None,
+            Event::RunBegun {
+                header: Box::new(header),
+            },
+        );
+        trace
+    }
+
+    pub fn add(&mut self, source: Source, direction: Option<Direction>, event: Event) -> &mut Self {
+        self.journal.append(Occurrence {
+            at: self.at,
+            source,
+            direction,
+            event,
+        });
+        self
+    }
+
+    pub fn topic(&self, name: &str) -> String {
+        format!("{}/{name}", self.prefix)
+    }
+
+    /// Lets time pass.
+    pub fn wait(&mut self, seconds: f64) -> &mut Self {
+        self.at = self.at.after(Duration::from_secs_f64(seconds));
+        self
+    }
+
+    /// A full header with the next headerId.
+    pub fn header(&mut self) -> Value {
+        self.next_header += 1;
+        json!({
+            "headerId": self.next_header,
+            "timestamp": self.at.utc.strftime("%Y-%m-%dT%H:%M:%S.%2fZ").to_string(),
+            "version": format!("{}.{}.0", pack().version.major, pack().version.minor),
+            "manufacturer": "acme",
+            "serialNumber": "7",
+        })
+    }
+
+    /// A complete state of an idle vehicle, changed by `over`, is delivered.
+    pub fn state(&mut self, over: &Value) -> &mut Self {
+        let state = merged(self.header(), &idle());
+        let state = merged(state, over);
+        self.message("state", &state)
+    }
+
+    /// A message is delivered live.
+    pub fn message(&mut self, name: &str, value: &Value) -> &mut Self {
+        self.bytes(name, value.to_string().as_bytes())
+    }
+
+    /// Bytes are delivered live.
+    pub fn bytes(&mut self, name: &str, bytes: &[u8]) -> &mut Self {
+        let event = Event::Message {
+            topic: self.topic(name),
+            qos: u8::from(name == "connection"),
+            retain: false,
+            dup: false,
+            payload: Payload::keep(bytes::Bytes::copy_from_slice(bytes)),
+        };
+        self.add(Source::Link, Some(Direction::FromDevice), event)
+    }
+
+    /// A connection message with a full header.
+    pub fn connection(&mut self, state: &str) -> &mut Self {
+        let message = merged(self.header(), &json!({ "connectionState": state }));
+        self.message("connection", &message)
+    }
+
+    /// The harness sends a message.
+    pub fn sent(&mut self, name: &str, value: &Value) -> &mut Self {
+        let event = Event::Sent {
+            topic: self.topic(name),
+            qos: 0,
+            retain: false,
+            payload: payload(value),
+        };
+        self.add(Source::Harness, Some(Direction::ToDevice), event)
+    }
+
+    /// The harness sends an instant action.
+    pub fn instant(&mut self, action: &str, id: &str, parameters: &Value) -> &mut Self {
+        self.sent(
+            "instantActions",
+            &json!({ "actions": [{ "actionType": action, "actionId": id, "blockingType": "HARD", "actionParameters": parameters }] }),
+        )
+    }
+
+    /// The device opens connection `number` and is accepted.
+    pub fn connect(&mut self, number: u64, will: Option<Will>, keep_alive: u16, level: u8) -> &mut Self {
+        let event = Event::Opened {
+            connection: number,
+            peer: "peer".into(),
+        };
+        self.add(Source::Tap, None, event);
+        let connect = Packet::Connect {
+            level,
+            client_id: "agv".into(),
+            keep_alive,
+            clean_session: true,
+            username: None,
+            has_password: false,
+            will,
+        };
+        self.packet(number, Direction::FromDevice, connect);
+        let accepted = Packet::Connack {
+            code: 0,
+            session_present: false,
+        };
+        self.packet(number, Direction::ToDevice, accepted)
+    }
+
+    /// A will as it should be.
+    pub fn will(&mut self) -> Will {
+        let message = merged(self.header(), &json!({ "connectionState": "CONNECTIONBROKEN" }));
+        self.next_header = 0;
+        Will {
+            topic: self.topic("connection"),
+            payload: payload(&message),
+            qos: 1,
+            retain: true,
+        }
+    }
+
+    /// The usual connection of a good device.
+    pub fn connected(&mut self, number: u64) -> &mut Self {
+        let will = self.will();
+        self.connect(number, Some(will), 15, 4)
+    }
+
+    pub fn packet(&mut self, connection: u64, direction: Direction, packet: Packet) -> &mut Self {
+        self.add(Source::Tap, Some(direction), Event::Packet { connection, packet })
+    }
+
+    /// The device publishes something, as seen at the tap.
+    pub fn publish(&mut self, connection: u64, name: &str, qos: u8, retain: bool, value: &Value) -> &mut Self {
+        let packet = Packet::Publish {
+            topic: self.topic(name),
+            qos,
+            retain,
+            dup: false,
+            packet_id: (qos > 0).then_some(1),
+            payload: payload(value),
+        };
+        self.packet(connection, Direction::FromDevice, packet)
+    }
+
+    /// The connection ends.
+    pub fn closed(&mut self, connection: u64) -> &mut Self {
+        let event = Event::Closed {
+            connection,
+            how: Close::DeviceFin,
+        };
+        self.add(Source::Tap, None, event)
+    }
+
+    pub fn fault(&mut self, fault: LinkFault) -> &mut Self {
+        self.add(Source::Harness, None, Event::Fault { fault })
+    }
+
+    pub fn hook(&mut self) -> &mut Self {
+        let event = Event::Hook {
+            hook: "power-cycle".into(),
+            ok: true,
+            detail: String::new(),
+        };
+        self.add(Source::Operator, None, event)
+    }
+
+    /// Runs a check over everything recorded.
+    pub fn judge(&self, name: &str) -> Outcome {
+        let pack = pack();
+        let topics: BTreeMap<String, String> = [
+            "order",
+            "instantActions",
+            "state",
+            "visualization",
+            "connection",
+            "factsheet",
+        ]
+        .into_iter()
+        .map(|name| (name.to_owned(), self.topic(name)))
+        .collect();
+        let Value::Object(bindings) = json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000 } })
+        else {
+            unreachable!()
+        };
+        let context = CheckContext {
+            pack: &pack,
+            topics: &topics,
+            identity: ("acme", "7"),
+            with: &self.with,
+            bindings: &bindings,
+        };
+        let mut running = (find(name).expect("known check").start)(&context);
+        let mut findings = Vec::new();
+        let mut judged = 0;
+        for entry in self.journal.entries() {
+            let entry: &Arc<Entry> = entry;
+            judged += usize::from(running.observe(entry, &context, &mut findings));
+        }
+        running.finish(self.at.moment, &context, &mut findings);
+        for finding in &findings {
+            if let Some(id) = &finding.requirement {
+                let check = find(name).expect("known check");
+                assert!(check.decides.contains(&id.as_str()), "{name} does not declare {id}");
+                assert_ne!(finding.verdict, Some(Verdict::Pass));
+            }
+        }
+        Outcome { findings, judged }
+    }
+}
+
+/// The protocol version the checks are tested with.
+pub(super) fn pack() -> Arc<Pack> {
+    static PACKS: LazyLock<Packs> = LazyLock::new(|| Packs::load(&Assets::embedded()).unwrap());
+    Arc::clone(PACKS.latest())
+}
+
+/// A state without header of a vehicle that stands idle on node n1.
+pub(super) fn idle() -> Value {
+    json!({
+        "orderId": "", "orderUpdateId": 0, "lastNodeId": "n1", "lastNodeSequenceId": 0,
+        "nodeStates": [], "edgeStates": [], "driving": false, "actionStates": [],
+        "agvPosition": { "positionInitialized": true, "x": 1.0, "y": 2.0, "theta": 0.5, "mapId": "hall" },
+        "batteryState": { "batteryCharge": 80.0, "charging": false },
+        "operatingMode": "AUTOMATIC", "errors": [],
+        "safetyState": { "eStop": "NONE", "fieldViolation": false },
+    })
+}
