@@ -88,8 +88,7 @@ impl OnlineAfterConnect {
             } => self.open.retain(|session| session.connection != *connection),
             _ => {}
         }
-        let (Some(message), Some((connection, ..))) =
-            (self.traffic.published(entry, context), device_publish(entry))
+        let (Some(message), Some((connection, ..))) = (self.traffic.published(entry, context), device_publish(entry))
         else {
             return false;
         };
@@ -99,7 +98,11 @@ impl OnlineAfterConnect {
             return false;
         };
         match message.name {
-            "connection" if entry.json().is_some_and(|value| text(value, "connectionState") == "ONLINE") => {
+            "connection"
+                if entry
+                    .json()
+                    .is_some_and(|value| text(value, "connectionState") == "ONLINE") =>
+            {
                 if session.first_state.is_some() && !session.online && !session.late {
                     let words = "ONLINE is published after the first state of the connection";
                     findings.push(remark("CONN-05", entry.seq(), words));
@@ -122,11 +125,17 @@ impl OnlineAfterConnect {
             return;
         }
         for session in &mut self.open {
-            let Some((since, seq)) = session.first_state else { continue };
+            let Some((since, seq)) = session.first_state else {
+                continue;
+            };
             if session.accepted && !session.late && now.since(since) > Self::limit(context) {
                 session.late = true;
                 let id = if self.online_before { "CONN-11" } else { "CONN-05" };
-                findings.push(broken(id, seq, "states are published on this connection, but never ONLINE"));
+                findings.push(broken(
+                    id,
+                    seq,
+                    "states are published on this connection, but never ONLINE",
+                ));
             }
         }
     }
@@ -182,7 +191,11 @@ impl Running for OnlineAfterConnect {
         let judged = self.packets(entry, context, findings);
         self.overdue(entry.at().moment, context, findings);
         self.delivered(entry, context, findings);
-        judged || self.traffic.delivered(entry, context).is_some_and(|message| message.name == "connection")
+        judged
+            || self
+                .traffic
+                .delivered(entry, context)
+                .is_some_and(|message| message.name == "connection")
     }
 
     fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
@@ -305,7 +318,13 @@ mod tests {
         let mut trace = Trace::tap();
         trace.connected(1).connection("CONNECTIONBROKEN");
         assert!(trace.judge("connection/values").findings.is_empty());
-        trace.publish(1, "connection", 1, true, &json!({ "connectionState": "CONNECTIONBROKEN" }));
+        trace.publish(
+            1,
+            "connection",
+            1,
+            true,
+            &json!({ "connectionState": "CONNECTIONBROKEN" }),
+        );
         assert_eq!(trace.judge("connection/values").summary(), ["CONN-10 warning"]);
     }
 }

@@ -54,7 +54,15 @@ impl Running for Persist {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.sent(entry, context);
-        if outside_influence(entry) || matches!(entry.event(), Event::Packet { packet: Packet::Connect { .. }, .. }) {
+        if outside_influence(entry)
+            || matches!(
+                entry.event(),
+                Event::Packet {
+                    packet: Packet::Connect { .. },
+                    ..
+                }
+            )
+        {
             self.watched.clear();
             self.shown = None;
         }
@@ -83,7 +91,10 @@ impl Running for Persist {
             .watched
             .iter()
             .map(|(kind, since)| (*kind, *since))
-            .filter(|(kind, _)| !now.iter().any(|(listed, _)| requirement(listed).is_some_and(|found| found.0 == *kind)))
+            .filter(|(kind, _)| {
+                !now.iter()
+                    .any(|(listed, _)| requirement(listed).is_some_and(|found| found.0 == *kind))
+            })
             .collect();
         for (kind, since) in gone {
             self.watched.remove(kind);
@@ -120,7 +131,8 @@ impl Persist {
         }
         if let Some(message) = to_vehicle("instantActions", entry, context) {
             self.after_order = false;
-            self.instant.extend(actions(message).map(|action| text(action, "actionId").to_owned()));
+            self.instant
+                .extend(actions(message).map(|action| text(action, "actionId").to_owned()));
             let excess = self.instant.len().saturating_sub(ACTIONS);
             self.instant.drain(..excess);
         } else if to_vehicle("order", entry, context).is_some() {
@@ -154,15 +166,22 @@ mod tests {
 
     fn rejected(error: &str) -> Trace {
         let mut trace = Trace::subscriber();
-        trace.state(&json!({})).sent("order", &json!({ "orderId": 7 })).state(&with(&[error]));
+        trace
+            .state(&json!({}))
+            .sent("order", &json!({ "orderId": 7 }))
+            .state(&with(&[error]));
         trace
     }
 
     #[test]
     fn a_report_that_stays_until_a_new_order_is_right() {
         let mut trace = rejected("validationError");
-        trace.instant("stateRequest", "x", &json!([])).state(&with(&["other", "validationError"]));
-        trace.state(&json!({ "orderId": "o" })).state(&json!({ "orderId": "o" }));
+        trace
+            .instant("stateRequest", "x", &json!([]))
+            .state(&with(&["other", "validationError"]));
+        trace
+            .state(&json!({ "orderId": "o" }))
+            .state(&json!({ "orderId": "o" }));
         let outcome = trace.judge(CHECK);
         assert!(outcome.findings.is_empty());
         assert_eq!(outcome.judged, 1);

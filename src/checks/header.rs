@@ -112,11 +112,20 @@ impl Running for Identity {
             if value.is_empty() {
                 findings.push(remark("HDR-05", seq, format!("{name} on {} is empty", message.name)));
             } else if value != own {
-                let text = format!("{name} {} on {} is not the {} of the topic", quote(value), message.name, quote(own));
+                let text = format!(
+                    "{name} {} on {} is not the {} of the topic",
+                    quote(value),
+                    message.name,
+                    quote(own)
+                );
                 findings.push(remark("TOPIC-04", seq, text));
             }
             if value.contains('/') {
-                findings.push(broken("TOPIC-06", seq, format!("{name} {} holds a slash", quote(value))));
+                findings.push(broken(
+                    "TOPIC-06",
+                    seq,
+                    format!("{name} {} holds a slash", quote(value)),
+                ));
             }
         }
         if !serial.bytes().all(serial_character) {
@@ -176,7 +185,11 @@ impl Running for Version {
             .take(4)
             .collect();
         let [Some(major), Some(minor), Some(_)] = parts[..] else {
-            let text = format!("version {} on {} is not three numbers with dots", quote(written), message.name);
+            let text = format!(
+                "version {} on {} is not three numbers with dots",
+                quote(written),
+                message.name
+            );
             findings.push(broken("HDR-04", entry.seq(), text));
             return true;
         };
@@ -262,9 +275,15 @@ mod tests {
     fn another_an_empty_a_changing_and_a_malformed_identity_are_found() {
         assert_eq!(identities(&[("Acme", "7")]), ["TOPIC-04 warning"]);
         assert_eq!(identities(&[("", "7")]), ["HDR-05 warning"]);
-        assert_eq!(identities(&[("acme", "7"), ("acme", "8")]), ["TOPIC-04 warning", "HDR-05"]);
+        assert_eq!(
+            identities(&[("acme", "7"), ("acme", "8")]),
+            ["TOPIC-04 warning", "HDR-05"]
+        );
         assert_eq!(identities(&[("acme", "7 b")]), ["TOPIC-04 warning", "TOPIC-05"]);
-        assert_eq!(identities(&[("acme", "7/b")]), ["TOPIC-04 warning", "TOPIC-06", "TOPIC-05"]);
+        assert_eq!(
+            identities(&[("acme", "7/b")]),
+            ["TOPIC-04 warning", "TOPIC-06", "TOPIC-05"]
+        );
     }
 
     fn versions(version: &str) -> Vec<String> {

@@ -61,7 +61,7 @@ impl Running for IdRises {
             }
             self.last.clear();
         }
-        let Some(id) = self.read(value.get("headerId"), message.name, entry, findings) else {
+        let Some(id) = Self::read(value.get("headerId"), message.name, entry, findings) else {
             self.last.remove(message.name);
             return true;
         };
@@ -93,7 +93,7 @@ impl Running for IdRises {
 }
 
 impl IdRises {
-    fn read(&self, id: Option<&Value>, topic: &str, entry: &Entry, findings: &mut Vec<CheckFinding>) -> Option<u32> {
+    fn read(id: Option<&Value>, topic: &str, entry: &Entry, findings: &mut Vec<CheckFinding>) -> Option<u32> {
         // A missing headerId is another requirement's business.
         let id = id?;
         if let Some(id) = id.as_u64().and_then(|id| u32::try_from(id).ok()) {
@@ -108,7 +108,10 @@ impl IdRises {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
             return Some(whole as u32);
         }
-        let text = format!("headerId {} on {topic} is no whole number from 0 to 4294967295", show(id));
+        let text = format!(
+            "headerId {} on {topic} is no whole number from 0 to 4294967295",
+            show(id)
+        );
         findings.push(broken("HDR-02", entry.seq(), text));
         None
     }
@@ -130,8 +133,17 @@ mod tests {
         for id in [4_294_967_295_u32, 0, 1] {
             trace.publish(1, "state", 0, false, &json!({ "headerId": id }));
         }
-        trace.publish(1, "connection", 1, true, &json!({ "headerId": 9, "connectionState": "ONLINE" }));
-        trace.closed(1).connected(2).publish(2, "state", 0, false, &json!({ "headerId": 0 }));
+        trace.publish(
+            1,
+            "connection",
+            1,
+            true,
+            &json!({ "headerId": 9, "connectionState": "ONLINE" }),
+        );
+        trace
+            .closed(1)
+            .connected(2)
+            .publish(2, "state", 0, false, &json!({ "headerId": 0 }));
         let outcome = trace.judge(CHECK);
         assert!(outcome.findings.is_empty());
         assert_eq!(outcome.judged, 5);
@@ -141,7 +153,16 @@ mod tests {
     fn repeats_jumps_and_other_values_are_found_at_the_tap() {
         let mut trace = Trace::tap();
         trace.connected(1);
-        for id in [json!(5), json!(5), json!(7), json!(6), json!(-1), json!("8"), json!(1), json!(2.0)] {
+        for id in [
+            json!(5),
+            json!(5),
+            json!(7),
+            json!(6),
+            json!(-1),
+            json!("8"),
+            json!(1),
+            json!(2.0),
+        ] {
             trace.publish(1, "state", 0, false, &json!({ "headerId": id }));
         }
         let expected = ["HDR-02", "HDR-02", "HDR-02", "HDR-02", "HDR-02", "HDR-02 warning"];
@@ -176,7 +197,9 @@ mod tests {
     #[test]
     fn a_gap_while_the_harness_disturbs_the_link_is_nobodys_fault() {
         let mut trace = Trace::tap();
-        trace.connected(1).publish(1, "state", 0, false, &json!({ "headerId": 5 }));
+        trace
+            .connected(1)
+            .publish(1, "state", 0, false, &json!({ "headerId": 5 }));
         trace.fault(LinkFault::Silence { direction: None });
         trace.publish(1, "state", 0, false, &json!({ "headerId": 8 }));
         trace.fault(LinkFault::Restore);

@@ -17,10 +17,37 @@ use crate::pack::{Finding, FindingKind};
 pub(super) const SCHEMA: Check = Check {
     name: "message/schema",
     decides: &[
-        "JSON-10", "JSON-01", "JSON-02", "JSON-06", "JSON-07", "JSON-08", "JSON-09", "HDR-01", "CONN-10", "STATE-01",
-        "STATE-MSG-01", "STATE-MSG-05", "STATE-MSG-13", "STATE-MSG-14", "STATE-MSG-15", "MODE-01", "ERR-02", "ERR-05",
-        "INFO-01", "MAP-12", "ORD-MSG-28", "FACT-02", "FACT-03", "FACT-04", "FACT-05", "FACT-06", "FACT-07",
-        "FACT-08", "FACT-09", "FACT-10", "VIS-01",
+        "JSON-10",
+        "JSON-01",
+        "JSON-02",
+        "JSON-06",
+        "JSON-07",
+        "JSON-08",
+        "JSON-09",
+        "HDR-01",
+        "CONN-10",
+        "STATE-01",
+        "STATE-MSG-01",
+        "STATE-MSG-05",
+        "STATE-MSG-13",
+        "STATE-MSG-14",
+        "STATE-MSG-15",
+        "MODE-01",
+        "ERR-02",
+        "ERR-05",
+        "INFO-01",
+        "MAP-12",
+        "ORD-MSG-28",
+        "FACT-02",
+        "FACT-03",
+        "FACT-04",
+        "FACT-05",
+        "FACT-06",
+        "FACT-07",
+        "FACT-08",
+        "FACT-09",
+        "FACT-10",
+        "VIS-01",
     ],
     doc: "Every message obeys the schema of its topic, written from the field tables of the document. A finding counts \
           for JSON-10, for the rule on JSON types or literals it breaks, and for the requirement of the field.",
@@ -131,7 +158,9 @@ fn requirements(topic: &str, finding: &Finding, value: &Value) -> Vec<&'static s
 /// The names IEEE 754 gives to what is no number.
 fn special(text: &str) -> bool {
     let text = text.trim_start_matches(['+', '-']);
-    ["nan", "inf", "infinity"].iter().any(|name| text.eq_ignore_ascii_case(name))
+    ["nan", "inf", "infinity"]
+        .iter()
+        .any(|name| text.eq_ignore_ascii_case(name))
 }
 
 fn of_field(topic: &str, path: &[&str], kind: FindingKind) -> Option<&'static str> {
@@ -245,19 +274,40 @@ mod tests {
 
     #[test]
     fn a_complete_state_with_extra_members_is_right() {
-        assert_eq!(state(&json!({ "vendorExtra": { "anything": 1 } })), Vec::<String>::new());
+        assert_eq!(
+            state(&json!({ "vendorExtra": { "anything": 1 } })),
+            Vec::<String>::new()
+        );
     }
 
     #[test]
     fn each_kind_of_violation_names_its_requirements() {
         let cases = [
             (json!({ "headerId": null }), vec!["JSON-10", "HDR-01"]),
-            (json!({ "nodeStates": null }), vec!["JSON-10", "STATE-MSG-01", "STATE-01"]),
-            (json!({ "operatingMode": "automatic" }), vec!["JSON-10", "JSON-02", "MODE-01"]),
-            (json!({ "driving": "false" }), vec!["JSON-10", "JSON-07", "STATE-MSG-01"]),
-            (json!({ "orderUpdateId": -1 }), vec!["JSON-10", "JSON-09", "STATE-MSG-01"]),
-            (json!({ "agvPosition": { "x": "1" } }), vec!["JSON-10", "JSON-06", "STATE-MSG-05"]),
-            (json!({ "agvPosition": { "x": "NaN" } }), vec!["JSON-10", "JSON-08", "STATE-MSG-05"]),
+            (
+                json!({ "nodeStates": null }),
+                vec!["JSON-10", "STATE-MSG-01", "STATE-01"],
+            ),
+            (
+                json!({ "operatingMode": "automatic" }),
+                vec!["JSON-10", "JSON-02", "MODE-01"],
+            ),
+            (
+                json!({ "driving": "false" }),
+                vec!["JSON-10", "JSON-07", "STATE-MSG-01"],
+            ),
+            (
+                json!({ "orderUpdateId": -1 }),
+                vec!["JSON-10", "JSON-09", "STATE-MSG-01"],
+            ),
+            (
+                json!({ "agvPosition": { "x": "1" } }),
+                vec!["JSON-10", "JSON-06", "STATE-MSG-05"],
+            ),
+            (
+                json!({ "agvPosition": { "x": "NaN" } }),
+                vec!["JSON-10", "JSON-08", "STATE-MSG-05"],
+            ),
             (json!({ "errors": [{ "errorType": "x" }] }), vec!["JSON-10", "ERR-02"]),
             (
                 json!({ "errors": [{ "errorType": "x", "errorLevel": "WARNING",
@@ -268,7 +318,10 @@ mod tests {
                 json!({ "actionStates": [{ "actionId": "a", "actionStatus": "DONE" }] }),
                 vec!["JSON-10", "JSON-02", "STATE-MSG-14"],
             ),
-            (json!({ "maps": [{ "mapId": "a", "mapStatus": "ENABLED" }] }), vec!["JSON-10", "MAP-12"]),
+            (
+                json!({ "maps": [{ "mapId": "a", "mapStatus": "ENABLED" }] }),
+                vec!["JSON-10", "MAP-12"],
+            ),
         ];
         for (over, expected) in cases {
             assert_eq!(state(&over), expected, "{over}");
@@ -290,7 +343,10 @@ mod tests {
     fn other_topics_have_their_own_requirements() {
         let mut trace = Trace::subscriber();
         trace.connection("connected");
-        assert_eq!(trace.judge("message/schema").summary(), ["JSON-10", "JSON-02", "CONN-10"]);
+        assert_eq!(
+            trace.judge("message/schema").summary(),
+            ["JSON-10", "JSON-02", "CONN-10"]
+        );
         let mut trace = Trace::subscriber();
         let header = trace.header();
         trace.message("factsheet", &header);

@@ -130,7 +130,9 @@ impl Running for Connect {
             return false;
         }
         self.announced = true;
-        let Some(opened) = self.open.remove(at) else { return false };
+        let Some(opened) = self.open.remove(at) else {
+            return false;
+        };
         opened.judge(context, findings);
         true
     }
@@ -164,7 +166,10 @@ impl Opened {
             return;
         };
         if context.topic_name(&will.topic) != Some("connection") {
-            let text = format!("the last will is on {}, not on the connection topic", quote(&will.topic));
+            let text = format!(
+                "the last will is on {}, not on the connection topic",
+                quote(&will.topic)
+            );
             findings.push(broken("CONN-01", seq, text));
         }
         if !(will.retain && will.qos == 1) {

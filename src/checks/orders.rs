@@ -35,7 +35,11 @@ impl Element {
 }
 
 /// A number written as `2.0` is the same number.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "range and fraction are checked")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "range and fraction are checked"
+)]
 fn whole(number: f64) -> Option<u64> {
     (number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number)).then_some(number as u64)
 }
@@ -142,10 +146,7 @@ impl Orders {
 /// Where a state says the vehicle was last: node and sequenceId.
 pub(super) fn last_node(state: &Value) -> Option<(String, u64)> {
     let node = state.get("lastNodeId")?.as_str()?;
-    Some((
-        node.chars().take(512).collect(),
-        number(state, "lastNodeSequenceId")?,
-    ))
+    Some((node.chars().take(512).collect(), number(state, "lastNodeSequenceId")?))
 }
 
 /// Whether a state reports something that may end an order without a word: another operating mode than the

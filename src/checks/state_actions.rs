@@ -113,13 +113,20 @@ impl Running for Kept {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         // A restarted vehicle may have forgotten everything; what it keeps over a restart is not ruled.
-        let restarted = matches!(entry.event(), Event::Packet { packet: Packet::Connect { .. }, .. });
+        let restarted = matches!(
+            entry.event(),
+            Event::Packet {
+                packet: Packet::Connect { .. },
+                ..
+            }
+        );
         if outside_influence(entry) || restarted {
             self.listed.clear();
         }
         if let Some(message) = to_vehicle("instantActions", entry, context) {
             let cancels = actions(message).filter(|action| text(action, "actionType") == "cancelOrder");
-            self.cancels.extend(cancels.map(|action| text(action, "actionId").to_owned()));
+            self.cancels
+                .extend(cancels.map(|action| text(action, "actionId").to_owned()));
             let excess = self.cancels.len().saturating_sub(64);
             self.cancels.drain(..excess);
         }
@@ -140,9 +147,11 @@ impl Running for Kept {
             .map(|(id, status)| (id.to_owned(), status.to_owned()))
             .collect();
         let complete = elements(state, "actionStates").count() == now.len();
-        let before = std::mem::replace(&mut self.order, Some(order.clone()));
+        let before = self.order.replace(order.clone());
         let listed = std::mem::take(&mut self.listed);
-        let same_order = before.as_ref().is_some_and(|before| before.0 == order.0 && before.1 <= order.1);
+        let same_order = before
+            .as_ref()
+            .is_some_and(|before| before.0 == order.0 && before.1 <= order.1);
         let updated = before.as_ref().is_some_and(|before| before.1 != order.1);
         if same_order && complete {
             let cancelled = listed.keys().chain(now.keys()).any(|id| self.cancels.contains(id));
@@ -165,14 +174,21 @@ impl Kept {
         findings: &mut Vec<CheckFinding>,
     ) {
         let seq = entry.seq();
-        let text = format!("action {} was {status} and is gone, although no new order was accepted", quote(id));
+        let text = format!(
+            "action {} was {status} and is gone, although no new order was accepted",
+            quote(id)
+        );
         if !terminal(status) {
             // An update may delete a horizon and its actions with it.
             if !updated {
                 findings.push(broken("STATE-MSG-09", seq, text));
             }
         } else if self.limit > 0 && count >= self.limit {
-            findings.push(remark("STATE-MSG-10", seq, format!("{text}; the factsheet allows {} of them", self.limit)));
+            findings.push(remark(
+                "STATE-MSG-10",
+                seq,
+                format!("{text}; the factsheet allows {} of them", self.limit),
+            ));
         } else {
             if cancelled && !self.cancels.iter().any(|cancel| cancel == id) {
                 findings.push(broken("ORD-CANCEL-12", seq, text.clone()));
@@ -185,7 +201,10 @@ impl Kept {
         let message = self.traffic.delivered(entry, context)?;
         let value = (message.name == "factsheet").then(|| entry.json()).flatten()?;
         let limits = value.pointer("/protocolLimits/maxArrayLens")?;
-        let limit = limits.get("state.actionStates").and_then(Value::as_u64).unwrap_or_default();
+        let limit = limits
+            .get("state.actionStates")
+            .and_then(Value::as_u64)
+            .unwrap_or_default();
         usize::try_from(limit).ok()
     }
 }
@@ -214,7 +233,18 @@ mod tests {
 
     #[test]
     fn legal_walks_with_and_without_missed_statuses_are_right() {
-        assert!(walk(&["WAITING", "INITIALIZING", "RUNNING", "PAUSED", "RUNNING", "FINISHED", "FINISHED"]).is_empty());
+        assert!(
+            walk(&[
+                "WAITING",
+                "INITIALIZING",
+                "RUNNING",
+                "PAUSED",
+                "RUNNING",
+                "FINISHED",
+                "FINISHED"
+            ])
+            .is_empty()
+        );
         assert!(walk(&["WAITING", "FINISHED"]).is_empty());
         assert!(walk(&["PAUSED", "FAILED"]).is_empty());
         assert!(walk(&["FAILED"]).is_empty());
@@ -249,7 +279,10 @@ mod tests {
         let mut trace = Trace::tap();
         trace.state(&actions(&[("a", "FINISHED")]));
         trace.state(&json!({ "orderId": "p" }));
-        trace.state(&actions(&[("b", "FINISHED")])).connected(2).state(&actions(&[]));
+        trace
+            .state(&actions(&[("b", "FINISHED")]))
+            .connected(2)
+            .state(&actions(&[]));
         trace.state(&actions(&[("c", "WAITING")]));
         trace.state(&json!({ "orderId": "o", "orderUpdateId": 1 }));
         assert!(trace.judge("state/action-states-kept").findings.is_empty());
@@ -262,7 +295,10 @@ mod tests {
             .state(&actions(&[("a", "FINISHED"), ("b", "RUNNING")]))
             .state(&actions(&[("b", "RUNNING")]))
             .state(&actions(&[]));
-        assert_eq!(trace.judge("state/action-states-kept").summary(), ["STATE-MSG-10", "STATE-MSG-09"]);
+        assert_eq!(
+            trace.judge("state/action-states-kept").summary(),
+            ["STATE-MSG-10", "STATE-MSG-09"]
+        );
     }
 
     #[test]
@@ -289,6 +325,9 @@ mod tests {
         trace
             .state(&actions(&[("a", "FINISHED")]))
             .state(&actions(&[("b", "RUNNING")]));
-        assert_eq!(trace.judge("state/action-states-kept").summary(), ["STATE-MSG-10 warning"]);
+        assert_eq!(
+            trace.judge("state/action-states-kept").summary(),
+            ["STATE-MSG-10 warning"]
+        );
     }
 }

@@ -42,7 +42,8 @@ impl Running for Maps {
         if let Some(message) = to_vehicle("instantActions", entry, context) {
             for action in actions(message).filter(|action| text(action, "actionType") == "deleteMap") {
                 if self.deleted.len() < LIMIT {
-                    self.deleted.insert((parameter(action, "mapId"), parameter(action, "mapVersion")));
+                    self.deleted
+                        .insert((parameter(action, "mapId"), parameter(action, "mapVersion")));
                 }
             }
         }
@@ -134,13 +135,26 @@ mod tests {
 
     #[test]
     fn one_enabled_version_per_map_is_right() {
-        assert!(judged(&[("hall", "1", "ENABLED"), ("hall", "2", "DISABLED"), ("yard", "1", "ENABLED")]).is_empty());
+        assert!(
+            judged(&[
+                ("hall", "1", "ENABLED"),
+                ("hall", "2", "DISABLED"),
+                ("yard", "1", "ENABLED")
+            ])
+            .is_empty()
+        );
     }
 
     #[test]
     fn twins_two_enabled_versions_and_an_active_map_that_is_not_enabled_are_found() {
-        assert_eq!(judged(&[("hall", "1", "ENABLED"), ("hall", "1", "DISABLED")]), ["MAP-07"]);
-        assert_eq!(judged(&[("hall", "1", "ENABLED"), ("hall", "2", "ENABLED")]), ["MAP-14"]);
+        assert_eq!(
+            judged(&[("hall", "1", "ENABLED"), ("hall", "1", "DISABLED")]),
+            ["MAP-07"]
+        );
+        assert_eq!(
+            judged(&[("hall", "1", "ENABLED"), ("hall", "2", "ENABLED")]),
+            ["MAP-14"]
+        );
         assert_eq!(judged(&[("hall", "1", "DISABLED")]), ["MAP-11"]);
         assert_eq!(judged(&[]), ["MAP-15"]);
     }

@@ -107,7 +107,9 @@ impl Running for Period {
                 let interval = entry
                     .json()
                     .and_then(|value| value.pointer("/protocolLimits/timing/defaultStateInterval")?.as_f64());
-                self.own = interval.filter(|seconds| (0.1..=30.0).contains(seconds)).map(Duration::from_secs_f64);
+                self.own = interval
+                    .filter(|seconds| (0.1..=30.0).contains(seconds))
+                    .map(Duration::from_secs_f64);
                 false
             }
             _ => false,
@@ -134,7 +136,14 @@ struct OwnLimits {
 impl Running for OwnLimits {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
-        if matches!(entry.event(), Event::Fault { .. } | Event::Packet { packet: Packet::Connect { .. }, .. }) {
+        if matches!(
+            entry.event(),
+            Event::Fault { .. }
+                | Event::Packet {
+                    packet: Packet::Connect { .. },
+                    ..
+                }
+        ) {
             self.last = None;
         }
         let Some(message) = self.traffic.delivered(entry, context) else {
@@ -237,7 +246,12 @@ mod tests {
         assert!(trace.judge(CHECK).findings.is_empty());
 
         let mut trace = Trace::subscriber();
-        trace.state(&json!({})).wait(5.0).connection("OFFLINE").wait(90.0).hook();
+        trace
+            .state(&json!({}))
+            .wait(5.0)
+            .connection("OFFLINE")
+            .wait(90.0)
+            .hook();
         assert!(trace.judge(CHECK).findings.is_empty());
     }
 
@@ -245,7 +259,11 @@ mod tests {
     fn missing_its_own_interval_is_a_remark() {
         let mut trace = Trace::subscriber();
         let timing = json!({ "protocolLimits": { "timing": { "defaultStateInterval": 2.0 } } });
-        trace.message("factsheet", &timing).state(&json!({})).wait(3.5).state(&json!({}));
+        trace
+            .message("factsheet", &timing)
+            .state(&json!({}))
+            .wait(3.5)
+            .state(&json!({}));
         assert_eq!(trace.judge(CHECK).summary(), ["STATE-02 warning"]);
     }
 
@@ -257,9 +275,15 @@ mod tests {
             "timing": { "minStateInterval": 0.5 },
         } });
         trace.message("factsheet", &limits);
-        trace.state(&json!({ "errors": [1], "information": [1, 2] })).wait(0.4).state(&json!({}));
+        trace
+            .state(&json!({ "errors": [1], "information": [1, 2] }))
+            .wait(0.4)
+            .state(&json!({}));
         assert!(trace.judge("state/own-limits").findings.is_empty());
         trace.wait(0.1).state(&json!({ "errors": [1, 2] }));
-        assert_eq!(trace.judge("state/own-limits").summary(), ["FACT-11", "FACT-14 warning"]);
+        assert_eq!(
+            trace.judge("state/own-limits").summary(),
+            ["FACT-11", "FACT-14 warning"]
+        );
     }
 }

@@ -146,8 +146,14 @@ impl RemainingRoute {
         if self.shown.carried.is_some() {
             return sent.nodes.first().filter(is_last).map(|first| first.sequence);
         }
-        let mut known = self.shown.orders.of(&sent.order).filter(|other| other.update <= sent.update);
-        known.find_map(|other| other.nodes.iter().find(is_last)).map(|element| element.sequence)
+        let mut known = self
+            .shown
+            .orders
+            .of(&sent.order)
+            .filter(|other| other.update <= sent.update);
+        known
+            .find_map(|other| other.nodes.iter().find(is_last))
+            .map(|element| element.sequence)
     }
 
     fn remainder<'o>(
@@ -167,7 +173,10 @@ impl RemainingRoute {
             }
             let alone = self.shown.orders.candidates(&sent.order, earlier.update).count() == 1;
             let certain = alone && earlier.sound && self.adopted.contains(&earlier.update);
-            for element in list(earlier).iter().filter(|element| element.released && element.sequence < first) {
+            for element in list(earlier)
+                .iter()
+                .filter(|element| element.released && element.sequence < first)
+            {
                 let ahead = progress.is_some_and(|progress| element.sequence > progress);
                 if certain && ahead && !all.required.contains(&element) {
                     all.required.push(element);
@@ -200,7 +209,11 @@ fn compare(
     found: &mut Vec<CheckFinding>,
 ) {
     if !listed.windows(2).all(|pair| pair[0].sequence < pair[1].sequence) {
-        found.push(broken("STATE-12", seq, format!("{name} is not in the sequence of the order")));
+        found.push(broken(
+            "STATE-12",
+            seq,
+            format!("{name} is not in the sequence of the order"),
+        ));
     }
     let same = |a: &Element, b: &Element| a.id == b.id && a.sequence == b.sequence;
     for element in listed {
@@ -208,7 +221,10 @@ fn compare(
         let mut known = right.required.iter().chain(&right.tolerated);
         match known.find(|other| same(other, element)) {
             Some(other) if other.released != element.released => {
-                let text = format!("{label} is listed with released {}, unlike in the order", element.released);
+                let text = format!(
+                    "{label} is listed with released {}, unlike in the order",
+                    element.released
+                );
                 found.push(broken("STATE-MSG-13", seq, text));
             }
             Some(_) => {}
@@ -285,7 +301,11 @@ impl Running for LastNode {
             return true;
         }
         if visits.iter().all(|element| !element.released) {
-            findings.push(broken("ORD-07", seq, format!("the vehicle reached {place}, which was not released")));
+            findings.push(broken(
+                "ORD-07",
+                seq,
+                format!("the vehicle reached {place}, which was not released"),
+            ));
         }
         let was_in_order = nodes().any(|element| element.id == node_before && element.sequence == sequence_before);
         if was_in_order && self.shown.carried.is_none() && sequence < sequence_before {
@@ -397,8 +417,14 @@ mod tests {
             state["nodeStates"].as_array_mut().unwrap().push(more);
         });
         assert_eq!(surplus, ["STATE-12"]);
-        assert_eq!(with(|state| state["nodeStates"].as_array_mut().unwrap().reverse()), ["STATE-12"]);
-        assert_eq!(with(|state| state["nodeStates"][1]["released"] = json!(true)), ["STATE-MSG-13"]);
+        assert_eq!(
+            with(|state| state["nodeStates"].as_array_mut().unwrap().reverse()),
+            ["STATE-12"]
+        );
+        assert_eq!(
+            with(|state| state["nodeStates"][1]["released"] = json!(true)),
+            ["STATE-MSG-13"]
+        );
         assert_eq!(with(|state| state["edgeStates"] = json!([])), ["STATE-12", "STATE-12"]);
     }
 
@@ -419,7 +445,10 @@ mod tests {
             trace.state(&under_way(0, &["a", "b", "c"], 0, 3));
             trace.instant("cancelOrder", "x", &json!([]));
             trace.state(&json!({ "orderId": "o", "lastNodeId": "a" }));
-            trace.sent("order", &json!({ "orderId": "p", "orderUpdateId": 0, "nodes": [], "edges": [] }));
+            trace.sent(
+                "order",
+                &json!({ "orderId": "p", "orderUpdateId": 0, "nodes": [], "edges": [] }),
+            );
             trace.state(&json!({ "orderId": "p", "lastNodeId": "a" }));
         });
         assert_eq!(outcome, Vec::<String>::new());

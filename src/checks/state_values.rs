@@ -78,10 +78,23 @@ impl Running for IdleEmpty {
             let text = format!("{nodes} nodeStates and {edges} edgeStates without any order");
             findings.push(broken("STATE-13", seq, text));
         } else if nodes == 0 && edges > 0 {
-            findings.push(broken("STATE-13", seq, format!("{edges} edgeStates are left without any nodeState")));
+            findings.push(broken(
+                "STATE-13",
+                seq,
+                format!("{edges} edgeStates are left without any nodeState"),
+            ));
         }
-        if never && state.get("orderUpdateId").and_then(Value::as_f64).is_some_and(|update| update != 0.0) {
-            findings.push(broken("STATE-MSG-02", seq, "orderUpdateId is not 0 although there is no orderId"));
+        if never
+            && state
+                .get("orderUpdateId")
+                .and_then(Value::as_f64)
+                .is_some_and(|update| update != 0.0)
+        {
+            findings.push(broken(
+                "STATE-MSG-02",
+                seq,
+                "orderUpdateId is not 0 although there is no orderId",
+            ));
         }
         true
     }
@@ -112,7 +125,11 @@ impl Running for PositionRange {
         }
         for name in ["x", "y"] {
             if let Some(value) = number(name).filter(|value| value.abs() > FAR) {
-                findings.push(remark("MAP-02", entry.seq(), format!("{name} {value} can hardly be metres")));
+                findings.push(remark(
+                    "MAP-02",
+                    entry.seq(),
+                    format!("{name} {value} can hardly be metres"),
+                ));
             }
         }
         true
@@ -131,7 +148,10 @@ impl Running for Identifiers {
         let Some(state) = state(self.traffic, entry, context) else {
             return false;
         };
-        let position = state.get("agvPosition").into_iter().map(|position| ("mapId", text(position, "mapId")));
+        let position = state
+            .get("agvPosition")
+            .into_iter()
+            .map(|position| ("mapId", text(position, "mapId")));
         let maps = elements(state, "maps").map(|map| ("mapId", text(map, "mapId")));
         let own = ["lastNodeId", "zoneSetId"].map(|name| (name, text(state, name)));
         for (name, id) in own.into_iter().chain(position).chain(maps) {
@@ -160,7 +180,9 @@ impl Running for Driving {
         let Some(state) = state(self.traffic, entry, context) else {
             return false;
         };
-        let Some(velocity) = state.get("velocity") else { return false };
+        let Some(velocity) = state.get("velocity") else {
+            return false;
+        };
         let speed = |name| velocity.get(name).and_then(Value::as_f64).unwrap_or_default().abs();
         let moving = ["vx", "vy", "omega"].into_iter().any(|name| speed(name) > MOVING);
         let suspicious = moving && state.get("driving") == Some(&Value::Bool(false));
@@ -197,18 +219,27 @@ mod tests {
 
     #[test]
     fn left_over_elements_are_found() {
-        assert_eq!(judged("state/idle-empty", &[json!({ "nodeStates": [{}] })]), ["STATE-13"]);
+        assert_eq!(
+            judged("state/idle-empty", &[json!({ "nodeStates": [{}] })]),
+            ["STATE-13"]
+        );
         let edges = json!({ "orderId": "o", "edgeStates": [{}] });
         assert_eq!(judged("state/idle-empty", &[edges]), ["STATE-13"]);
-        assert_eq!(judged("state/idle-empty", &[json!({ "orderUpdateId": 3 })]), ["STATE-MSG-02"]);
+        assert_eq!(
+            judged("state/idle-empty", &[json!({ "orderUpdateId": 3 })]),
+            ["STATE-MSG-02"]
+        );
     }
 
     #[test]
     fn radians_and_metres_are_told_from_degrees_and_millimetres() {
         let position = |x: f64, theta: f64| json!({ "agvPosition": { "x": x, "theta": theta } });
-        assert!(judged("state/position-range", &[position(-350.0, -3.1416)]).is_empty());
+        assert!(judged("state/position-range", &[position(-350.0, -std::f64::consts::PI)]).is_empty());
         assert_eq!(judged("state/position-range", &[position(1.0, 90.0)]), ["MAP-02"]);
-        assert_eq!(judged("state/position-range", &[position(4.0e6, 0.0)]), ["MAP-02 warning"]);
+        assert_eq!(
+            judged("state/position-range", &[position(4.0e6, 0.0)]),
+            ["MAP-02 warning"]
+        );
     }
 
     #[test]

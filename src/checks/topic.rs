@@ -129,7 +129,10 @@ impl Running for Structure {
             findings.push(remark("TOPIC-03", seq, text));
         }
         if serial == context.identity.1 && !serial.bytes().all(serial_character) {
-            let text = format!("the serial number in {} holds characters that are not allowed", quote(topic));
+            let text = format!(
+                "the serial number in {} holds characters that are not allowed",
+                quote(topic)
+            );
             findings.push(broken("TOPIC-05", seq, text));
         }
         true
@@ -195,10 +198,16 @@ mod tests {
     #[test]
     fn variants_of_a_name_are_found_once() {
         for name in ["State", "instant_actions", "FactSheet"] {
-            assert_eq!(at_tap(&format!("x/{name}")).judge("topic/names").summary(), ["TOPIC-01"], "{name}");
+            assert_eq!(
+                at_tap(&format!("x/{name}")).judge("topic/names").summary(),
+                ["TOPIC-01"],
+                "{name}"
+            );
         }
         let mut trace = Trace::subscriber();
-        trace.message("Connection", &json!({})).message("Connection", &json!({}));
+        trace
+            .message("Connection", &json!({}))
+            .message("Connection", &json!({}));
         assert_eq!(trace.judge("topic/names").summary(), ["TOPIC-01"]);
     }
 
@@ -225,7 +234,9 @@ mod tests {
     #[test]
     fn publishing_on_the_other_sides_topics_is_found() {
         let mut trace = Trace::tap();
-        trace.publish(1, "state", 0, false, &json!({})).sent("order", &json!({}));
+        trace
+            .publish(1, "state", 0, false, &json!({}))
+            .sent("order", &json!({}));
         assert!(trace.judge("topic/own-side").findings.is_empty());
         trace.publish(1, "order", 0, false, &json!({}));
         assert_eq!(trace.judge("topic/own-side").summary(), ["TOPIC-15"]);

@@ -259,11 +259,19 @@ impl Trace {
     /// Runs a check over everything recorded.
     pub fn judge(&self, name: &str) -> Outcome {
         let pack = pack();
-        let topics: BTreeMap<String, String> = ["order", "instantActions", "state", "visualization", "connection", "factsheet"]
-            .into_iter()
-            .map(|name| (name.to_owned(), self.topic(name)))
-            .collect();
-        let Value::Object(bindings) = json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000 } }) else {
+        let topics: BTreeMap<String, String> = [
+            "order",
+            "instantActions",
+            "state",
+            "visualization",
+            "connection",
+            "factsheet",
+        ]
+        .into_iter()
+        .map(|name| (name.to_owned(), self.topic(name)))
+        .collect();
+        let Value::Object(bindings) = json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000 } })
+        else {
             unreachable!()
         };
         let context = CheckContext {

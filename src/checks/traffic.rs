@@ -120,7 +120,9 @@ pub(super) fn to_vehicle<'e>(name: &str, entry: &'e Entry, context: &CheckContex
     else {
         return None;
     };
-    (context.topic_name(topic) == Some(name)).then(|| entry.json()).flatten()
+    (context.topic_name(topic) == Some(name))
+        .then(|| entry.json())
+        .flatten()
 }
 
 /// Every action of an instantActions message, whatever else is wrong with it.

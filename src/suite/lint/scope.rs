@@ -25,6 +25,16 @@ const TIMES: [&str; 12] = [
     "settle",
 ];
 
+/// The names of `device.` that a profile may give.
+const PROFILE: [&str; 6] = [
+    "longAction.type",
+    "longAction.parameters",
+    "uninterruptibleAction.type",
+    "uninterruptibleAction.parameters",
+    "activeMap.mapId",
+    "activeMap.mapVersion",
+];
+
 /// Where names of a test come from.
 #[derive(Clone, PartialEq, Eq)]
 enum Origin {
@@ -256,7 +266,12 @@ impl<'a> Scope<'a> {
                     members.iter().map(String::as_str),
                 ))
             }
-            _ => unknown(did_you_mean(first, ["manufacturer", "serialNumber", "factsheet"])),
+            // What a profile tells of a device beyond its factsheet; a test that uses it `needs: [profile …]`.
+            _ if PROFILE.contains(&rest) => None,
+            _ => unknown(did_you_mean(
+                rest,
+                ["manufacturer", "serialNumber", "factsheet"].into_iter().chain(PROFILE),
+            )),
         }
     }
 

@@ -1,0 +1,89 @@
+//! `schemas/suite.schema.json` agrees with the loader: it takes every good suite and refuses what it can see.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use vda5050_tck::diagnostic::Source;
+use vda5050_tck::yaml;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn schema() -> jsonschema::Validator {
+    let text = std::fs::read_to_string(root().join("schemas/suite.schema.json")).expect("schema");
+    let schema: Value = serde_json::from_str(&text).expect("JSON");
+    jsonschema::draft202012::meta::validate(&schema).expect("a schema of 2020-12");
+    jsonschema::validator_for(&schema).expect("a schema")
+}
+
+fn suites_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries {
+        let path = entry.expect("entry").path();
+        if path.is_dir() && !path.ends_with("suites/requirements") {
+            suites_below(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "yaml") {
+            found.push(path);
+        }
+    }
+}
+
+fn read(path: &Path) -> Option<Value> {
+    let text = std::fs::read_to_string(path).expect("text");
+    let source = Source::new(path.to_string_lossy(), text);
+    yaml::tree(&source).ok().map(|tree| yaml::value(&tree))
+}
+
+#[test]
+fn every_suite_is_valid() {
+    let schema = schema();
+    let mut files = Vec::new();
+    suites_below(&root().join("fixtures/good-suites"), &mut files);
+    suites_below(&root().join("suites"), &mut files);
+    assert!(files.len() >= 12);
+    for path in files {
+        let value = read(&path).unwrap_or_else(|| panic!("{} is no YAML", path.display()));
+        let objections: Vec<String> = schema
+            .iter_errors(&value)
+            .map(|error| format!("{}: {error:.300}", error.instance_path()))
+            .collect();
+        assert!(objections.is_empty(), "{}: {objections:#?}", path.display());
+    }
+}
+
+#[test]
+fn mistakes_of_form_are_refused() {
+    const OF_FORM: [&str; 16] = [
+        "always-without-extent",
+        "bad-duration",
+        "bad-need",
+        "bad-node-name",
+        "bad-version-range",
+        "bad-walk",
+        "empty-cases",
+        "empty-steps",
+        "horizon-without-base",
+        "monitor-rule",
+        "unknown-behaviour",
+        "unknown-device",
+        "unknown-fault",
+        "unknown-operator",
+        "unknown-verb",
+        "wrong-type",
+    ];
+    let schema = schema();
+    let mut files = Vec::new();
+    suites_below(&root().join("fixtures/bad-suites"), &mut files);
+    let mut refused = 0;
+    for path in files {
+        let text = std::fs::read_to_string(&path).expect("text");
+        let code = text.lines().next().and_then(|line| line.strip_prefix("# expect: "));
+        let (Some(code), Some(value)) = (code, read(&path)) else { continue };
+        if OF_FORM.contains(&code) {
+            assert!(!schema.is_valid(&value), "{} is taken", path.display());
+            refused += 1;
+        }
+    }
+    assert!(refused >= OF_FORM.len(), "only {refused} refused");
+}

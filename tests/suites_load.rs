@@ -1,0 +1,100 @@
+//! The suites that ship with the tool load without a complaint, and what they cover is written down.
+
+#![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+
+use vda5050_tck::checks;
+use vda5050_tck::pack::{Assets, Catalogue, Packs, Role};
+use vda5050_tck::suite::{CheckInfo, HookFacts, Suites};
+
+const HOOKS: &[&str] = &["power-cycle", "shutdown"];
+
+fn load() -> (Suites, Catalogue) {
+    let assets = Assets::embedded();
+    let packs = Packs::load(&assets).expect("packs");
+    let catalogue = Catalogue::load(&assets).expect("catalogue");
+    let known: Vec<CheckInfo> = checks::registry()
+        .iter()
+        .map(|check| CheckInfo {
+            name: check.name,
+            decides: check.decides,
+            arguments: check.arguments,
+        })
+        .collect();
+    let hooks: Vec<HookFacts> = HOOKS
+        .iter()
+        .map(|name| HookFacts {
+            name,
+            role: Role::Agv,
+            parameters: &[],
+        })
+        .collect();
+    let suites = Suites::load(&assets, &packs, &catalogue, &known, &hooks).unwrap_or_else(|diagnostics| {
+        for diagnostic in &diagnostics {
+            println!("{}", diagnostic.render(false));
+        }
+        panic!("{} diagnostics", diagnostics.len())
+    });
+    (suites, catalogue)
+}
+
+#[test]
+fn every_suite_loads_without_a_complaint() {
+    let (suites, _) = load();
+    let agv = suites.tests.iter().filter(|test| test.device == Role::Agv);
+    let files: BTreeSet<&str> = agv.map(|test| test.id.split('[').next().unwrap_or_default()).collect();
+    assert!(files.len() >= 60, "only {} files", files.len());
+}
+
+#[test]
+fn every_named_check_has_a_monitor() {
+    let (suites, _) = load();
+    for check in checks::registry() {
+        assert!(
+            suites.monitors.iter().any(|monitor| monitor.id == check.name),
+            "{} is never run",
+            check.name
+        );
+    }
+}
+
+#[test]
+fn every_test_of_a_vehicle_decides_something() {
+    let (suites, _) = load();
+    for test in &suites.tests {
+        assert!(!test.requirements().is_empty(), "{} decides nothing", test.id);
+    }
+}
+
+/// Requirements of vehicles, and the tests and monitors that decide them.
+#[test]
+fn the_requirements_covered_are_written_down() {
+    let (suites, catalogue) = load();
+    let mut by: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for test in suites.tests.iter().filter(|test| test.device == Role::Agv) {
+        let file = test.id.split('[').next().unwrap_or_default();
+        for requirement in test.requirements() {
+            by.entry(requirement.to_string()).or_default().insert(file.to_owned());
+        }
+    }
+    for monitor in &suites.monitors {
+        for binding in &monitor.checks {
+            let entry = by.entry(binding.requirement.to_string()).or_default();
+            entry.insert(format!("monitor {}", monitor.id));
+        }
+    }
+    let mut text = String::new();
+    for requirement in catalogue
+        .all()
+        .filter(|requirement| requirement.role.concerns(Role::Agv))
+    {
+        let deciders = by.get(requirement.id.as_str()).map_or_else(
+            || "-".to_owned(),
+            |names| names.iter().cloned().collect::<Vec<_>>().join(", "),
+        );
+        let _ = writeln!(text, "{}: {deciders}", requirement.id);
+    }
+    insta::assert_snapshot!("agv_requirements", text);
+}
