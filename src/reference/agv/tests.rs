@@ -257,6 +257,7 @@ fn status_in(state: &Value, id: &str) -> Option<String> {
     found["actionStatus"].as_str().map(str::to_owned)
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "json!() is written in place")]
 fn action(action_type: &str, id: &str, blocking: &str, parameters: Value) -> Value {
     let parameters: Vec<Value> = parameters
         .as_object()

@@ -2,14 +2,12 @@ use super::*;
 use crate::reference::agv::FAULTS;
 
 #[test]
-fn a_vehicle_with_any_single_fault_lives_through_every_scenario() {
-    for (config, scenario) in super::scenarios::all() {
-        for fault in FAULTS {
-            let mut bench = Bench::with(config.clone(), &[fault.name]);
-            scenario(&mut bench);
-            bench.wait(30.0);
-            assert!(!bench.outputs.is_empty(), "{}", fault.name);
-        }
+fn a_vehicle_with_any_single_fault_lives_through_a_day() {
+    for fault in FAULTS {
+        let mut bench = Bench::with(config(), &[fault.name]);
+        super::scenarios::day(&mut bench);
+        bench.wait(30.0);
+        assert!(bench.publications("/state").len() > 1, "{}", fault.name);
     }
 }
 

@@ -45,7 +45,7 @@ pub(super) fn all() -> Vec<Scenario> {
 }
 
 /// A little of everything.
-fn day(bench: &mut Bench) {
+pub(super) fn day(bench: &mut Bench) {
     let pick = action(
         "pick",
         "a1",
@@ -125,6 +125,11 @@ fn completed_order(bench: &mut Bench) {
 }
 
 fn busy_vehicle(bench: &mut Bench) {
+    bench.order(order("o0", 3, 0, "n1 n2"));
+    bench.order(order("o0", 2, 0, "n1 n2"));
+    bench.wait(6.0);
+    bench.order(order("back", 0, 0, "n2 n1"));
+    bench.wait(6.0);
     let long = action("beep", "a", "NONE", json!({ "duration": 5 }));
     bench.order(with(order("o1", 0, 0, "n1"), "/nodes/0/actions/-", long));
     bench.order(order("o2", 0, 0, "n1 n2"));
@@ -228,7 +233,7 @@ fn ways(bench: &mut Bench) {
     let order1 = with(
         with(order1, "/edges/0/maxSpeed", json!(0.5)),
         "/edges/1/orientation",
-        json!(3.14),
+        json!(3.1),
     );
     bench.order(with(
         with(order1, "/edges/1/maxRotationSpeed", json!(0.5)),
