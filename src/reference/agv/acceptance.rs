@@ -1,68 +1,17 @@
-//! Acceptance of orders and order updates (figure 8), and how a refusal is reported.
+//! Acceptance of orders and order updates: the decision table of figure 8, and taking an order over.
+//!
+//! Whether the vehicle is able to do what it is asked is decided in `ability`, a refusal reported in `rejection`.
 
 use serde_json::Value;
 
-use super::action_kinds::{self, Scope};
+use super::Agv;
+use super::action_kinds;
 use super::actions::{Action, Origin};
-use super::book::{Place, Stop};
-use super::errors::{ActiveError, Life};
+use super::book::Stop;
 use super::faults::FaultName as F;
 use super::order_message::{ActionRequest, Edge, Node, Order};
 use super::read::Defect;
-use super::{Agv, motion};
-
-/// How far an edge orientation may be from forwards or backwards, in radians: the vehicle has two driven wheels.
-const SIDEWAYS: f64 = 0.1;
-
-/// Which rule refused an order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Rule {
-    Malformed,
-    Unable,
-    Memory,
-    UnknownMap,
-    OtherOrderActive,
-    StartOutOfRange,
-    Outdated,
-    BrokenUpdate,
-    /// Never raised by a faultless vehicle.
-    Duplicate,
-}
-
-/// An order that is not taken over.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Refusal {
-    rule: Rule,
-    reason: String,
-    /// What in the message is wrong.
-    culprits: Vec<(String, String)>,
-}
-
-impl Refusal {
-    fn new(rule: Rule, reason: &str) -> Self {
-        Self {
-            rule,
-            reason: reason.to_owned(),
-            culprits: Vec::new(),
-        }
-    }
-
-    fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
-        self.culprits.push((key.to_owned(), value.into()));
-        self
-    }
-
-    fn at_field(rule: Rule, reason: &str, path: &str) -> Self {
-        Self::new(rule, reason).naming("field", path)
-    }
-}
-
-impl From<Defect> for Refusal {
-    fn from(defect: Defect) -> Self {
-        let reason = format!("{} {}", defect.path, defect.reason);
-        Self::at_field(Rule::Malformed, &reason, &defect.path)
-    }
-}
+use super::rejection::{Refusal, Rule};
 
 /// What to do with an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,8 +151,8 @@ impl Agv {
     /// Nodes left, an order action not ended, or a cancellation under way; a horizon keeps it busy.
     pub(super) fn is_busy(&self) -> bool {
         let actions = self.actions.order_unfinished() && !self.faults.has(F::RunningActionIgnored);
-        let only_horizon = self.book.nodes.iter().all(|stop| !stop.node.released);
-        let nodes = !self.book.nodes.is_empty() && !(only_horizon && self.faults.has(F::HorizonNotBusy));
+        let counts = |released: bool| released || !self.faults.has(F::HorizonNotBusy);
+        let nodes = !self.book.cancelled && self.book.nodes.iter().any(|stop| counts(stop.node.released));
         (nodes || actions || self.book.cancel.is_some()) && !self.faults.has(F::BusyIgnored)
     }
 
@@ -230,178 +179,6 @@ impl Agv {
         let lenient = self.faults.has(F::UnknownMapAccepted) || self.faults.has(F::DisabledMapUsed);
         (pose.map_id == place.map_id || lenient)
             && pose.distance(place.x, place.y) <= allowed.max(self.config.tolerance)
-    }
-
-    /// Where a node is: as the order says, else as the layout knows.
-    fn place(&self, node: &Node) -> Option<Place> {
-        if let Some(position) = &node.position {
-            return Some(Place {
-                x: position.x,
-                y: position.y,
-                map_id: position.map_id.clone(),
-            });
-        }
-        self.config.node(&node.id).map(|known| Place {
-            x: known.x,
-            y: known.y,
-            map_id: known.map_id.clone(),
-        })
-    }
-
-    /// Whether the vehicle can do all this; the first `known` nodes are only the joint.
-    fn check_ability(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
-        self.check_memory(order, known)?;
-        if let Some(path) = order
-            .unsupported
-            .first()
-            .filter(|_| !self.faults.has(F::UnsupportedFieldIgnored))
-        {
-            return Err(Refusal::at_field(
-                Rule::Unable,
-                &format!("the vehicle has no use for {path}"),
-                path,
-            ));
-        }
-        for node in &order.nodes {
-            let Some(place) = self.place(node) else {
-                let path = format!("{}.nodePosition", node.path);
-                let refusal = Refusal::at_field(Rule::Unable, "the vehicle does not know where the node is", &path);
-                return Err(refusal.naming("nodeId", &node.id));
-            };
-            self.check_map(node, &place)?;
-        }
-        for (index, edge) in order.edges.iter().enumerate() {
-            let ends = order.nodes.get(index).zip(order.nodes.get(index + 1));
-            self.check_edge(edge, ends)?;
-        }
-        self.check_actions(order, known)
-    }
-
-    fn check_memory(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
-        let limit = self.config.max_nodes;
-        let actions = |actions: &Vec<ActionRequest>| actions.len() > self.config.max_actions;
-        let too_many_actions = order.nodes.iter().any(|node| actions(&node.actions))
-            || order.edges.iter().any(|edge| actions(&edge.actions));
-        let left = if known == 0 {
-            0
-        } else {
-            self.book.nodes.iter().filter(|stop| stop.node.released).count()
-        };
-        let too_many_nodes = left + order.nodes.len() > limit;
-        if self.faults.has(F::MemoryUnchecked) {
-            order.nodes.truncate(limit);
-            order.edges.truncate(limit.saturating_sub(1));
-            return Ok(());
-        }
-        if too_many_nodes {
-            return Err(Refusal::at_field(Rule::Memory, "the order has too many nodes", "nodes"));
-        }
-        if too_many_actions {
-            return Err(Refusal::at_field(
-                Rule::Memory,
-                "a node or edge has too many actions",
-                "actions",
-            ));
-        }
-        Ok(())
-    }
-
-    fn check_map(&self, node: &Node, place: &Place) -> Result<(), Refusal> {
-        let refusal = |reason| {
-            Err(Refusal::new(Rule::UnknownMap, reason)
-                .naming("mapId", &place.map_id)
-                .naming("nodeId", &node.id))
-        };
-        if self.faults.has(F::UnknownMapAccepted) {
-            return Ok(());
-        }
-        if !self.maps.on_board(&place.map_id) {
-            return refusal("the map is not on board");
-        }
-        if !self.maps.enabled(&place.map_id) && !self.faults.has(F::DisabledMapUsed) {
-            return refusal("the map is not enabled");
-        }
-        Ok(())
-    }
-
-    fn check_edge(&self, edge: &Edge, ends: Option<(&Node, &Node)>) -> Result<(), Refusal> {
-        let unable = |field: &str, reason: &str| {
-            let path = format!("{}.{field}", edge.path);
-            Err(Refusal::at_field(Rule::Unable, reason, &path).naming("edgeId", &edge.id))
-        };
-        if edge.max_speed == Some(0.0) {
-            return unable("maxSpeed", "the vehicle cannot drive with speed zero");
-        }
-        if edge.max_height.is_some_and(|height| height < self.config.height) {
-            return unable("maxHeight", "the vehicle is higher");
-        }
-        let Some(orientation) = edge.orientation else {
-            return Ok(());
-        };
-        let places = ends.and_then(|(from, to)| self.place(from).zip(self.place(to)));
-        let Some((from, to)) = places.filter(|(from, to)| (to.x - from.x).hypot(to.y - from.y) > 1e-6) else {
-            return Ok(());
-        };
-        let heading = (to.y - from.y).atan2(to.x - from.x);
-        let relative = motion::wrapped(if edge.global {
-            orientation - heading
-        } else {
-            orientation
-        })
-        .abs();
-        let possible = relative <= SIDEWAYS || relative >= std::f64::consts::PI - SIDEWAYS;
-        if possible || self.faults.has(F::OrientationUnchecked) {
-            return Ok(());
-        }
-        unable("orientation", "the vehicle cannot drive sideways")
-    }
-
-    fn check_actions(&self, order: &Order, known: usize) -> Result<(), Refusal> {
-        let nodes = order.nodes.iter().skip(known).flat_map(|node| &node.actions);
-        let edges = order.edges.iter().flat_map(|edge| &edge.actions);
-        let scoped = nodes
-            .map(|action| (action, Scope::Node))
-            .chain(edges.map(|action| (action, Scope::Edge)));
-        let mut seen: Vec<&str> = Vec::new();
-        for (request, scope) in scoped {
-            let unable = |reason: &str, field: &str| {
-                let refusal = Refusal::at_field(Rule::Unable, reason, field).naming("actionId", &request.id);
-                Err(refusal.naming("actionType", &request.action_type))
-            };
-            if seen.contains(&request.id.as_str()) || self.id_taken(&request.id, known) {
-                return unable("the actionId is not unique", &request.path);
-            }
-            seen.push(&request.id);
-            let Some(kind) = action_kinds::find(&self.config, &request.action_type) else {
-                if self.faults.has(F::UnknownActionAccepted) {
-                    continue;
-                }
-                return unable("the vehicle does not know the action", &request.path);
-            };
-            let listed_refused = self.faults.has(F::ListedActionRefused)
-                && matches!(
-                    kind.deed,
-                    action_kinds::Deed::FinePositioning | action_kinds::Deed::DetectObject
-                );
-            if listed_refused || (!kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked)) {
-                return unable("the action is not possible here", &request.path);
-            }
-            if let Some((key, reason)) = action_kinds::refusal(kind, request, true) {
-                let refusal = Refusal::at_field(Rule::Unable, reason, &request.path).naming("actionParameter", key);
-                return Err(refusal.naming("actionId", &request.id));
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether an action of that id stays when the order is taken over.
-    fn id_taken(&self, id: &str, known: usize) -> bool {
-        self.actions.get(id).is_some_and(|action| match action.origin {
-            Origin::Instant => known > 0 || !action.status.is_terminal(),
-            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => {
-                known > 0 && sequence_id <= self.book.base_end.1 && !self.faults.has(F::OutdatedUpdateTakenOver)
-            }
-        })
     }
 
     /// Row 4: takes over a new order.
@@ -507,86 +284,4 @@ impl Agv {
             self.actions.push(Action::waiting(request, kind, origin));
         }
     }
-
-    /// Reports a refusal; nothing else changes (ORD-FLOW-12).
-    fn refuse(&mut self, message: &Value, refusal: Refusal) {
-        self.refusal_side_effects(message, refusal.rule);
-        if self.faults.has(F::RejectionSilent) {
-            return;
-        }
-        let names = &self.config.errors;
-        let name = match refusal.rule {
-            Rule::Malformed if self.faults.has(F::ValidationErrorMisspelled) => "validationOrder",
-            Rule::Malformed => &names.validation,
-            Rule::Unable if self.faults.has(F::OrderErrorAsValidation) => &names.validation,
-            Rule::Unable => &names.order,
-            Rule::Memory => &names.memory,
-            Rule::UnknownMap => &names.unknown_map,
-            Rule::OtherOrderActive => &names.other_order_active,
-            Rule::StartOutOfRange => &names.start_out_of_range,
-            Rule::Outdated if self.faults.has(F::OutdatedUpdateMisnamed) => &names.validation,
-            Rule::Outdated | Rule::Duplicate => &names.outdated_update,
-            Rule::BrokenUpdate => &names.broken_update,
-        };
-        let fatal = match refusal.rule {
-            Rule::Malformed => self.faults.has(F::ValidationErrorFatal),
-            Rule::Unable => self.faults.has(F::OrderErrorFatal),
-            Rule::Outdated => self.faults.has(F::OutdatedUpdateFatal),
-            _ => false,
-        };
-        let (early, short) = match refusal.rule {
-            Rule::Malformed => (self.faults.has(F::ValidationErrorDroppedEarly), false),
-            Rule::Unable => (self.faults.has(F::OrderErrorDroppedEarly), false),
-            Rule::Outdated | Rule::BrokenUpdate | Rule::Duplicate => (false, true),
-            _ => (false, false),
-        };
-        let life = match (early, short) {
-            (true, _) => Life::Until(self.moment() + std::time::Duration::from_secs(1)),
-            (_, true) => Life::Until(self.moment() + self.config.error_duration),
-            _ => Life::UntilNewOrder,
-        };
-        let mut references = message_references(message);
-        references.extend(refusal.culprits);
-        if self.faults.has(F::UpdateIdUnreferenced) {
-            references.retain(|(key, _)| key != "orderUpdateId");
-        }
-        if refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorUnreferenced) {
-            references.clear();
-        }
-        let error = ActiveError {
-            error_type: name.to_owned(),
-            fatal,
-            references,
-            description: refusal.reason,
-            life,
-        };
-        self.errors.raise(error);
-    }
-
-    /// What a faulty vehicle changes when it refuses an order.
-    fn refusal_side_effects(&mut self, message: &Value, rule: Rule) {
-        let taken = rule == Rule::Malformed && self.faults.has(F::MalformedTakenOver)
-            || rule != Rule::Outdated && self.faults.has(F::RejectedIdReported);
-        if let Some(id) = message.get("orderId").and_then(Value::as_str).filter(|_| taken) {
-            id.clone_into(&mut self.book.order_id);
-        }
-        if self.faults.has(F::RejectionStopsOrder)
-            || (rule == Rule::Outdated && self.faults.has(F::OutdatedUpdateDropsOrder))
-        {
-            self.give_up_order();
-        }
-    }
-}
-
-/// References that identify the message, as far as it can be read (BP-02).
-fn message_references(message: &Value) -> Vec<(String, String)> {
-    let mut references = vec![("topic".to_owned(), "order".to_owned())];
-    for key in ["headerId", "orderId", "orderUpdateId"] {
-        match message.get(key) {
-            Some(Value::String(text)) => references.push((key.to_owned(), text.chars().take(256).collect())),
-            Some(Value::Number(number)) => references.push((key.to_owned(), number.to_string())),
-            _ => {}
-        }
-    }
-    references
 }

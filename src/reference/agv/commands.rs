@@ -96,7 +96,9 @@ impl Agv {
             .filter(waits)
             .map(|action| action.request.id.clone())
             .collect();
-        ids.iter().for_each(|id| self.complete(id));
+        for id in &ids {
+            self.complete(id);
+        }
     }
 
     /// Master control keeps its order only between the automatic modes (MODE-05).
@@ -168,7 +170,7 @@ impl Agv {
             let position = super::action_kinds::LOAD_POSITIONS[0].to_owned();
             self.loads.push(super::Load {
                 id: id.to_owned(),
-                load_type: load_type.to_owned(),
+                kind: load_type.to_owned(),
                 position,
             });
         }

@@ -331,7 +331,7 @@ impl Agv {
             };
             self.loads.push(Load {
                 id: given("loadId", ""),
-                load_type: given("loadType", "EPAL"),
+                kind: given("loadType", "EPAL"),
                 position: given("lhd", LOAD_POSITIONS[0]),
             });
         }

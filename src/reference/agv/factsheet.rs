@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::ability::SLOWEST;
 use super::action_kinds::{self, ActionKind, Deed, LOAD_POSITIONS, MAX_HEIGHT};
 use super::errors::MAX_ERRORS;
 use super::faults::FaultName as F;
@@ -78,9 +79,9 @@ impl Agv {
 
     fn physical_parameters(&self) -> Value {
         let mut parameters = json!({
-            "speedMin": 0.01,
+            "speedMin": SLOWEST,
             "speedMax": self.config.speed,
-            "angularSpeedMin": 0.01,
+            "angularSpeedMin": SLOWEST,
             "angularSpeedMax": self.config.rotation_speed,
             "accelerationMax": 2.0,
             "decelerationMax": 2.0,

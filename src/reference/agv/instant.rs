@@ -116,9 +116,9 @@ impl Agv {
             .and_then(|action| action.kind)
             .is_some_and(|kind| kind.lasting);
         if lasting {
-            self.run_action(id)
+            self.run_action(id);
         } else {
-            self.complete(id)
+            self.complete(id);
         }
     }
 

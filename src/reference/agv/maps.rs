@@ -151,8 +151,18 @@ impl Maps {
 /// Whether the file has the announced SHA-256, in hexadecimal; no announcement fits every file (MAP-34).
 pub(super) fn hash_fits(file: &[u8], announced: &str) -> bool {
     let digest = Sha256::digest(file);
-    let hexadecimal: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-    announced.is_empty() || announced.eq_ignore_ascii_case(&hexadecimal)
+    let mut pairs = announced.as_bytes().chunks(2);
+    let byte = |pair: &[u8]| {
+        std::str::from_utf8(pair)
+            .ok()
+            .and_then(|pair| u8::from_str_radix(pair, 16).ok())
+    };
+    let fits = announced.len() == 2 * digest.len()
+        && announced.bytes().all(|digit| digit.is_ascii_hexdigit())
+        && digest
+            .iter()
+            .all(|expected| pairs.next().and_then(byte) == Some(*expected));
+    announced.is_empty() || fits
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! The reference AGV: a complete vehicle as a sans-IO state machine, "the best-behaved vehicle there is".
 //!
-//! Written from the standard. The parts, by idea: [`acceptance`] decides about orders (figure 8), [`book`] holds
-//! the order, [`progress`] drives it, [`cancel`] ends it (figure 9); [`actions`] knows when an action runs and
+//! Written from the standard. The parts, by idea: [`acceptance`], with [`ability`] and [`rejection`], decides about orders
+//! (figure 8), [`book`] holds the order, [`progress`] drives it, [`cancel`] ends it (figure 9); [`actions`] knows when an action runs and
 //! [`deeds`] what it does; [`instant`] takes instant actions, [`commands`] what people do to the vehicle;
 //! [`connection`] and [`report`] speak to the broker. Every deviation from good behaviour is in [`faults`].
 
+mod ability;
 mod acceptance;
 mod action_kinds;
 mod actions;
@@ -24,6 +25,7 @@ mod motion;
 mod order_message;
 mod progress;
 mod read;
+mod rejection;
 mod report;
 #[cfg(test)]
 mod tests;
@@ -92,7 +94,7 @@ impl Holds {
 #[derive(Clone, Debug, PartialEq)]
 struct Load {
     id: String,
-    load_type: String,
+    kind: String,
     position: String,
 }
 

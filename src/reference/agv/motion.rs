@@ -64,9 +64,11 @@ pub(super) struct Motion {
     pub(super) reached: bool,
 }
 
-/// Time for a way at a speed; never zero speed, never endless.
+/// Time for a way at a speed: never endless, and in whole microseconds, as moments are.
 fn lasting(way: f64, speed: f64) -> Duration {
-    Duration::try_from_secs_f64((way / speed.max(0.001)).clamp(0.0, 1e6)).unwrap_or_default()
+    let micros = (way / speed.max(0.001)).clamp(0.0, 1e6) * 1e6;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped above")]
+    Duration::from_micros(micros.ceil() as u64)
 }
 
 impl Motion {

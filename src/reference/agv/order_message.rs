@@ -7,6 +7,9 @@ use super::read::{Defect, Fields};
 /// Slack for angles written with few digits, such as 3.1416.
 const ANGLE: f64 = std::f64::consts::PI + 0.01;
 
+/// Coordinates beyond this are no place on earth, in metres.
+const FARTHEST: f64 = 1e8;
+
 /// What may go on beside an action (section 6.12).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Blocking {
@@ -89,10 +92,10 @@ pub(super) struct Position {
 impl Position {
     fn read(value: &Value, path: &str) -> Result<Self, Defect> {
         let fields = Fields::open(value, path)?;
-        fields.optional("mapDescription", |fields, key| fields.text(key))?;
+        fields.optional("mapDescription", Fields::text)?;
         Ok(Self {
-            x: fields.number("x")?,
-            y: fields.number("y")?,
+            x: fields.number_in("x", -FARTHEST, FARTHEST)?,
+            y: fields.number_in("y", -FARTHEST, FARTHEST)?,
             theta: fields.optional("theta", |fields, key| fields.number_in(key, -ANGLE, ANGLE))?,
             allowed_deviation: fields
                 .optional("allowedDeviationXY", |fields, key| fields.number_in(key, 0.0, f64::MAX))?,
@@ -155,7 +158,7 @@ impl Order {
         let fields = Fields::open(message, "")?;
         read_header(&fields)?;
         let mut unsupported = Vec::new();
-        if fields.optional("zoneSetId", |fields, key| fields.text(key))?.is_some() {
+        if fields.optional("zoneSetId", Fields::text)?.is_some() {
             unsupported.push("zoneSetId".to_owned());
         }
         let nodes = fields
@@ -234,7 +237,7 @@ fn read_actions(fields: &Fields<'_>) -> Result<Vec<ActionRequest>, Defect> {
 }
 
 fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
-    fields.optional("nodeDescription", |fields, key| fields.text(key))?;
+    fields.optional("nodeDescription", Fields::text)?;
     let sent_position = fields.raw("nodePosition").cloned();
     let position = fields
         .raw("nodePosition")
@@ -252,8 +255,8 @@ fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
 }
 
 fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge, Defect> {
-    fields.optional("edgeDescription", |fields, key| fields.text(key))?;
-    fields.optional("length", |fields, key| fields.number(key))?;
+    fields.optional("edgeDescription", Fields::text)?;
+    fields.optional("length", Fields::number)?;
     for key in UNSUPPORTED_EDGE_FIELDS {
         if fields.has(key) {
             unsupported.push(fields.at(key));
@@ -275,9 +278,9 @@ fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge,
         max_speed: fields.optional("maxSpeed", limit)?,
         max_height: fields.optional("maxHeight", limit)?,
         max_rotation_speed: fields.optional("maxRotationSpeed", limit)?,
-        orientation: fields.optional("orientation", |fields, key| fields.number(key))?,
+        orientation: fields.optional("orientation", Fields::number)?,
         global,
-        rotation_allowed: fields.optional("rotationAllowed", |fields, key| fields.boolean(key))?,
+        rotation_allowed: fields.optional("rotationAllowed", Fields::boolean)?,
         actions: read_actions(fields)?,
     })
 }

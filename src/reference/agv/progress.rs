@@ -12,6 +12,9 @@ use super::{Agv, Mode, motion};
 /// An orientation is right within this, in radians.
 const ALIGNED: f64 = 1e-3;
 
+/// No orientation is asked for more exactly than this, in radians.
+const EXACT: f64 = 1e-6;
+
 /// How far onto an edge the vehicle rolls out before an action that stops it begins, in metres.
 const BRAKING: f64 = 0.3;
 
@@ -223,7 +226,7 @@ impl Agv {
                 .and_then(|position| position.allowed_deviation_theta)
                 .unwrap_or(0.0);
             let allowed = if allowed > 0.0 {
-                allowed
+                allowed.max(EXACT)
             } else {
                 self.config.tolerance_theta
             };
@@ -247,7 +250,9 @@ impl Agv {
         let sequence_id = stop.node.sequence_id;
         self.motion.reached = false;
         self.book.entered = false;
-        while let Some(edge) = self.book.edges.pop_front_if(|edge| edge.sequence_id < sequence_id) {
+        let behind = |edge: &Edge| edge.sequence_id < sequence_id;
+        while self.book.edges.front().is_some_and(behind) {
+            let Some(edge) = self.book.edges.pop_front() else { break };
             if self.faults.has(F::EdgeActionsLate) {
                 self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
             } else if !self.faults.has(F::EdgeActionOutlivesEdge) {

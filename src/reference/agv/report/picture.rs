@@ -223,7 +223,7 @@ impl Agv {
         let picture = |load: &Load| {
             json!({
                 "loadId": load.id,
-                "loadType": load.load_type,
+                "loadType": load.kind,
                 "loadPosition": load.position,
                 "boundingBoxReference": { "x": 0.0, "y": 0.0, "z": 0.0 },
                 "loadDimensions": { "length": 1.2, "width": 0.8, "height": MAX_HEIGHT / 2.0 },

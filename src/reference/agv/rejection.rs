@@ -1,0 +1,144 @@
+//! Why an order is not taken over, and how the vehicle reports that (section 6.6.4).
+
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::Agv;
+use super::errors::{ActiveError, Life};
+use super::faults::FaultName as F;
+use super::read::Defect;
+
+/// Which rule refused an order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rule {
+    Malformed,
+    Unable,
+    Memory,
+    UnknownMap,
+    OtherOrderActive,
+    StartOutOfRange,
+    Outdated,
+    BrokenUpdate,
+    /// Never raised by a faultless vehicle.
+    Duplicate,
+}
+
+/// An order that is not taken over.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Refusal {
+    rule: Rule,
+    reason: String,
+    /// What in the message is wrong.
+    culprits: Vec<(String, String)>,
+}
+
+impl Refusal {
+    pub(super) fn new(rule: Rule, reason: &str) -> Self {
+        Self {
+            rule,
+            reason: reason.to_owned(),
+            culprits: Vec::new(),
+        }
+    }
+
+    pub(super) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
+        self.culprits.push((key.to_owned(), value.into()));
+        self
+    }
+
+    pub(super) fn at_field(rule: Rule, reason: &str, path: &str) -> Self {
+        Self::new(rule, reason).naming("field", path)
+    }
+}
+
+impl From<Defect> for Refusal {
+    fn from(defect: Defect) -> Self {
+        let reason = format!("{} {}", defect.path, defect.reason);
+        Self::at_field(Rule::Malformed, &reason, &defect.path)
+    }
+}
+
+impl Agv {
+    /// Reports a refusal; nothing else changes (ORD-FLOW-12).
+    pub(super) fn refuse(&mut self, message: &Value, refusal: Refusal) {
+        self.refusal_side_effects(message, refusal.rule);
+        if self.faults.has(F::RejectionSilent) {
+            return;
+        }
+        let names = &self.config.errors;
+        let name = match refusal.rule {
+            Rule::Malformed if self.faults.has(F::ValidationErrorMisspelled) => "validationOrder",
+            Rule::Malformed => &names.validation,
+            Rule::Unable if self.faults.has(F::OrderErrorAsValidation) => &names.validation,
+            Rule::Unable => &names.order,
+            Rule::Memory => &names.memory,
+            Rule::UnknownMap => &names.unknown_map,
+            Rule::OtherOrderActive => &names.other_order_active,
+            Rule::StartOutOfRange => &names.start_out_of_range,
+            Rule::Outdated if self.faults.has(F::OutdatedUpdateMisnamed) => &names.validation,
+            Rule::Outdated | Rule::Duplicate => &names.outdated_update,
+            Rule::BrokenUpdate => &names.broken_update,
+        };
+        let fatal = match refusal.rule {
+            Rule::Malformed => self.faults.has(F::ValidationErrorFatal),
+            Rule::Unable => self.faults.has(F::OrderErrorFatal),
+            Rule::Outdated => self.faults.has(F::OutdatedUpdateFatal),
+            _ => false,
+        };
+        let (early, short) = match refusal.rule {
+            Rule::Malformed => (self.faults.has(F::ValidationErrorDroppedEarly), false),
+            Rule::Unable => (self.faults.has(F::OrderErrorDroppedEarly), false),
+            Rule::Outdated | Rule::BrokenUpdate | Rule::Duplicate => (false, true),
+            _ => (false, false),
+        };
+        let life = match (early, short) {
+            (true, _) => Life::Until(self.moment() + Duration::from_secs(1)),
+            (_, true) => Life::Until(self.moment() + self.config.error_duration),
+            _ => Life::UntilNewOrder,
+        };
+        let mut references = message_references(message);
+        references.extend(refusal.culprits);
+        if self.faults.has(F::UpdateIdUnreferenced) {
+            references.retain(|(key, _)| key != "orderUpdateId");
+        }
+        if refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorUnreferenced) {
+            references.clear();
+        }
+        let error = ActiveError {
+            error_type: name.to_owned(),
+            fatal,
+            references,
+            description: refusal.reason,
+            life,
+        };
+        self.errors.raise(error);
+    }
+
+    /// What a faulty vehicle changes when it refuses an order.
+    fn refusal_side_effects(&mut self, message: &Value, rule: Rule) {
+        let taken = rule == Rule::Malformed && self.faults.has(F::MalformedTakenOver)
+            || rule != Rule::Outdated && self.faults.has(F::RejectedIdReported);
+        if let Some(id) = message.get("orderId").and_then(Value::as_str).filter(|_| taken) {
+            id.clone_into(&mut self.book.order_id);
+        }
+        if self.faults.has(F::RejectionStopsOrder)
+            || (rule == Rule::Outdated && self.faults.has(F::OutdatedUpdateDropsOrder))
+        {
+            self.give_up_order();
+        }
+    }
+}
+
+/// References that identify the message, as far as it can be read (BP-02).
+fn message_references(message: &Value) -> Vec<(String, String)> {
+    let mut references = vec![("topic".to_owned(), "order".to_owned())];
+    for key in ["headerId", "orderId", "orderUpdateId"] {
+        match message.get(key) {
+            Some(Value::String(text)) => references.push((key.to_owned(), text.chars().take(256).collect())),
+            Some(Value::Number(number)) => references.push((key.to_owned(), number.to_string())),
+            _ => {}
+        }
+    }
+    references
+}
