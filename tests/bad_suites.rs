@@ -59,11 +59,7 @@ fn every_bad_suite_yields_the_one_diagnostic_it_expects() {
     let assets = Assets::embedded();
     let packs = Packs::load(&assets).expect("packs");
     let catalogue = Catalogue::load(&assets).expect("catalogue");
-    let vocabulary = PackVocabulary {
-        packs: &packs,
-        catalogue: &catalogue,
-        hooks: &HOOKS,
-    };
+    let vocabulary = PackVocabulary::new(&packs, &catalogue, &HOOKS);
     let mut count = 0;
     let mut others = String::new();
     insta::glob!("../fixtures/bad-suites", "*.yaml", |path| {

@@ -79,7 +79,9 @@ fn mistakes_of_form_are_refused() {
     for path in files {
         let text = std::fs::read_to_string(&path).expect("text");
         let code = text.lines().next().and_then(|line| line.strip_prefix("# expect: "));
-        let (Some(code), Some(value)) = (code, read(&path)) else { continue };
+        let (Some(code), Some(value)) = (code, read(&path)) else {
+            continue;
+        };
         if OF_FORM.contains(&code) {
             assert!(!schema.is_valid(&value), "{} is taken", path.display());
             refused += 1;

@@ -1,5 +1,7 @@
 //! Filling `${case.x}` and `${with.x}` into the tree, before anything is read from it.
 
+use std::borrow::Cow;
+
 use super::fields::Problems;
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::yaml::{self, Kind, Node};
@@ -7,9 +9,11 @@ use crate::yaml::{self, Kind, Node};
 /// Values to fill in, under `case` or `with`.
 pub(super) struct Fill<'a> {
     /// `case` or `with`.
-    pub(super) root: &'static str,
+    root: &'static str,
+    /// How a variable of this root begins.
+    opening: String,
     /// The mapping of names to values.
-    pub(super) values: &'a [(Node, Node)],
+    values: &'a [(Node, Node)],
     /// Which of them were used.
     pub(super) used: Vec<bool>,
 }
@@ -19,8 +23,18 @@ impl<'a> Fill<'a> {
     pub(super) fn new(root: &'static str, values: &'a [(Node, Node)]) -> Self {
         Self {
             root,
+            opening: format!("${{{root}."),
             values,
             used: vec![false; values.len()],
+        }
+    }
+
+    /// As [`Fill::apply`], sparing the copy where the text has no variable of this root.
+    pub(super) fn apply_to<'n>(&mut self, node: &'n Node, problems: &mut Problems) -> Cow<'n, Node> {
+        if node.span.source.text.contains(&self.opening) {
+            Cow::Owned(self.apply(node, problems))
+        } else {
+            Cow::Borrowed(node)
         }
     }
 
@@ -66,14 +80,13 @@ impl<'a> Fill<'a> {
     }
 
     fn text(&mut self, text: &str, at: &Node, problems: &mut Problems) -> Filled {
-        let opening = format!("${{{}.", self.root);
-        if !text.contains(&opening) {
+        if !text.contains(&self.opening) {
             return Filled::Untouched;
         }
         let mut filled = String::new();
         let mut rest = text;
-        while let Some(start) = rest.find(&opening) {
-            let name_from = start + opening.len();
+        while let Some(start) = rest.find(&self.opening) {
+            let name_from = start + self.opening.len();
             let Some(length) = rest[name_from..].find('}') else {
                 break;
             };

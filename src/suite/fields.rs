@@ -66,8 +66,13 @@ impl Problems {
     pub(super) fn into_sorted(self) -> Vec<Diagnostic> {
         let mut sorted: Vec<Diagnostic> = Vec::new();
         for diagnostic in self.found {
-            // An inlined state or a row of a table repeats the mistake of the one place.
-            if !sorted.contains(&diagnostic) {
+            // An inlined state or a row of a table repeats the mistake of the one place, maybe for another version.
+            let repeated = sorted.iter().any(|other| {
+                other.code == diagnostic.code
+                    && other.span == diagnostic.span
+                    && (other.span.is_some() || other == &diagnostic)
+            });
+            if !repeated {
                 sorted.push(diagnostic);
             }
         }

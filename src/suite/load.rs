@@ -169,12 +169,69 @@ pub(super) fn load_text<'a>(
             .unwrap_or_default()
             .to_owned();
         states.read(&own, &source, &mut problems);
+        lint_state(&own, &source, &states, vocabulary, known, &mut problems);
     } else {
         let read = read_test(&source, None, &states, vocabulary, known, &mut problems);
         suites.tests.extend(read.into_iter().map(Arc::new));
     }
     let problems = problems.into_sorted();
     if problems.is_empty() { Ok(suites) } else { Err(problems) }
+}
+
+/// Lints a state as the preamble of a test of all versions. One that waits for values of its user cannot be linted
+/// without them.
+fn lint_state(
+    name: &str,
+    source: &Arc<Source>,
+    states: &States,
+    vocabulary: &dyn Vocabulary,
+    known: &[CheckInfo],
+    problems: &mut Problems,
+) {
+    let Some(steps) = states.steps_of(name) else { return };
+    if source.text.contains("${with.") {
+        return;
+    }
+    let Some(spec) = vocabulary
+        .versions()
+        .first()
+        .and_then(|version| format!(">={version}").parse().ok())
+    else {
+        return;
+    };
+    let before = problems.len();
+    let mut reader = StepReader {
+        states,
+        inside: vec![name.to_owned()],
+        problems: &mut *problems,
+    };
+    let given = reader.steps(steps, "steps", None);
+    let places = HeaderPlaces {
+        start: steps.span.clone(),
+        spec: None,
+        moves: None,
+        needs: Vec::new(),
+        complete: false,
+    };
+    let test = Test {
+        id: name.to_owned(),
+        group: String::new(),
+        title: String::new(),
+        device: Role::Agv,
+        spec,
+        needs: Vec::new(),
+        moves: true,
+        maturity: Maturity::Watchlist,
+        why: String::new(),
+        given,
+        steps: Vec::new(),
+        finally: Vec::new(),
+        source: Arc::clone(source),
+        course: super::model::CourseNeed::default(),
+    };
+    if problems.len() == before {
+        lint::test(&test, &places, vocabulary, known, problems);
+    }
 }
 
 fn parse(source: &Arc<Source>, problems: &mut Problems) -> Option<Node> {
@@ -309,8 +366,8 @@ fn read_test(
     };
     let nothing: &[(Node, Node)] = &[];
     let Some(cases) = fields.get("cases", problems) else {
-        let root = Fill::new("case", nothing).apply(&root, problems);
-        let root = Fill::new("with", nothing).apply(&root, problems);
+        let root = Fill::new("case", nothing).apply_to(&root, problems);
+        let root = Fill::new("with", nothing).apply_to(&root, problems);
         return reader.read(&root, None, problems).into_iter().collect();
     };
     let before_rows = problems.len();
@@ -334,7 +391,7 @@ fn read_test(
     for (name, values) in &rows {
         let mut fill = Fill::new("case", values);
         let filled = fill.apply(&without_cases, problems);
-        let filled = Fill::new("with", nothing).apply(&filled, problems);
+        let filled = Fill::new("with", nothing).apply_to(&filled, problems);
         for ((key, _), is_used) in values.iter().zip(&fill.used) {
             used.entry(key.text().unwrap_or_default())
                 .or_insert((false, &key.span))

@@ -58,11 +58,7 @@ impl Suites {
         checks: &[CheckInfo],
         hooks: &[HookFacts],
     ) -> Result<Self, Vec<Diagnostic>> {
-        let vocabulary = PackVocabulary {
-            packs,
-            catalogue,
-            hooks,
-        };
+        let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
         load::load(files(assets), &vocabulary, checks)
     }
 
@@ -80,11 +76,7 @@ impl Suites {
         checks: &[CheckInfo],
         hooks: &[HookFacts],
     ) -> Result<Self, Vec<Diagnostic>> {
-        let vocabulary = PackVocabulary {
-            packs,
-            catalogue,
-            hooks,
-        };
+        let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
         load::load_text(name, text, files(assets), &vocabulary, checks)
     }
 

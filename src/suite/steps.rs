@@ -190,7 +190,7 @@ impl StepReader<'_> {
             })
         });
         let mut fill = Fill::new("with", values);
-        let filled = fill.apply(body, self.problems);
+        let filled = fill.apply_to(body, self.problems);
         for ((key, _), used) in values.iter().zip(&fill.used) {
             if !used {
                 let name = key.text().unwrap_or_default();

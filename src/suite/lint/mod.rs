@@ -310,7 +310,7 @@ impl Linter<'_> {
                 "other-role",
                 at,
                 format!("`{id}` does not oblige the {role}"),
-                format!("this is about the {role}"),
+                format!("the {role} is under test here"),
             );
         }
         let having: Vec<usize> = packs

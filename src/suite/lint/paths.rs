@@ -1,5 +1,7 @@
 //! Patterns held against the schema of a topic: paths, words, types and operators.
 
+use std::rc::Rc;
+
 use serde_json::Value;
 
 use super::pictures;
@@ -16,9 +18,9 @@ pub(super) struct Topic<'a> {
 }
 
 impl Topic<'_> {
-    fn shape(&self, path: &[&str]) -> Option<Shape> {
+    fn shape(&self, path: &[&str]) -> Option<Rc<Shape>> {
         if pictures::has(self.name) {
-            return pictures::shape(self.name, path);
+            return pictures::shape(self.name, path).map(Rc::new);
         }
         self.vocabulary.shape(self.pack, self.name, path)
     }
@@ -74,13 +76,20 @@ impl Topic<'_> {
     fn unknown_path(&self, path: &[&str], span: &Span) -> Diagnostic {
         let (name, parent) = path.split_last().unwrap_or((&"", &[]));
         let members = self.members(parent);
+        let versions = self.vocabulary.versions();
+        let elsewhere = (0..versions.len())
+            .filter(|pack| self.vocabulary.shape(*pack, self.name, path).is_some())
+            .find_map(|pack| versions.get(pack));
         Diagnostic::new(
             "unknown-path",
             span.clone(),
             format!("{} has no member `{name}` in {}", self.at(parent), self.version()),
             "not in the schema",
         )
-        .hint(did_you_mean(name, members.iter().map(String::as_str)))
+        .hint(match elsewhere {
+            Some(version) => format!("{version} has it: narrow `spec:`, of the test or of this step"),
+            None => did_you_mean(name, members.iter().map(String::as_str)),
+        })
     }
 
     fn pattern<'p>(&self, pattern: &'p Pattern, place: &mut Place<'p>, found: &mut Vec<Diagnostic>) {

@@ -290,6 +290,12 @@ impl<'a> Scope<'a> {
             Some(serde_json::Value::Object(members)) => members.keys().cloned().collect(),
             _ => Vec::new(),
         };
+        let elsewhere = self
+            .vocabulary
+            .versions()
+            .into_iter()
+            .enumerate()
+            .find(|(pack, _)| self.vocabulary.word(*pack, path).is_some());
         Some(
             Diagnostic::new(
                 "unknown-variable",
@@ -297,7 +303,12 @@ impl<'a> Scope<'a> {
                 format!("unknown variable `${{{name}}}`"),
                 format!("not in the vocabulary of {version}"),
             )
-            .hint(did_you_mean(last, siblings.iter().map(String::as_str))),
+            .hint(match elsewhere {
+                Some((_, version)) if !path.is_empty() => {
+                    format!("{version} has it: narrow `spec:`, of the test or of this step")
+                }
+                _ => did_you_mean(last, siblings.iter().map(String::as_str)),
+            }),
         )
     }
 }

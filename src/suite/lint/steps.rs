@@ -132,7 +132,7 @@ impl Linter<'_> {
         for status in walk.stations.iter().flat_map(|station| &station.statuses) {
             let odd = packs.iter().find_map(|pack| {
                 let shape = vocabulary.shape(*pack, "state", &["actionStates", "actionStatus"])?;
-                shape.literals.filter(|literals| !literals.contains(status))
+                shape.literals.clone().filter(|literals| !literals.contains(status))
             });
             if let Some(literals) = odd {
                 let names = literals.iter().map(String::as_str);

@@ -1,5 +1,9 @@
 //! What the linter asks the packs, the catalogue and the list of hooks.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
 use serde_json::Value;
 
 use crate::pack::{Catalogue, Packs, Role, Shape, Version};
@@ -31,7 +35,7 @@ pub trait Vocabulary {
     /// The topics of a pack and who publishes them.
     fn topics(&self, pack: usize) -> Vec<(String, Role)>;
     /// What the schema of a topic says about a path of member names; lists are entered without an index.
-    fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Shape>;
+    fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Rc<Shape>>;
     /// The members below a path.
     fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String>;
     /// A word of the vocabulary: `error.outdatedUpdate`.
@@ -46,12 +50,24 @@ pub trait Vocabulary {
 
 /// The names of the real packs and catalogue.
 pub struct PackVocabulary<'a> {
-    /// The protocol versions.
-    pub packs: &'a Packs,
-    /// The requirements.
-    pub catalogue: &'a Catalogue,
-    /// The hooks a profile can have.
-    pub hooks: &'a [HookFacts],
+    packs: &'a Packs,
+    catalogue: &'a Catalogue,
+    hooks: &'a [HookFacts],
+    /// Suites ask for the same few paths over and over, and a schema takes its time to answer.
+    shapes: RefCell<HashMap<String, Option<Rc<Shape>>>>,
+}
+
+impl<'a> PackVocabulary<'a> {
+    /// The names of these packs, this catalogue and the hooks a profile can have.
+    #[must_use]
+    pub fn new(packs: &'a Packs, catalogue: &'a Catalogue, hooks: &'a [HookFacts]) -> Self {
+        Self {
+            packs,
+            catalogue,
+            hooks,
+            shapes: RefCell::default(),
+        }
+    }
 }
 
 impl Vocabulary for PackVocabulary<'_> {
@@ -68,8 +84,22 @@ impl Vocabulary for PackVocabulary<'_> {
             .collect()
     }
 
-    fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Shape> {
-        self.packs.all().get(pack)?.schema(topic)?.shape(path)
+    fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Rc<Shape>> {
+        let schema = self.packs.all().get(pack)?.schema(topic)?;
+        // Member names of our schemas have no line breaks; those of a suite may, and then only miss the memory.
+        let mut key = format!("{pack}\n{topic}");
+        for name in path {
+            key.push('\n');
+            key.push_str(name);
+        }
+        if path.iter().any(|name| name.contains('\n')) {
+            return schema.shape(path).map(Rc::new);
+        }
+        self.shapes
+            .borrow_mut()
+            .entry(key)
+            .or_insert_with(|| schema.shape(path).map(Rc::new))
+            .clone()
     }
 
     fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String> {
