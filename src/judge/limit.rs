@@ -44,10 +44,7 @@ impl Limit {
                 })
             }
             Some(name) => millis(name).map(Self::exactly),
-            None => {
-                let value = time.term.bind(bindings).ok()?;
-                Some(Self::exactly(Duration::from_millis(value.as_u64()?)))
-            }
+            None => time.bind(bindings).ok().map(Self::exactly),
         }
     }
 

@@ -67,8 +67,9 @@ impl TestJudge {
     pub fn begin(test: &Arc<Test>, ground: &Ground, entry: &Entry, own: &Value) -> Self {
         let mut bindings = ground.bindings.clone();
         bindings.insert("vda".to_owned(), ground.pack.vocabulary().clone());
+        let mut bindings = Bindings::from(bindings);
         if let Some(own) = own.as_object() {
-            bindings.extend(own.clone());
+            bindings.extend(own);
         }
         let maturity = match test.maturity {
             Maturity::Watchlist => "watchlist",
@@ -77,7 +78,7 @@ impl TestJudge {
         let (seq, moment) = (entry.seq(), entry.at().moment);
         Self {
             test: Arc::clone(test),
-            bindings: Bindings::from(bindings),
+            bindings,
             entries: Vec::new(),
             begun: (seq, moment),
             mark: seq,

@@ -272,7 +272,6 @@ impl Selector {
         let (agreeing, total) = examination.score;
         let miss = examination.misses.into_iter().next();
         Some(Near {
-            seq: entry.seq(),
             share: if total == 0 {
                 0.0
             } else {
@@ -291,7 +290,6 @@ impl Selector {
 
 /// A message that came close.
 pub(super) struct Near {
-    pub(super) seq: u64,
     share: f64,
     pub(super) span: Option<Span>,
     pub(super) miss: Option<NearestMiss>,
