@@ -125,7 +125,6 @@ const DROP: &[Parameter] = &[
     optional("loadId", "STRING"),
     optional("height", "FLOAT"),
     optional("depth", "FLOAT"),
-    optional("side", "STRING"),
 ];
 const POSE: &[Parameter] = &[
     required("x", "FLOAT"),
@@ -305,7 +304,7 @@ pub(super) fn offered(config: &AgvConfig) -> impl Iterator<Item = &'static Actio
 
 fn is_offered(config: &AgvConfig, kind: &ActionKind) -> bool {
     let in_version = match kind.deed {
-        Deed::EnableMap | Deed::DownloadMap | Deed::DeleteMap => config.has("maps"),
+        Deed::EnableMap | Deed::DownloadMap | Deed::DeleteMap => config.has("mapActions"),
         Deed::FactsheetRequest => config.has("factsheetRequest"),
         _ => true,
     };

@@ -28,6 +28,9 @@ impl Agv {
         if let Some(action) = self.actions.get_mut(action_id) {
             action.status = Status::Running;
         }
+        if self.config.has("cancelRunsFromReceipt") {
+            self.flush();
+        }
     }
 
     /// No order, or one that was cancelled before (ORD-CANCEL-18 to ORD-CANCEL-20).

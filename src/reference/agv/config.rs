@@ -100,7 +100,8 @@ pub struct AgvConfig {
     pub version: String,
     /// Full topic by topic name. A topic that is missing is neither subscribed nor published.
     pub topics: BTreeMap<String, String>,
-    /// Features of the protocol version: `maps` (maps in the state and their actions), `factsheetRequest`.
+    /// Features of the protocol version, by the names the packs use: `maps` (in the state), `mapActions`,
+    /// `factsheetRequest`, `retainedFactsheet`, `vehicleConfig`, `localizationParameters`, `cancelRunsFromReceipt`.
     pub features: BTreeSet<String>,
     /// Names of errors.
     pub errors: ErrorNames,
@@ -179,7 +180,15 @@ impl Default for AgvConfig {
             serial_number: "agv-1".into(),
             version: String::new(),
             topics: BTreeMap::new(),
-            features: ["maps", "factsheetRequest"].map(String::from).into(),
+            features: [
+                "maps",
+                "mapActions",
+                "factsheetRequest",
+                "retainedFactsheet",
+                "vehicleConfig",
+            ]
+            .map(String::from)
+            .into(),
             errors: ErrorNames::default(),
             without_actions: BTreeSet::new(),
             nodes,

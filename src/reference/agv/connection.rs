@@ -218,7 +218,7 @@ impl Agv {
             ),
             "factsheet" => (
                 if self.faults.has(F::FactsheetQosTwo) { 2 } else { 0 },
-                !self.faults.has(F::FactsheetNotRetained),
+                self.config.has("retainedFactsheet") && !self.faults.has(F::FactsheetNotRetained),
             ),
             "state" => (u8::from(self.faults.has(F::StateQosOne)), false),
             _ => (0, false),

@@ -51,16 +51,17 @@ impl Agv {
             "agvGeometry": self.geometry(),
             "loadSpecification": self.load_specification(),
         });
-        if self.config.has("maps") {
+        if self.config.has("localizationParameters") {
+            // Required by the elder schema, and empty for a vehicle without further parameters.
+            factsheet["localizationParameters"] = json!({});
+        }
+        if self.config.has("vehicleConfig") {
             let version = if self.faults.has(F::VersionsNumeric) {
                 json!(1.0)
             } else {
                 json!(env!("CARGO_PKG_VERSION"))
             };
             factsheet["vehicleConfig"] = json!({ "versions": [{ "key": "softwareVersion", "value": version }] });
-        } else {
-            // Required by the elder schema, and empty for a vehicle without further parameters.
-            factsheet["localizationParameters"] = json!({});
         }
         factsheet
     }
@@ -183,7 +184,7 @@ impl Agv {
         if let Some(result) = kind.result {
             picture.insert("resultDescription".into(), json!(result));
         }
-        if self.config.has("maps") {
+        if self.config.has("vehicleConfig") {
             picture.insert("blockingTypes".into(), json!(["NONE", "SOFT", "HARD"]));
         }
         Value::Object(picture)
