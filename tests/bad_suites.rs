@@ -4,6 +4,9 @@
 //! `suites/agv/bad/<name>.yaml`, a `monitor-…` below `suites/monitors/`, a `state-…` below `suites/states/` with
 //! a test that uses it. Every other mistake in it would be a second diagnostic, and the test would fail.
 
+#![allow(clippy::expect_used, clippy::panic)]
+
+use std::fmt::Write;
 use std::path::Path;
 
 use vda5050_tck::diagnostic::Diagnostic;
@@ -73,10 +76,10 @@ fn every_bad_suite_yields_the_one_diagnostic_it_expects() {
         let problems = Suites::load_files(files, &vocabulary, &CHECKS)
             .err()
             .unwrap_or_default();
-        let rendered: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
+        let rendered = problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
         let codes: Vec<&str> = problems.iter().map(|problem: &Diagnostic| problem.code).collect();
         if codes != [expected] {
-            others += &format!("{name}: {expected} was expected\n{rendered}\n");
+            let _ = writeln!(others, "{name}: {expected} was expected\n{rendered}");
         }
         insta::assert_snapshot!("diagnostic", rendered);
     });

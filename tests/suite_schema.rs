@@ -1,5 +1,7 @@
 //! `schemas/suite.schema.json` agrees with the loader: it takes every good suite and refuses what it can see.
 
+#![allow(clippy::expect_used, clippy::panic)]
+
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;

@@ -305,25 +305,27 @@ fn joined(parts: impl Iterator<Item = Examination>) -> Examination {
     whole
 }
 
+/// Takes no more than is shown: a hostile value may be megabytes long.
+struct Limited(String);
+
+impl std::io::Write for Limited {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        if self.0.len() > TEXT_LIMIT * 4 {
+            return Err(std::io::ErrorKind::WriteZero.into());
+        }
+        self.0
+            .push_str(&String::from_utf8_lossy(&bytes[..bytes.len().min(TEXT_LIMIT * 8)]));
+        Ok(bytes.len())
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
 fn shown(value: Option<&Value>) -> String {
     let Some(value) = value else {
         return "nothing".to_owned();
     };
-    // Written no further than needed: a hostile value may be megabytes long.
-    struct Limited(String);
-    impl std::io::Write for Limited {
-        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            if self.0.len() > TEXT_LIMIT * 4 {
-                return Err(std::io::ErrorKind::WriteZero.into());
-            }
-            self.0
-                .push_str(&String::from_utf8_lossy(&bytes[..bytes.len().min(TEXT_LIMIT * 8)]));
-            Ok(bytes.len())
-        }
-        fn flush(&mut self) -> std::io::Result<()> {
-            Ok(())
-        }
-    }
     let mut limited = Limited(String::new());
     let _ = serde_json::to_writer(&mut limited, value);
     limited.0

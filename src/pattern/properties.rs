@@ -83,6 +83,7 @@ fn bound(value: &Value) -> Bound {
 }
 
 #[track_caller]
+#[expect(clippy::needless_pass_by_value, reason = "reads better with `json!` in place")]
 fn holds(picture: Value, message: Value) {
     let bound = bound(&picture);
     assert!(
@@ -94,6 +95,7 @@ fn holds(picture: Value, message: Value) {
 }
 
 #[track_caller]
+#[expect(clippy::needless_pass_by_value, reason = "reads better with `json!` in place")]
 fn fails(picture: Value, message: Value) {
     let bound = bound(&picture);
     assert!(

@@ -50,7 +50,7 @@ pub(super) fn time(node: &Node, problems: &mut Problems) -> Option<TimeTerm> {
         bad(problems, "not a duration", "a number and `ms`, `s` or `min`");
         return None;
     };
-    if !(millis >= 1.0 && millis <= LONGEST) {
+    if !(1.0..=LONGEST).contains(&millis) {
         problems.at(
             "duration-out-of-range",
             &node.span,

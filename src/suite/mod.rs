@@ -11,6 +11,7 @@ mod grammar;
 mod lint;
 mod load;
 pub mod model;
+mod read;
 mod steps;
 mod stimuli;
 mod terms;
@@ -35,6 +36,16 @@ pub struct CheckInfo {
     pub decides: &'static [&'static str],
     /// Names of arguments it takes.
     pub arguments: &'static [&'static str],
+}
+
+impl From<&crate::checks::Check> for CheckInfo {
+    fn from(check: &crate::checks::Check) -> Self {
+        Self {
+            name: check.name,
+            decides: check.decides,
+            arguments: check.arguments,
+        }
+    }
 }
 
 /// All tests and monitors, sorted by id.

@@ -287,11 +287,12 @@ fn route(node: &Node, problems: &mut Problems) -> Option<Route> {
         }
     }
     let way: Vec<&String> = base.iter().chain(&horizon).collect();
-    if let Some(pair) = way.windows(2).find(|pair| pair[0] == pair[1]) {
+    let to_itself = way.iter().zip(way.iter().skip(1)).find(|(from, to)| from == to);
+    if let Some((from, _)) = to_itself {
         problems.at(
             "bad-route",
             &node.span,
-            format!("the route goes from `{}` to itself", pair[0]),
+            format!("the route goes from `{from}` to itself"),
             "no edge leads there",
         );
     }

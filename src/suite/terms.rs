@@ -52,13 +52,11 @@ pub(super) fn term(node: &Node, problems: &mut Problems) -> Term {
 
 /// Named terms: the members of a mapping.
 pub(super) fn named_terms(node: &Node, problems: &mut Problems) -> Vec<(String, Term)> {
-    match term(node, problems).kind {
-        TermKind::Map(members) => members,
-        _ => {
-            problems.wrong_type(node, "a mapping");
-            Vec::new()
-        }
+    if let TermKind::Map(members) = term(node, problems).kind {
+        return members;
     }
+    problems.wrong_type(node, "a mapping");
+    Vec::new()
 }
 
 fn literal_key(key: &Node, problems: &mut Problems) -> Option<String> {

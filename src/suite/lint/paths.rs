@@ -137,10 +137,16 @@ impl Topic<'_> {
             PatternKind::List(_) if !can_be("array") => wrong(found, "a list"),
             PatternKind::List(items) => {
                 let entered = std::mem::replace(&mut place.entered, true);
-                items.iter().for_each(|item| self.pattern(item, place, found));
+                for item in items {
+                    self.pattern(item, place, found);
+                }
                 place.entered = entered;
             }
-            PatternKind::All(parts) => parts.iter().for_each(|part| self.pattern(part, place, found)),
+            PatternKind::All(parts) => {
+                for part in parts {
+                    self.pattern(part, place, found);
+                }
+            }
             PatternKind::Not(inner) => self.pattern(inner, place, found),
             PatternKind::Elements(_) | PatternKind::Includes(_) | PatternKind::Empty(_) | PatternKind::Count(_)
                 if !can_be("array") =>

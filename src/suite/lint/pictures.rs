@@ -141,7 +141,10 @@ pub(super) fn shape(topic: &str, path: &[&str]) -> Option<Shape> {
 
 /// The members below a path.
 pub(super) fn members(topic: &str, path: &[&str]) -> Vec<String> {
-    let prefix = path.iter().map(|part| format!("{part}.")).collect::<String>();
+    let mut prefix = path.join(".");
+    if !path.is_empty() {
+        prefix.push('.');
+    }
     members_of(topic)
         .unwrap_or_default()
         .iter()

@@ -1,0 +1,400 @@
+//! One file into tests or a monitor: header keys, the rows of a table, the rule.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::CheckInfo;
+use super::course::course_need;
+use super::expand::Fill;
+use super::fields::{Fields, Problems, text_of};
+use super::grammar::need;
+use super::lint::{self, HeaderPlaces, Vocabulary};
+use super::load::{States, parse};
+use super::model::{CourseNeed, Maturity, Monitor, Need, Rule, Test};
+use super::steps::{StepReader, check_use, checks, version_range};
+use super::terms::pattern;
+use crate::diagnostic::{Diagnostic, Source, Span};
+use crate::pack::{Role, VersionRange};
+use crate::yaml::{Kind, Node};
+
+const TEST_KEYS: &[&str] = &[
+    "test", "title", "device", "spec", "needs", "moves", "maturity", "why", "cases", "given", "steps", "finally",
+];
+const MONITOR_KEYS: &[&str] = &[
+    "monitor", "title", "device", "spec", "needs", "why", "checks", "check", "with", "topic", "always", "when", "never",
+];
+const ROLES: [(&str, Role); 2] = [("agv", Role::Agv), ("master-control", Role::MasterControl)];
+
+/// The first line of a file: where what is missing is shown.
+pub(super) fn start(root: &Node) -> Span {
+    match root.map().and_then(<[(Node, Node)]>::first) {
+        Some((key, _)) => key.span.clone(),
+        None => root.span.clone(),
+    }
+}
+
+/// Checks the name of a file against its path.
+pub(super) fn named(fields: &Fields<'_>, key: &str, name: &str, at: &Span, problems: &mut Problems) {
+    let Some(text) = fields.need_text(key, at, problems) else {
+        return;
+    };
+    if text != name
+        && let Some(node) = fields.get(key, problems)
+    {
+        problems.add(
+            Diagnostic::new(
+                "wrong-name",
+                node.span.clone(),
+                format!("`{key}` is not the path of the file"),
+                "named otherwise than its file",
+            )
+            .hint(format!("write `{key}: {name}`")),
+        );
+    }
+}
+
+/// What tests and monitors have in common.
+struct Header {
+    title: String,
+    device: Option<Role>,
+    spec: Option<VersionRange>,
+    needs: Vec<(Need, Span)>,
+    why: String,
+}
+
+fn header(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Header {
+    let owned = |text: Option<&str>| text.map(|text| text.trim().to_owned()).unwrap_or_default();
+    Header {
+        title: owned(fields.need_text("title", at, problems)),
+        device: fields.word("device", "unknown-device", &ROLES, problems),
+        spec: fields
+            .need("spec", at, problems)
+            .and_then(|node| version_range(node, problems)),
+        needs: fields
+            .list("needs", problems)
+            .iter()
+            .filter_map(|node| Some((need(node, problems)?, node.span.clone())))
+            .collect(),
+        why: owned(fields.need_text("why", at, problems)),
+    }
+}
+
+/// The tests of one file: one, or one per row of its table. `place` is the name and role that its path asks for.
+pub(super) fn read_test(
+    source: &Arc<Source>,
+    place: Option<(&str, Option<Role>)>,
+    states: &States,
+    vocabulary: &dyn Vocabulary,
+    known: &[CheckInfo],
+    problems: &mut Problems,
+) -> Vec<Test> {
+    let before = problems.len();
+    let Some(root) = parse(source, problems) else {
+        return Vec::new();
+    };
+    let Some(fields) = Fields::of(&root, problems) else {
+        return Vec::new();
+    };
+    fields.only(&[TEST_KEYS], problems);
+    let at = start(&root);
+    if let Some((name, _)) = place {
+        named(&fields, "test", name, &at, problems);
+    } else {
+        fields.need_text("test", &at, problems);
+    }
+    let role = place.and_then(|(_, role)| role);
+    let reader = TestReader {
+        source,
+        states,
+        vocabulary,
+        known,
+        role,
+        before,
+    };
+    let nothing: &[(Node, Node)] = &[];
+    let Some(cases) = fields.get("cases", problems) else {
+        let root = Fill::new("case", nothing).apply_to(&root, problems);
+        let root = Fill::new("with", nothing).apply_to(&root, problems);
+        return reader.read(&root, None, problems).into_iter().collect();
+    };
+    let before_rows = problems.len();
+    let rows = rows(cases, problems);
+    if problems.len() > before_rows {
+        return Vec::new();
+    }
+    let without_cases = Node {
+        kind: Kind::Map(
+            fields
+                .entries()
+                .iter()
+                .filter(|(key, _)| key.text() != Some("cases"))
+                .cloned()
+                .collect(),
+        ),
+        span: root.span.clone(),
+    };
+    let mut used: BTreeMap<&str, (bool, &Span)> = BTreeMap::new();
+    let mut tests = Vec::new();
+    for (name, values) in &rows {
+        let mut fill = Fill::new("case", values);
+        let filled = fill.apply(&without_cases, problems);
+        let filled = Fill::new("with", nothing).apply_to(&filled, problems);
+        for ((key, _), is_used) in values.iter().zip(&fill.used) {
+            used.entry(key.text().unwrap_or_default())
+                .or_insert((false, &key.span))
+                .0 |= is_used;
+        }
+        tests.extend(reader.read(&filled, Some(name), problems));
+    }
+    for (name, (is_used, span)) in used {
+        if !is_used {
+            problems.at(
+                "unused-value",
+                span,
+                format!("the case value `{name}` is not used"),
+                format!("no `${{case.{name}}}` in this test"),
+            );
+        }
+    }
+    tests
+}
+
+/// The rows of a table of cases, each with the same names.
+fn rows<'a>(cases: &'a Node, problems: &mut Problems) -> Vec<(&'a str, &'a [(Node, Node)])> {
+    let Some(fields) = Fields::of(cases, problems) else {
+        return Vec::new();
+    };
+    if fields.entries().is_empty() {
+        problems.at(
+            "empty-cases",
+            &cases.span,
+            "a table without rows",
+            "no test comes out of it",
+        );
+    }
+    let mut rows: Vec<(&str, &[(Node, Node)])> = Vec::new();
+    for (key, row) in fields.entries() {
+        let name = key.text().unwrap_or_default();
+        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+            problems.at(
+                "bad-name",
+                &key.span,
+                format!("`{}` cannot be the name of a case", super::fields::short(name)),
+                "letters, digits, `-`, `_` and `.`",
+            );
+        }
+        let Some(values) = row.map() else {
+            problems.wrong_type(row, "a mapping of values");
+            continue;
+        };
+        rows.push((name, values));
+    }
+    let names: Vec<&str> = {
+        let mut names = Vec::new();
+        for (key, _) in rows.iter().flat_map(|(_, values)| *values) {
+            let name = key.text().unwrap_or_default();
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    };
+    for (key, row) in fields.entries() {
+        for name in &names {
+            if row.map().is_some() && row.get(name).is_none() {
+                problems.at(
+                    "missing-case-value",
+                    &key.span,
+                    format!("this row has no value for `{name}`"),
+                    "every row has the same names",
+                );
+            }
+        }
+    }
+    rows
+}
+
+struct TestReader<'a> {
+    source: &'a Arc<Source>,
+    states: &'a States,
+    vocabulary: &'a dyn Vocabulary,
+    known: &'a [CheckInfo],
+    role: Option<Role>,
+    /// How many problems there were before this file.
+    before: usize,
+}
+
+impl TestReader<'_> {
+    fn read(&self, root: &Node, case: Option<&str>, problems: &mut Problems) -> Option<Test> {
+        let fields = Fields::of(root, problems)?;
+        let at = start(root);
+        let header = header(&fields, &at, problems);
+        fields.need("device", &at, problems);
+        if let (Some(device), Some(role), Some(node)) = (header.device, self.role, fields.get("device", problems))
+            && device != role
+        {
+            problems.at(
+                "wrong-name",
+                &node.span,
+                format!("a test for `{device}` among those for `{role}`"),
+                format!("the folder says `{role}`"),
+            );
+        }
+        let maturities = [("watchlist", Maturity::Watchlist), ("reviewed", Maturity::Reviewed)];
+        let maturity = fields
+            .word("maturity", "unknown-word", &maturities, problems)
+            .unwrap_or(Maturity::Watchlist);
+        let moves = fields.flag("moves", problems);
+        let mut reader = StepReader {
+            states: self.states,
+            inside: Vec::new(),
+            problems: &mut *problems,
+        };
+        let mut section = |key: &str| match fields.get(key, reader.problems) {
+            Some(node) => reader.steps(node, key, None),
+            None => Vec::new(),
+        };
+        let (given, steps, finally) = (section("given"), section("steps"), section("finally"));
+        if let Some(node) = fields.need("steps", &at, problems)
+            && node.list().is_some_and(<[Node]>::is_empty)
+        {
+            problems.at("empty-steps", &node.span, "a test without steps", "decides nothing");
+        }
+        let id = fields.text("test", &mut Problems::default())?.to_owned();
+        let group = id.split('/').next().unwrap_or_default().to_owned();
+        let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
+        let mut test = Test {
+            id: case.map_or_else(|| id.clone(), |case| format!("{id}[{case}]")),
+            group,
+            title: header.title,
+            device: header.device.or(self.role)?,
+            spec: header.spec?,
+            needs,
+            moves,
+            maturity,
+            why: header.why,
+            given,
+            steps,
+            finally,
+            source: Arc::clone(self.source),
+            course: CourseNeed::default(),
+        };
+        test.course = course_need(&test);
+        let value_place = |key: &str| fields.get(key, &mut Problems::default()).map(|node| node.span.clone());
+        let places = HeaderPlaces {
+            start: at,
+            spec: value_place("spec"),
+            moves: value_place("moves"),
+            needs: need_places,
+            complete: problems.len() == self.before,
+        };
+        lint::test(&test, &places, self.vocabulary, self.known, problems);
+        Some(test)
+    }
+}
+
+/// The monitor of a file. `name` is what its path asks for.
+pub(super) fn read_monitor(
+    source: &Arc<Source>,
+    name: Option<&str>,
+    vocabulary: &dyn Vocabulary,
+    known: &[CheckInfo],
+    problems: &mut Problems,
+) -> Option<Monitor> {
+    let root = parse(source, problems)?;
+    let fields = Fields::of(&root, problems)?;
+    fields.only(&[MONITOR_KEYS], problems);
+    let at = start(&root);
+    if let Some(name) = name {
+        named(&fields, "monitor", name, &at, problems);
+    }
+    let id = fields.need_text("monitor", &at, problems).map(str::to_owned);
+    let header = header(&fields, &at, problems);
+    let bindings = checks(&fields, problems);
+    if fields.need("checks", &at, problems).is_some() && bindings.is_empty() {
+        problems.at(
+            "decides-nothing",
+            &at,
+            "a monitor that decides nothing",
+            "`checks` is empty",
+        );
+    }
+    let rule = rule(&fields, &at, problems);
+    let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
+    let monitor = Monitor {
+        id: id?,
+        title: header.title,
+        device: header.device,
+        spec: header.spec?,
+        needs,
+        checks: bindings,
+        why: header.why,
+        rule: rule?,
+        source: Arc::clone(source),
+    };
+    let places = HeaderPlaces {
+        spec: fields
+            .get("spec", &mut Problems::default())
+            .map(|node| node.span.clone()),
+        start: at,
+        moves: None,
+        needs: need_places,
+        complete: true,
+    };
+    let topic_place = fields
+        .get("topic", &mut Problems::default())
+        .map(|node| node.span.clone());
+    lint::monitor(&monitor, &places, topic_place.as_ref(), vocabulary, known, problems);
+    Some(monitor)
+}
+
+fn rule(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Option<Rule> {
+    let written: Vec<&str> = ["check", "always", "never"]
+        .into_iter()
+        .filter(|key| fields.has(key))
+        .collect();
+    if written.len() != 1 {
+        problems.at(
+            "monitor-rule",
+            at,
+            "a monitor has one rule",
+            "needs one of `check:`, `always:` and `never:`",
+        );
+        return None;
+    }
+    let unneeded: &[&str] = match written[0] {
+        "check" => &["topic", "when"],
+        "always" => &["with"],
+        _ => &["with", "when"],
+    };
+    for key in unneeded {
+        if let Some(name) = fields.key(key) {
+            problems.at(
+                "conflicting-keys",
+                &name.span,
+                format!("`{key}` beside `{}`", written[0]),
+                "has no meaning here",
+            );
+        }
+    }
+    if written[0] == "check" {
+        return check_use(fields, problems).map(Rule::Check);
+    }
+    let topic = text_of(fields.need("topic", at, problems)?, problems)?.to_owned();
+    let picture = pattern(fields.get(written[0], problems)?, problems);
+    if written[0] == "never" {
+        return Some(Rule::Never {
+            topic,
+            pattern: picture?,
+        });
+    }
+    let when = match fields.get("when", problems) {
+        Some(node) => Some(pattern(node, problems)?),
+        None => None,
+    };
+    Some(Rule::Always {
+        topic,
+        when,
+        pattern: picture?,
+    })
+}
