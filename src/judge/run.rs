@@ -123,6 +123,12 @@ impl RunJudge {
         }
         match entry.event() {
             Event::Planned { plan } => self.plan = (**plan).clone(),
+            // Outside a test, a variable gets its value for the whole run.
+            Event::Bound { name, value } if self.current.is_none() => {
+                let mut bindings = crate::pattern::Bindings::from(std::mem::take(&mut self.ground.bindings));
+                bindings.set(name, value.clone());
+                self.ground.bindings = bindings.as_map().clone();
+            }
             Event::TestBegun { test, bindings } => {
                 self.break_off("the run went on without ending this test");
                 let found = self.test(test).ok_or_else(|| JudgeError::UnknownTest(test.clone()))?;

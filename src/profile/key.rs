@@ -95,6 +95,14 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "The vehicle carries loads, and one may be put on it during the run.",
     },
     Statement {
+        name: "no-charger-on-course",
+        doc: "There is no charger on any node of the course.",
+    },
+    Statement {
+        name: "map-hash",
+        doc: "The vehicle checks mapHash as SHA-256 in hexadecimal.",
+    },
+    Statement {
         name: "charges",
         doc: "The vehicle can charge on the course.",
     },
@@ -132,6 +140,8 @@ pub const KEYS: &[Key] = &[
     key("device.line-guided", Kind::Flag),
     key("device.free-navigation", Kind::Flag),
     key("device.carries-load", Kind::Flag),
+    key("device.no-charger-on-course", Kind::Flag),
+    key("device.map-hash", Kind::Flag),
     key("device.charges", Kind::Flag),
     key("device.long-action", Kind::Action),
     key("device.uninterruptible-action", Kind::Action),

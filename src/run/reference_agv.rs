@@ -66,6 +66,9 @@ impl ReferenceAgv {
                 map_version: "1".to_owned(),
                 enabled: true,
             }],
+            // Brisk, so that a run over real sockets takes a minute; slow enough to be caught between two nodes.
+            speed: 8.0,
+            rotation_speed: 8.0 * std::f64::consts::PI,
             ..AgvConfig::default()
         };
         let time = TimeLimits {
@@ -96,6 +99,8 @@ impl ReferenceAgv {
             ("long-action", true),
             ("uninterruptible-action", true),
             ("edge-actions", true),
+            ("no-charger-on-course", true),
+            ("map-hash", true),
             ("line-guided", false),
             ("free-navigation", true),
         ]
@@ -107,7 +112,7 @@ impl ReferenceAgv {
     /// `device.*` beside identity and factsheet: the actions tests may use for their own ends.
     #[must_use]
     pub fn device_bindings(&self) -> Map<String, Value> {
-        let action = |name: &str| json!({ "type": name, "parameters": { "duration": 1.0 } });
+        let action = |name: &str| json!({ "type": name, "parameters": { "duration": 0.5 } });
         let mut all = Map::new();
         all.insert("longAction".to_owned(), action("beep"));
         all.insert("uninterruptibleAction".to_owned(), action("calibrate"));

@@ -340,6 +340,11 @@ impl Link for MemoryLink {
         Ok(())
     }
 
+    fn command(&mut self, name: &str, parameters: serde_json::Value) -> bool {
+        MemoryLink::command(self, 0, name, parameters);
+        true
+    }
+
     async fn fresh_subscriber(&mut self, topic: &str) -> Result<u64, LinkError> {
         self.check()?;
         self.requests += 1;

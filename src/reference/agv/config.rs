@@ -139,6 +139,8 @@ pub struct AgvConfig {
     pub interruptible: bool,
     /// Whether the vehicle can stop between nodes when its order is cancelled.
     pub stops_between_nodes: bool,
+    /// Nodes with a charger.
+    pub chargers: BTreeSet<String>,
     /// Number of maps the vehicle can store.
     pub map_capacity: usize,
     /// Maps on board at first.
@@ -207,6 +209,7 @@ impl Default for AgvConfig {
             action_durations: BTreeMap::new(),
             interruptible: true,
             stops_between_nodes: true,
+            chargers: BTreeSet::new(),
             map_capacity: 8,
             maps: vec![OnboardMap {
                 map_id: "hall".into(),

@@ -185,7 +185,7 @@ impl Agv {
         match kind.deed {
             Deed::StartPause => self.start_pause(action),
             Deed::StopPause => self.stop_pause(action),
-            Deed::StartCharging => self.set_charging(true),
+            Deed::StartCharging => self.start_charging(action),
             Deed::StopCharging => self.set_charging(false),
             Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
@@ -266,6 +266,15 @@ impl Agv {
             (true, false) => self.actions.resume(moment),
             _ => {}
         }
+    }
+
+    /// Only where there is a charger (ACT-20).
+    fn start_charging(&mut self, action: &Action) -> Outcome {
+        let here = &self.book.last_node;
+        if !self.config.chargers.contains(here) && !self.faults.has(F::ChargesAnywhere) {
+            return Outcome::Failed(Problem::unable(action, "there is no charger here"));
+        }
+        self.set_charging(true)
     }
 
     fn set_charging(&mut self, on: bool) -> Outcome {

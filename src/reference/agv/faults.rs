@@ -208,6 +208,7 @@ faults! {
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Reports stopPause FINISHED although the button still holds it.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
+    ChargesAnywhere "charges-anywhere" ["ACT-20", "ACT-30"] "Reports that it charges where there is no charger.";
     ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23"] "Reports initPosition FINISHED and keeps its pose.";
     InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
