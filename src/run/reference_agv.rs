@@ -69,11 +69,14 @@ impl ReferenceAgv {
             // Brisk, so that a run over real sockets takes a minute; slow enough to be caught between two nodes.
             speed: 8.0,
             rotation_speed: 8.0 * std::f64::consts::PI,
+            keep_alive: Duration::from_secs(10),
+            reconnect_delay: Duration::from_millis(300),
+            state_interval: Duration::from_secs(5),
             ..AgvConfig::default()
         };
         let time = TimeLimits {
-            drive: Duration::from_secs(60),
-            quiet: Duration::from_millis(400),
+            drive: Duration::from_secs(10),
+            quiet: Duration::from_millis(200),
             settle: Duration::from_millis(300),
             reconnect: Duration::from_secs(20),
             connect: Duration::from_secs(20),
