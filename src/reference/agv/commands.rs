@@ -142,7 +142,7 @@ impl Agv {
 
     /// Pushed or steered by hand, which is only possible outside the automatic modes (MODE-06).
     fn move_to(&mut self, arguments: &Value) {
-        if self.mode.takes_orders() {
+        if self.mode.takes_orders() || self.faults.has(F::ManualPositionStale) {
             return;
         }
         let mut pose = self.motion.pose(self.moment());

@@ -174,8 +174,8 @@ impl Agv {
     fn forget_if_faulty(&mut self, id: &str) {
         let faults = self.faults;
         self.actions.retain(|action| {
-            let forgotten =
-                faults.has(F::FinishedActionsRemoved) || (faults.has(F::InstantActionsForgotten) && !action.of_order());
+            let forgotten = faults.has(F::FinishedActionsRemoved)
+                || (faults.has(F::FinishedInstantForgotten) && !action.of_order());
             action.request.id != id || !forgotten
         });
     }
@@ -261,7 +261,9 @@ impl Agv {
         let before = self.holds.any();
         change(&mut self.holds);
         let moment = self.moment();
+        let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
         match (before, self.holds.any()) {
+            (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
             (false, true) => self.actions.hold(moment, self.faults),
             (true, false) => self.actions.resume(moment),
             _ => {}

@@ -154,6 +154,7 @@ fn refused_orders(bench: &mut Bench) {
         ),
         with(route(), "/edges/0/trajectory", json!({})),
         with(route(), "/edges/0/orientation", json!(1.57)),
+        with(route(), "/edges/0/maxHeight", json!(0.5)),
         with(route(), "/nodes/1/nodePosition", place("moon")),
         route(),
     ];
@@ -283,6 +284,11 @@ fn instant_actions(bench: &mut Bench) {
 }
 
 fn held_by_hand(bench: &mut Bench) {
+    let beep = with(order("o1", 0, 0, "n1"), "/nodes/0/actions/-", beep("a", "NONE"));
+    bench.order(beep);
+    bench.command("violate-field", json!({}));
+    bench.wait(1.0);
+    bench.command("clear-field", json!({}));
     bench.command("press-pause", json!({}));
     bench.instant("stopPause", "s", json!({}));
     bench.wait(1.0);
@@ -296,6 +302,7 @@ fn modes(bench: &mut Bench) {
     bench.order(order("o1", 0, 0, "n1 n2"));
     bench.wait(0.5);
     bench.command("set-mode", json!({ "mode": "MANUAL" }));
+    bench.command("move-to", json!({ "x": 1.0 }));
     bench.wait(5.0);
 }
 
