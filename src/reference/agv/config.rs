@@ -61,6 +61,8 @@ pub struct ErrorNames {
     pub map: String,
     /// The pose cannot be taken over.
     pub localization: String,
+    /// Charging could not be started.
+    pub charging: String,
     /// pick or drop failed.
     pub load: String,
     /// The emergency stop is active.
@@ -83,6 +85,7 @@ impl Default for ErrorNames {
             instant_action: name("instantActionError"),
             map: name("mapError"),
             localization: name("localizationError"),
+            charging: name("chargingError"),
             load: name("loadError"),
             emergency_stop: name("emergencyStop"),
         }

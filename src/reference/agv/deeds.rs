@@ -20,6 +20,7 @@ enum Area {
     Map,
     Localization,
     Load,
+    Charging,
 }
 
 /// Why an action failed.
@@ -167,6 +168,7 @@ impl Agv {
             Area::Map => &names.map,
             Area::Localization => &names.localization,
             Area::Load => &names.load,
+            Area::Charging => &names.charging,
         };
         self.warn(name.clone(), problem.references.clone(), problem.reason.clone());
     }
@@ -185,8 +187,11 @@ impl Agv {
         match kind.deed {
             Deed::StartPause => self.start_pause(action),
             Deed::StopPause => self.stop_pause(action),
-            Deed::StartCharging => self.set_charging(true),
-            Deed::StopCharging => self.set_charging(false),
+            Deed::StartCharging => self.start_charging(action).into(),
+            Deed::StopCharging => {
+                self.charging = false;
+                Outcome::Done(None)
+            }
             Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
                 let result = self
@@ -270,9 +275,16 @@ impl Agv {
         }
     }
 
-    fn set_charging(&mut self, on: bool) -> Outcome {
-        self.charging = on && !self.faults.has(F::ChargingUnreported);
-        Outcome::Done(None)
+    /// The charger is at a node: there is none where the vehicle drives (ACT-20).
+    fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
+        if self.motion.is_moving() {
+            if self.faults.has(F::ChargingFailureFinished) {
+                return Ok(());
+            }
+            return Err(Problem::new(Area::Charging, action, "the vehicle is not at a charger"));
+        }
+        self.charging = !self.faults.has(F::ChargingUnreported);
+        Ok(())
     }
 
     fn init_position(&mut self, action: &Action) -> Result<(), Problem> {

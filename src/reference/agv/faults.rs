@@ -222,6 +222,7 @@ faults! {
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Reports stopPause FINISHED although the button still holds it.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
     ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
+    ChargingFailureFinished "charging-failure-finished" ["ACT-20"] "Reports startCharging FINISHED although there is no charger.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23"] "Reports initPosition FINISHED and keeps its pose.";
     InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
     InitPositionUnchecked "init-position-unchecked" ["ACT-25"] "Takes over a pose on a map it does not have.";

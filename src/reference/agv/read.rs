@@ -77,6 +77,16 @@ impl<'a> Fields<'a> {
         Ok(text)
     }
 
+    /// A string for people, of any length.
+    pub(super) fn prose(&self, key: &str) -> Result<(), Defect> {
+        let text = self.required(key)?.is_string();
+        if text {
+            Ok(())
+        } else {
+            Err(self.wrong(key, "is not a string"))
+        }
+    }
+
     /// A string that identifies something.
     pub(super) fn id(&self, key: &str) -> Result<String, Defect> {
         match self.text(key)? {

@@ -170,6 +170,7 @@ impl Agv {
         changes.order = self.report.order_received;
         let requested = self.report.requested;
         let too_soon = *sent + self.config.min_state_interval > moment;
+        self.report.delayed = false;
         if periodic {
             self.send_state(body, true);
         } else if (changes.any() || requested) && !self.suppressed(changes, requested, &body) {

@@ -280,6 +280,7 @@ fn instant_actions(bench: &mut Bench) {
     bench.instant("initPosition", "i", pose);
     let here = json!({ "x": 1.0, "y": 2.0, "mapId": "hall" });
     bench.order(with(order("o1", 0, 0, "here n2"), "/nodes/0/nodePosition", here));
+    bench.instant("startCharging", "lane", json!({}));
     bench.wait(20.0);
 }
 
