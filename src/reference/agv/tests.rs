@@ -97,6 +97,11 @@ impl Bench {
     fn give(&mut self, input: Input) {
         let mut out = Vec::new();
         self.agv.handle(self.now, input, &mut out);
+        let wake = self.agv.wake_up();
+        assert!(
+            wake.is_none_or(|wake| wake > self.now.moment),
+            "wants to be woken in the past: {wake:?}"
+        );
         self.outputs
             .extend(out.into_iter().map(|output| (self.now.moment, output)));
     }
