@@ -117,9 +117,11 @@ proptest! {
     fn mutated_messages_never_break_the_vehicle(
         script in prop::collection::vec((message(), any::<prop::sample::Index>(), prop::option::of(leaf()), 0.0..3.0_f64), 1..12),
         fault in prop::option::of(any::<prop::sample::Index>()),
+        interval in 0_u64..600,
     ) {
         let faults: Vec<&str> = fault.iter().map(|index| index.get(crate::reference::agv::FAULTS).name).collect();
-        let mut bench = Bench::with(config(), &faults);
+        let min_state_interval = Duration::from_millis(interval.saturating_sub(300));
+        let mut bench = Bench::with(AgvConfig { min_state_interval, ..config() }, &faults);
         for ((topic, mut body), place, value, pause) in script {
             if let Some(value) = value {
                 let mut found = Vec::new();

@@ -287,9 +287,9 @@ fn instant_actions(bench: &mut Bench) {
 fn held_by_hand(bench: &mut Bench) {
     let beep = with(order("o1", 0, 0, "n1"), "/nodes/0/actions/-", beep("a", "NONE"));
     bench.order(beep);
-    bench.command("violate-field", json!({}));
+    bench.command("enter-field", json!({}));
     bench.wait(1.0);
-    bench.command("clear-field", json!({}));
+    bench.command("leave-field", json!({}));
     bench.command("press-pause", json!({}));
     bench.instant("stopPause", "s", json!({}));
     bench.wait(1.0);
