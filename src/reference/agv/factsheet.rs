@@ -7,6 +7,7 @@ use super::action_kinds::{self, ActionKind, Deed, LOAD_POSITIONS, MAX_HEIGHT};
 use super::errors::MAX_ERRORS;
 use super::faults::FaultName as F;
 use super::instant::MAX_INSTANT_ACTIONS;
+use super::read::MAX_STRING;
 use super::{Agv, AgvConfig};
 
 /// Optional parameters the vehicle acts on.
@@ -104,7 +105,12 @@ impl Agv {
             seconds => seconds,
         };
         let mut limits = json!({
-            "maxStringLens": { "msgLen": self.config.max_message, "idLen": 256, "enumLen": 256, "idNumericalOnly": false },
+            "maxStringLens": {
+                "msgLen": self.config.max_message,
+                "idLen": MAX_STRING,
+                "enumLen": MAX_STRING,
+                "idNumericalOnly": false,
+            },
             "maxArrayLens": {
                 "order.nodes": nodes,
                 "order.edges": nodes.saturating_sub(1),

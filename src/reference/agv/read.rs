@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 /// Longest id or keyword the vehicle takes, in characters.
-const MAX_STRING: usize = 256;
+pub(super) const MAX_STRING: usize = 256;
 
 /// What is wrong with a message, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use crate::clock::{Moment, Stamp};
 use crate::reference::{ConnectOptions, Device, Download, Input, Output, Publication};
 
-use super::{Agv, AgvConfig, OnboardMap};
+use super::{Agv, AgvConfig, ErrorNames, OnboardMap};
 
 /// A version no pack has, since versions are data.
 const VERSION: &str = "7.8.9";

@@ -115,7 +115,10 @@ proptest! {
 
     #[test]
     fn mutated_messages_never_break_the_vehicle(
-        script in prop::collection::vec((message(), any::<prop::sample::Index>(), prop::option::of(leaf()), 0.0..3.0_f64), 1..12),
+        script in prop::collection::vec(
+            (message(), any::<prop::sample::Index>(), prop::option::of(leaf()), 0.0..3.0_f64),
+            1..12,
+        ),
         fault in prop::option::of(any::<prop::sample::Index>()),
         interval in 0_u64..600,
     ) {
@@ -140,7 +143,9 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_bytes_never_break_the_vehicle(payloads in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..8)) {
+    fn arbitrary_bytes_never_break_the_vehicle(
+        payloads in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..8),
+    ) {
         let mut bench = Bench::new();
         for payload in payloads {
             bench.send_raw("order", payload.clone());

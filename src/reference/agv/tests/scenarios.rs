@@ -207,7 +207,8 @@ fn orders_on_maps(bench: &mut Bench) {
 
 fn maps_on_board(bench: &mut Bench) {
     let pair = |map: &str, version: &str| json!({ "mapId": map, "mapVersion": version });
-    let download = |map: &str, version: &str| json!({ "mapId": map, "mapVersion": version, "mapDownloadLink": "http://127.0.0.1/m" });
+    let link = "http://127.0.0.1/m";
+    let download = |map: &str, version: &str| json!({ "mapId": map, "mapVersion": version, "mapDownloadLink": link });
     bench.instant("downloadMap", "d0", download("hall", "2"));
     bench.instant("downloadMap", "d1", download("new", "1"));
     bench.download(Download::Begun);
