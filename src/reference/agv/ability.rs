@@ -118,7 +118,7 @@ impl Agv {
         if edge.max_rotation_speed.is_some_and(|speed| speed < SLOWEST) {
             return unable("maxRotationSpeed", "the vehicle cannot turn so slowly");
         }
-        if edge.max_height.is_some_and(|height| height < self.config.height) {
+        if edge.max_height.is_some_and(|height| height < self.config.height) && !self.faults.has(F::MaxHeightIgnored) {
             return unable("maxHeight", "the vehicle is higher");
         }
         let Some(orientation) = edge.orientation else {

@@ -135,7 +135,7 @@ impl Agv {
         let first = &order.nodes[0];
         let joins = if busy {
             (&first.id, first.sequence_id) == (&self.book.base_end.0, self.book.base_end.1)
-                || self.faults.has(F::ErrorlessGapUpdate)
+                || self.faults.has(F::RunningUpdateGapAccepted)
                 || self.faults.has(F::OutdatedUpdateTakenOver)
         } else {
             (&first.id, first.sequence_id) == (&self.book.last_node, self.book.last_sequence)

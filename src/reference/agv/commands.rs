@@ -15,7 +15,7 @@ use super::{Agv, Mode};
 /// The commands of [`crate::reference::Input::Command`]; unknown ones are ignored.
 ///
 /// `place-on {nodeId}`, `move-to {x, y, theta}`, `set-mode {mode}`, `enable-map {mapId, mapVersion}`,
-/// `place-load {loadId, loadType}`; the others take nothing.
+/// `place-load {loadId, loadType}`, `trigger {actionId?}`; the others take nothing.
 pub const COMMANDS: [&str; 16] = [
     "power-cycle",
     "shutdown",
@@ -29,8 +29,8 @@ pub const COMMANDS: [&str; 16] = [
     "press-pause",
     "release-pause",
     "enable-map",
-    "violate-field",
-    "clear-field",
+    "enter-field",
+    "leave-field",
     "place-load",
     "remove-load",
 ];
@@ -42,7 +42,7 @@ impl Agv {
             "power-cycle" => self.power_cycle(),
             "shutdown" => self.shut_down(),
             "start" => self.connection.wanted_at(self.now.moment),
-            "trigger" => self.trigger(),
+            "trigger" => self.trigger(text("actionId")),
             "set-mode" => self.set_mode(text("mode")),
             "place-on" => self.place_on(text("nodeId")),
             "move-to" => self.move_to(arguments),
@@ -53,8 +53,8 @@ impl Agv {
             }
             "press-pause" => self.set_holds(|holds| holds.button = true),
             "release-pause" => self.set_holds(|holds| holds.button = false),
-            "violate-field" => self.set_holds(|holds| holds.field = true),
-            "clear-field" => self.set_holds(|holds| holds.field = false),
+            "enter-field" => self.set_holds(|holds| holds.field = true),
+            "leave-field" => self.set_holds(|holds| holds.field = false),
             "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
             "enable-map" => {
                 // A map that is not on board cannot be chosen on the vehicle's panel.
@@ -82,13 +82,18 @@ impl Agv {
         self.mode = Mode::Automatic;
         self.charging = false;
         self.report = super::Report::default();
-        self.pending.push(Output::Drop);
+        if self.connection.online {
+            self.pending.push(Output::Drop);
+        }
         self.connection.dropped(moment + self.config.reconnect_delay);
     }
 
-    fn trigger(&mut self) {
+    /// The button that waitForTrigger waits for; it serves all of them unless one is named.
+    fn trigger(&mut self, wanted: &str) {
         let waits = |action: &&super::actions::Action| {
-            action.status == Status::Running && action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger)
+            (wanted.is_empty() || action.request.id == wanted)
+                && action.status == Status::Running
+                && action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger)
         };
         let ids: Vec<String> = self
             .actions
@@ -142,7 +147,7 @@ impl Agv {
 
     /// Pushed or steered by hand, which is only possible outside the automatic modes (MODE-06).
     fn move_to(&mut self, arguments: &Value) {
-        if self.mode.takes_orders() {
+        if self.mode.takes_orders() || self.faults.has(F::ManualPositionStale) {
             return;
         }
         let mut pose = self.motion.pose(self.moment());

@@ -61,6 +61,8 @@ pub struct ErrorNames {
     pub map: String,
     /// The pose cannot be taken over.
     pub localization: String,
+    /// Charging could not be started.
+    pub charging: String,
     /// pick or drop failed.
     pub load: String,
     /// The emergency stop is active.
@@ -83,9 +85,38 @@ impl Default for ErrorNames {
             instant_action: name("instantActionError"),
             map: name("mapError"),
             localization: name("localizationError"),
+            charging: name("chargingError"),
             load: name("loadError"),
             emergency_stop: name("emergencyStop"),
         }
+    }
+}
+
+impl ErrorNames {
+    /// The names a vocabulary gives (`error.validation`, …), and the default where it gives none.
+    #[must_use]
+    pub fn from_vocabulary<'a>(word: impl Fn(&str) -> Option<&'a str>) -> Self {
+        let mut names = Self::default();
+        let entries = [
+            (&mut names.validation, "error.validation"),
+            (&mut names.order, "error.order"),
+            (&mut names.outdated_update, "error.outdatedUpdate"),
+            (&mut names.broken_update, "error.badContinuation"),
+            (&mut names.other_order_active, "error.newOrderWhileBusy"),
+            (&mut names.start_out_of_range, "error.startTooFar"),
+            (&mut names.unknown_map, "error.unknownMap"),
+            (&mut names.memory, "error.memoryExceeded"),
+            (&mut names.no_order_to_cancel, "error.noOrderToCancel"),
+            (&mut names.instant_action, "error.unknownInstantAction"),
+            (&mut names.map, "error.mapDownload"),
+            (&mut names.load, "error.actionFailed"),
+        ];
+        for (name, path) in entries {
+            if let Some(word) = word(path) {
+                word.clone_into(name);
+            }
+        }
+        names
     }
 }
 

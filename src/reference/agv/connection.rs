@@ -223,6 +223,11 @@ impl Agv {
             "state" => (u8::from(self.faults.has(F::StateQosOne)), false),
             _ => (0, false),
         };
+        let topic = if name == "visualization" && self.faults.has(F::OtherMajorVersion) {
+            topic.replacen("/v", "/v1", 1)
+        } else {
+            topic
+        };
         let topic = match topic
             .strip_suffix("factsheet")
             .filter(|_| self.faults.has(F::MisspelledTopic))
@@ -250,7 +255,7 @@ impl Agv {
         if counts && !(name == "state" && self.faults.has(F::HeaderIdConstant)) {
             *next = next.wrapping_add(1);
         }
-        let header_id = if self.faults.has(F::HeaderIdText) {
+        let header_id = if self.faults.has(F::HeaderIdAsText) {
             json!(id.to_string())
         } else {
             json!(id)
@@ -266,7 +271,7 @@ impl Agv {
         };
         let serial = &self.config.serial_number;
         let serial_number = match () {
-            () if self.faults.has(F::TopicWithoutPrefix) => format!("{serial}0"),
+            () if self.faults.has(F::OtherSerialNumber) => format!("{serial}0"),
             () if self.faults.has(F::SerialNumberWithSpace) => format!("No. {serial}"),
             () => serial.clone(),
         };

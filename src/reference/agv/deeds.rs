@@ -20,6 +20,7 @@ enum Area {
     Map,
     Localization,
     Load,
+    Charging,
 }
 
 /// Why an action failed.
@@ -167,6 +168,7 @@ impl Agv {
             Area::Map => &names.map,
             Area::Localization => &names.localization,
             Area::Load => &names.load,
+            Area::Charging => &names.charging,
         };
         self.warn(name.clone(), problem.references.clone(), problem.reason.clone());
     }
@@ -174,8 +176,8 @@ impl Agv {
     fn forget_if_faulty(&mut self, id: &str) {
         let faults = self.faults;
         self.actions.retain(|action| {
-            let forgotten =
-                faults.has(F::FinishedActionsRemoved) || (faults.has(F::InstantActionsForgotten) && !action.of_order());
+            let forgotten = faults.has(F::FinishedActionsRemoved)
+                || (faults.has(F::FinishedInstantForgotten) && !action.of_order());
             action.request.id != id || !forgotten
         });
     }
@@ -185,8 +187,11 @@ impl Agv {
         match kind.deed {
             Deed::StartPause => self.start_pause(action),
             Deed::StopPause => self.stop_pause(action),
-            Deed::StartCharging => self.start_charging(action),
-            Deed::StopCharging => self.set_charging(false),
+            Deed::StartCharging => self.start_charging(action).into(),
+            Deed::StopCharging => {
+                self.charging = false;
+                Outcome::Done(None)
+            }
             Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
                 let result = self
@@ -261,25 +266,25 @@ impl Agv {
         let before = self.holds.any();
         change(&mut self.holds);
         let moment = self.moment();
+        let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
         match (before, self.holds.any()) {
+            (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
             (false, true) => self.actions.hold(moment, self.faults),
             (true, false) => self.actions.resume(moment),
             _ => {}
         }
     }
 
-    /// Only where there is a charger (ACT-20).
-    fn start_charging(&mut self, action: &Action) -> Outcome {
-        let here = &self.book.last_node;
-        if !self.config.chargers.contains(here) && !self.faults.has(F::ChargesAnywhere) {
-            return Outcome::Failed(Problem::unable(action, "there is no charger here"));
+    /// The charger is at a node: there is none where the vehicle drives (ACT-20).
+    fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
+        if self.motion.is_moving() || !self.config.chargers.contains(&self.book.last_node) {
+            if self.faults.has(F::ChargingFailureFinished) {
+                return Ok(());
+            }
+            return Err(Problem::new(Area::Charging, action, "the vehicle is not at a charger"));
         }
-        self.set_charging(true)
-    }
-
-    fn set_charging(&mut self, on: bool) -> Outcome {
-        self.charging = on && !self.faults.has(F::ChargingUnreported);
-        Outcome::Done(None)
+        self.charging = !self.faults.has(F::ChargingUnreported);
+        Ok(())
     }
 
     fn init_position(&mut self, action: &Action) -> Result<(), Problem> {

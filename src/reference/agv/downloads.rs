@@ -121,6 +121,12 @@ impl Agv {
             self.finish(action_id, None);
             return;
         }
+        if self.faults.has(F::DownloadRetried) {
+            self.pending.push(Output::Fetch {
+                token: u64::MAX,
+                url: action.text("mapDownloadLink").to_owned(),
+            });
+        }
         let silent = self.faults.has(F::DownloadFailureSilent);
         self.fail(action_id, &Problem::map(&action, reason).silent_if(silent));
     }

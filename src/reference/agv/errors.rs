@@ -41,8 +41,10 @@ impl Errors {
     pub(super) fn raise(&mut self, error: ActiveError) {
         self.active
             .retain(|other| other.error_type != error.error_type || other.references != error.references);
-        if self.active.len() >= MAX_ERRORS {
-            self.active.remove(0);
+        if self.active.len() >= MAX_ERRORS
+            && let Some(oldest) = self.active.iter().position(|error| !error.fatal)
+        {
+            self.active.remove(oldest);
         }
         self.active.push(error);
     }

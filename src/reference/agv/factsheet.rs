@@ -7,6 +7,7 @@ use super::action_kinds::{self, ActionKind, Deed, LOAD_POSITIONS, MAX_HEIGHT};
 use super::errors::MAX_ERRORS;
 use super::faults::FaultName as F;
 use super::instant::MAX_INSTANT_ACTIONS;
+use super::read::MAX_STRING;
 use super::{Agv, AgvConfig};
 
 /// Optional parameters the vehicle acts on.
@@ -104,7 +105,12 @@ impl Agv {
             seconds => seconds,
         };
         let mut limits = json!({
-            "maxStringLens": { "msgLen": self.config.max_message, "idLen": 256, "enumLen": 256, "idNumericalOnly": false },
+            "maxStringLens": {
+                "msgLen": self.config.max_message,
+                "idLen": MAX_STRING,
+                "enumLen": MAX_STRING,
+                "idNumericalOnly": false,
+            },
             "maxArrayLens": {
                 "order.nodes": nodes,
                 "order.edges": nodes.saturating_sub(1),
@@ -119,7 +125,7 @@ impl Agv {
             "timing": {
                 "minOrderInterval": 0.0,
                 "minStateInterval": min_state_interval,
-                "defaultStateInterval": self.config.state_interval.as_secs_f64(),
+                "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },
         });
         if let Some(interval) = self.config.visualization_interval {
@@ -144,11 +150,20 @@ impl Agv {
             .map(|name| json!({ "parameter": name, "support": support }))
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
-        let actions: Vec<Value> = action_kinds::offered(&self.config)
+        let mut actions: Vec<Value> = action_kinds::offered(&self.config)
             .filter(|kind| !(missing && kind.deed == Deed::CancelOrder))
             .map(|kind| self.action_picture(kind))
             .collect();
-        json!({ "optionalParameters": parameters, "agvActions": actions })
+        if self.faults.has(F::VendorPauseListed) {
+            actions.push(json!({ "actionType": "pauseVehicle", "actionScopes": ["INSTANT"] }));
+        }
+        let mut features = json!({ "optionalParameters": parameters, "agvActions": actions });
+        if self.faults.has(F::OptionalParametersMissing)
+            && let Some(fields) = features.as_object_mut()
+        {
+            fields.remove("optionalParameters");
+        }
+        features
     }
 
     fn action_picture(&self, kind: &ActionKind) -> Value {
@@ -167,6 +182,7 @@ impl Agv {
                 }
             })
             .collect();
+        let renamed = self.faults.has(F::PickParameterRenamed);
         let mut picture = Map::new();
         picture.insert("actionType".into(), json!(kind.name));
         picture.insert("actionDescription".into(), json!(kind.description));
@@ -174,7 +190,7 @@ impl Agv {
         if !kind.parameters.is_empty() {
             let parameters = kind.parameters.iter().map(|parameter| {
                 json!({
-                    "key": parameter.key,
+                    "key": if parameter.key == "height" && renamed { "liftHeightMm" } else { parameter.key },
                     "valueDataType": parameter.data_type,
                     "isOptional": parameter.optional,
                 })

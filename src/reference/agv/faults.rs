@@ -28,8 +28,9 @@ faults! {
     NeverReconnects "never-reconnects" ["MQTT-10"] "Does not connect again after a broken link.";
     NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10"] "Sends the terminating zero byte of its string with every periodic state.";
     MisspelledTopic "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore.";
-    TopicWithoutPrefix "topic-other-serial" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
+    OtherSerialNumber "other-serial-number" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
     NoFactsheet "no-factsheet" ["TOPIC-11", "ACT-40"] "Never publishes a factsheet.";
+    OtherMajorVersion "other-major-version" ["TOPIC-03", "TOPIC-02"] "Publishes its visualization below another major version.";
     EchoesOrder "echoes-order" ["TOPIC-15"] "Publishes the accepted order back on the order topic.";
     InstantActionsNotSubscribed "instant-actions-not-subscribed" ["TOPIC-10"] "Does not subscribe to instantActions.";
     SerialNumberWithSpace "serial-number-with-space" ["TOPIC-05", "HDR-05"] "Writes its serial number with a space in the header.";
@@ -40,14 +41,14 @@ faults! {
     VisualizationWithoutHeader "visualization-without-header" ["VIS-01", "HDR-01"] "Publishes the visualization without a header.";
     HeaderIdConstant "header-id-constant" ["HDR-02"] "Sends every state with the same headerId.";
     HeaderIdShared "header-id-shared" ["HDR-02"] "Counts one headerId over all topics.";
-    HeaderIdText "header-id-as-text" ["JSON-06", "HDR-02"] "Sends the headerId as a string.";
+    HeaderIdAsText "header-id-as-text" ["JSON-06", "HDR-02"] "Sends the headerId as a string.";
     TimestampLocal "timestamp-local" ["HDR-03"] "Gives its timestamps in local time with an offset.";
     TimestampWithoutZone "timestamp-without-zone" ["HDR-03"] "Gives its timestamps without the Z.";
     TimestampUnix "timestamp-unix" ["HDR-03", "JSON-06"] "Gives its timestamps as seconds since 1970.";
     VersionShort "version-short" ["HDR-04"] "Gives the protocol version without the patch number.";
     FieldMisspelled "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore.";
     ModeLowerCase "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case.";
-    LatinText "latin-1-text" ["JSON-03"] "Encodes the text of its periodic states in Latin-1.";
+    LatinOneText "latin-1-text" ["JSON-03"] "Encodes the text of its periodic states in Latin-1.";
     BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15"] "Sends charging as a word in quotes.";
     NanVelocity "nan-velocity" ["JSON-08", "MQTT-02"] "Writes NaN as turning speed into its periodic states.";
     ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15"] "Estimates its reach in fractions of a metre.";
@@ -78,6 +79,7 @@ faults! {
     FactsheetWithoutSize "factsheet-without-size" ["FACT-04"] "Leaves width and length out of the factsheet.";
     FactsheetWithoutTiming "factsheet-without-timing" ["FACT-05"] "Leaves the timing out of its limits.";
     FactsheetSupportYes "factsheet-support-yes" ["FACT-06"] "Says YES where the support of a parameter is asked for.";
+    OptionalParametersMissing "optional-parameters-missing" ["OPT-04", "FACT-06"] "Leaves optionalParameters out of the factsheet.";
     FactsheetScopeLowerCase "factsheet-scope-lower-case" ["FACT-07", "JSON-02"] "Spells the scopes of its actions in lower case.";
     ListedActionRefused "listed-action-refused" ["FACT-07"] "Refuses finePositioning and detectObject although its factsheet lists them.";
     FactsheetActionMissing "factsheet-action-missing" ["FACT-07"] "Offers cancelOrder but does not list it.";
@@ -103,7 +105,7 @@ faults! {
     HorizonKept "horizon-kept" ["ORD-UPD-09"] "Keeps the old horizon when an update has none.";
     HorizonActionsStay "horizon-actions-stay" ["ORD-UPD-10"] "Lets the actions of a deleted horizon wait for ever.";
     LoopConfused "loop-confused" ["ORD-UPD-13", "NODE-03"] "Reports the sequenceId of the first visit on every visit of a node.";
-    ErrorlessGapUpdate "running-update-gap-accepted" ["ORD-FLOW-08"] "Takes over an update that does not begin at the decision point.";
+    RunningUpdateGapAccepted "running-update-gap-accepted" ["ORD-FLOW-08"] "Takes over an update that does not begin at the decision point.";
     BusyIgnored "busy-ignored" ["ORD-FLOW-01", "ORD-FLOW-03"] "Takes over a new order while another one is being driven.";
     RunningActionIgnored "running-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs.";
     HorizonNotBusy "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point.";
@@ -119,7 +121,7 @@ faults! {
 
     // Cancel
     CancelDrivesOn "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder.";
-    CancelLeavesWaiting "cancel-leaves-waiting" ["ORD-CANCEL-03"] "Leaves the waiting actions of a cancelled order WAITING.";
+    CancelLeavesWaiting "cancel-leaves-waiting" ["ORD-CANCEL-03", "ORD-CANCEL-13"] "Leaves the waiting actions of a cancelled order WAITING.";
     CancelLetsRun "cancel-lets-run" ["ORD-CANCEL-04"] "Lets interruptible actions run to their end when the order is cancelled.";
     CancelFailsEarly "cancel-fails-early" ["ORD-CANCEL-05"] "Reports an action FAILED on cancellation and FINISHED when it ends.";
     CancelFinishedEarly "cancel-finished-early" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while an action still runs.";
@@ -137,7 +139,7 @@ faults! {
     IdleCancelUnreferenced "idle-cancel-unreferenced" ["ORD-CANCEL-20"] "Does not name the actionId when there is no order to cancel.";
 
     // Rejection
-    MalformedTakenOver "malformed-taken-over" ["ORD-REJ-01"] "Takes over the ids of malformed orders, with defaults for what it cannot read.";
+    MalformedTakenOver "malformed-taken-over" ["ORD-REJ-01"] "Reports the orderId of a malformed order as its own.";
     ValidationErrorMisspelled "validation-error-misspelled" ["ORD-REJ-02"] "Calls a malformed order validationOrder, as an old figure does.";
     ValidationErrorFatal "validation-error-fatal" ["ORD-REJ-02"] "Reports a malformed order as FATAL.";
     ValidationErrorDroppedEarly "validation-error-dropped-early" ["ORD-REJ-03"] "Forgets the validationError after a second.";
@@ -169,6 +171,10 @@ faults! {
     DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05"] "Reports its orientation in degrees.";
     VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 
+    TurnsOnEdge "turns-on-edge" ["ORD-MSG-24", "ORD-MSG-12"] "Turns to the orientation of an edge when it is on it already.";
+    MaxHeightIgnored "max-height-ignored" ["ORD-MSG-21", "OPT-02"] "Accepts edges too low for it.";
+    ZoneSetInvented "zone-set-invented" ["STATE-MSG-03"] "Reports a zone set no order named.";
+
     // Maps
     MapListedTwice "map-listed-twice" ["MAP-07"] "Lists the map it uses twice.";
     UnknownMapAccepted "unknown-map-accepted" ["MAP-08"] "Accepts orders on maps it does not have.";
@@ -196,9 +202,16 @@ faults! {
     UsedMapDeleted "used-map-deleted" ["MAP-32"] "Deletes the map it drives on.";
     DeleteUnknownFinished "delete-unknown-finished" ["MAP-33"] "Reports deleteMap FINISHED for a map it does not have.";
     HashIgnored "hash-ignored" ["MAP-34"] "Does not verify the hash of a map.";
+    DownloadRetried "download-retried" ["MAP-06"] "Fetches a map again by itself when a download failed.";
     LiftMapStale "lift-map-stale" ["MAP-35"] "Keeps its old mapId when it arrives on another floor.";
 
     // Actions
+    ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07"] "Never begins the actions of an order.";
+    VendorPauseListed "vendor-pause-listed" ["ACT-05"] "Lists a pause action of its own beside startPause.";
+    PickParameterRenamed "pick-parameter-renamed" ["ACT-06"] "Calls the height of a pick liftHeightMm.";
+    UndescribedStatus "undescribed-status" ["ACT-41"] "Reports instant actions INITIALIZING that have no preparation.";
+    PickPreparedAsRunning "pick-prepared-as-running" ["ACT-33", "ASTATE-02"] "Reports a pick RUNNING while it only prepares for it.";
+    FieldDoesNotPause "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated.";
     EdgeActionOutlivesEdge "edge-action-outlives-edge" ["ACT-02", "NODE-05"] "Lets the actions of an edge run on behind its end.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
     PauseTwiceFails "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused.";
@@ -208,8 +221,8 @@ faults! {
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Reports stopPause FINISHED although the button still holds it.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
-    ChargesAnywhere "charges-anywhere" ["ACT-20", "ACT-30"] "Reports that it charges where there is no charger.";
     ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
+    ChargingFailureFinished "charging-failure-finished" ["ACT-20"] "Reports startCharging FINISHED although there is no charger.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23"] "Reports initPosition FINISHED and keeps its pose.";
     InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
     InitPositionUnchecked "init-position-unchecked" ["ACT-25"] "Takes over a pose on a map it does not have.";
@@ -247,17 +260,18 @@ faults! {
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02"] "Empties the orderId when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
     LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
-    PositionNotInitialized "position-as-text" ["STATE-MSG-05", "JSON-06"] "Reports its coordinates as strings.";
+    PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06"] "Reports its coordinates as strings.";
     LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
     DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
-    InstantActionsForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
+    FinishedInstantForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
     FinishedActionsRemoved "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done.";
     RunningInstantDropped "running-instant-dropped" ["STATE-MSG-11"] "Removes running instant actions from its states when a new order is accepted.";
     NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13"] "Leaves the sequenceId out of its node states.";
     HorizonReportedReleased "horizon-reported-released" ["STATE-MSG-13"] "Reports the nodes and edges of the horizon as released.";
+    DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
     StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05"] "Says DONE where FINISHED is meant.";
-    ChargeAsFraction "charge-missing" ["STATE-MSG-15"] "Leaves the charge out of its battery state.";
+    ChargeMissing "charge-missing" ["STATE-MSG-15"] "Leaves the charge out of its battery state.";
     EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
     EmergencyStopUnreported "emergency-stop-unreported" ["STATE-MSG-17"] "Does not report an emergency stop.";
 
@@ -270,7 +284,7 @@ faults! {
     EdgeActionsOnNode "edge-actions-on-node" ["NODE-07"] "Begins the actions of an edge while it is held on the node before.";
 
     // Action life cycle and blocking
-    ActionStatesMissing "horizon-actions-missing" ["ASTATE-01"] "Lists the actions of the horizon only when they are released.";
+    HorizonActionsMissing "horizon-actions-missing" ["ASTATE-01"] "Lists the actions of the horizon only when they are released.";
     RunningFromStart "running-from-start" ["ASTATE-02"] "Reports all actions RUNNING when the order is accepted.";
     InitializingFromStart "initializing-from-start" ["ASTATE-03", "ASTATE-02"] "Reports all actions INITIALIZING when the order is accepted.";
     PausedWithoutPause "paused-without-pause" ["ASTATE-04"] "Reports actions PAUSED that only wait for others.";
@@ -294,6 +308,7 @@ faults! {
     InfoLevelWarning "info-level-warning" ["INFO-01"] "Reports an information with the level WARNING.";
     SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
+    ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";
     SemiautomaticFaster "semiautomatic-faster" ["MODE-03"] "Drives faster in SEMIAUTOMATIC.";
     VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";
 }

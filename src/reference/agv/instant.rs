@@ -110,6 +110,12 @@ impl Agv {
     }
 
     fn begin_instant(&mut self, id: &str) {
+        if self.faults.has(F::UndescribedStatus)
+            && let Some(action) = self.actions.get_mut(id)
+        {
+            action.status = Status::Initializing;
+            self.flush();
+        }
         let lasting = self
             .actions
             .get(id)

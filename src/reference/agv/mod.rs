@@ -1,9 +1,10 @@
 //! The reference AGV: a complete vehicle as a sans-IO state machine, "the best-behaved vehicle there is".
 //!
-//! Written from the standard. The parts, by idea: [`acceptance`], with [`ability`] and [`rejection`], decides about orders
-//! (figure 8), [`book`] holds the order, [`progress`] drives it, [`cancel`] ends it (figure 9); [`actions`] knows when an action runs and
-//! [`deeds`] what it does; [`instant`] takes instant actions, [`commands`] what people do to the vehicle;
-//! [`connection`] and [`report`] speak to the broker. Every deviation from good behaviour is in [`faults`].
+//! Written from the standard. The parts, by idea: `acceptance`, with `ability` and `rejection`, decides about orders
+//! (figure 8), `book` holds the order, `progress` drives it, `cancel` ends it (figure 9); `actions` knows when an
+//! action runs and `deeds` what it does; `instant` takes instant actions, `commands` what people do to the vehicle;
+//! `connection` and `report` speak to the broker. Every deviation from good behaviour is declared in `faults`, and
+//! found in the code by its [`FaultName`].
 
 mod ability;
 mod acceptance;

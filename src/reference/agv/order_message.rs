@@ -92,7 +92,7 @@ pub(super) struct Position {
 impl Position {
     fn read(value: &Value, path: &str) -> Result<Self, Defect> {
         let fields = Fields::open(value, path)?;
-        fields.optional("mapDescription", Fields::text)?;
+        fields.optional("mapDescription", Fields::prose)?;
         Ok(Self {
             x: fields.number_in("x", -FARTHEST, FARTHEST)?,
             y: fields.number_in("y", -FARTHEST, FARTHEST)?,
@@ -237,7 +237,7 @@ fn read_actions(fields: &Fields<'_>) -> Result<Vec<ActionRequest>, Defect> {
 }
 
 fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
-    fields.optional("nodeDescription", Fields::text)?;
+    fields.optional("nodeDescription", Fields::prose)?;
     let sent_position = fields.raw("nodePosition").cloned();
     let position = fields
         .raw("nodePosition")
@@ -255,7 +255,7 @@ fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
 }
 
 fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge, Defect> {
-    fields.optional("edgeDescription", Fields::text)?;
+    fields.optional("edgeDescription", Fields::prose)?;
     fields.optional("length", Fields::number)?;
     for key in UNSUPPORTED_EDGE_FIELDS {
         if fields.has(key) {

@@ -31,7 +31,7 @@ impl Agv {
 
     /// Begins actions of the order whose turn it is. A held vehicle begins nothing.
     fn begin_triggered(&mut self) -> bool {
-        if self.holds.any() {
+        if self.holds.any() || self.faults.has(F::ActionsIgnored) {
             return false;
         }
         let ids = self.actions.startable();
@@ -108,7 +108,7 @@ impl Agv {
         let pose = self.motion.pose(moment);
         let distance = pose.distance(stop.place.x, stop.place.y);
         let (theta, backwards) = self.course(edge.as_ref(), stop);
-        let aligned = distance < 1e-6 || motion::wrapped(theta - pose.theta).abs() <= ALIGNED;
+        let aligned = self.turns_late() || distance < 1e-6 || motion::wrapped(theta - pose.theta).abs() <= ALIGNED;
         let turns_before = edge.as_ref().is_some_and(|edge| edge.rotation_allowed == Some(false));
         self.charging = false;
         if !aligned && turns_before && !self.book.entered {
@@ -143,10 +143,11 @@ impl Agv {
         let moment = self.moment();
         let pose = self.motion.pose(moment);
         let stops = edge.is_some_and(|edge| self.actions.edge_stops(edge.sequence_id));
-        let way = match stops && !self.faults.has(F::EdgeActionsLate) {
-            true => BRAKING.min(distance / 4.0),
-            false if self.faults.has(F::TraversedEarly) => (distance - 0.5).max(distance / 2.0),
-            false => distance,
+        let (way, to_node) = match stops && !self.faults.has(F::EdgeActionsLate) {
+            true => (BRAKING.min(distance / 4.0), false),
+            false if self.turns_late() => (distance / 3.0, false),
+            false if self.faults.has(F::TraversedEarly) => ((distance - 0.5).max(distance / 2.0), true),
+            false => (distance, true),
         };
         let part = way / distance;
         let to = (
@@ -167,8 +168,15 @@ impl Agv {
             to,
             permitted.map_or(own, |permitted| permitted.min(own)),
             backwards,
-            !stops,
+            to_node,
         );
+    }
+
+    /// `turns-on-edge`: rolls on as it stands, until the node it left is well behind.
+    fn turns_late(&self) -> bool {
+        let pose = self.motion.pose(self.moment());
+        let behind = |left: &Stop| pose.distance(left.place.x, left.place.y) > 0.2;
+        self.faults.has(F::TurnsOnEdge) && !self.book.left.0.as_ref().is_some_and(behind)
     }
 
     fn rotation_speed(&self, edge: Option<&Edge>) -> f64 {

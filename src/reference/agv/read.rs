@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 /// Longest id or keyword the vehicle takes, in characters.
-const MAX_STRING: usize = 256;
+pub(super) const MAX_STRING: usize = 256;
 
 /// What is wrong with a message, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,6 +75,16 @@ impl<'a> Fields<'a> {
             return Err(self.wrong(key, "is too long"));
         }
         Ok(text)
+    }
+
+    /// A string for people, of any length.
+    pub(super) fn prose(&self, key: &str) -> Result<(), Defect> {
+        let text = self.required(key)?.is_string();
+        if text {
+            Ok(())
+        } else {
+            Err(self.wrong(key, "is not a string"))
+        }
     }
 
     /// A string that identifies something.

@@ -33,6 +33,22 @@ pub(super) struct Report {
 /// Members that change without being an event.
 const SILENT: [&str; 3] = ["agvPosition", "velocity", "batteryState"];
 
+/// Faults that keep events from the state.
+const KEPT_EVENTS: [F; 9] = [
+    F::StatesByClock,
+    F::OrderWithoutState,
+    F::LoadWithoutState,
+    F::ErrorWithoutState,
+    F::ModeWithoutState,
+    F::MapsWithoutState,
+    F::NodeWithoutState,
+    F::DrivingWithoutState,
+    F::ActionsWithoutState,
+];
+
+/// The longest interval the standard allows, with some room.
+const LONGEST: Duration = Duration::from_secs(28);
+
 /// What differs between two states.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Changes {
@@ -91,6 +107,16 @@ impl Agv {
         if self.faults.has(F::StateSilence) {
             Duration::from_secs(45)
         } else {
+            self.stated_interval()
+        }
+    }
+
+    /// The interval the factsheet promises. A faulty vehicle that keeps events to itself has a long one, so that
+    /// its periodic states do not make up for them.
+    pub(super) fn stated_interval(&self) -> Duration {
+        if KEPT_EVENTS.iter().any(|fault| self.faults.has(*fault)) {
+            LONGEST
+        } else {
             self.config.state_interval
         }
     }
@@ -144,6 +170,7 @@ impl Agv {
         changes.order = self.report.order_received;
         let requested = self.report.requested;
         let too_soon = *sent + self.config.min_state_interval > moment;
+        self.report.delayed = false;
         if periodic {
             self.send_state(body, true);
         } else if (changes.any() || requested) && !self.suppressed(changes, requested, &body) {
@@ -181,7 +208,7 @@ impl Agv {
     fn send_state(&mut self, mut body: Map<String, Value>, periodic: bool) {
         let kept = body.clone();
         let mut mangle: Vec<(&str, &[u8])> = Vec::new();
-        if periodic && self.faults.has(F::LatinText) {
+        if periodic && self.faults.has(F::LatinOneText) {
             let information = json!([{ "infoType": "place", "infoDescription": "Lagerpl@tz", "infoLevel": "INFO" }]);
             body.insert("information".into(), information);
             mangle.push(("Lagerpl@tz", b"Lagerpl\xe4tz"));

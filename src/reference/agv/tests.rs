@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use crate::clock::{Moment, Stamp};
 use crate::reference::{ConnectOptions, Device, Download, Input, Output, Publication};
 
-use super::{Agv, AgvConfig, OnboardMap};
+use super::{Agv, AgvConfig, ErrorNames, OnboardMap};
 
 /// A version no pack has, since versions are data.
 const VERSION: &str = "7.8.9";
@@ -97,6 +97,11 @@ impl Bench {
     fn give(&mut self, input: Input) {
         let mut out = Vec::new();
         self.agv.handle(self.now, input, &mut out);
+        let wake = self.agv.wake_up();
+        assert!(
+            wake.is_none_or(|wake| wake > self.now.moment),
+            "wants to be woken in the past: {wake:?}"
+        );
         self.outputs
             .extend(out.into_iter().map(|output| (self.now.moment, output)));
     }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::reference::agv::action_kinds::MAX_HEIGHT;
+use crate::reference::agv::action_kinds::{Deed, MAX_HEIGHT};
 use crate::reference::agv::actions::{Action, Origin, Status};
 use crate::reference::agv::book::Stop;
 use crate::reference::agv::faults::FaultName as F;
@@ -31,6 +31,12 @@ impl Agv {
         }
         set("orderId", json!(order_id));
         set("orderUpdateId", json!(self.book.update_id));
+        if has(F::ZoneSetInvented) {
+            set("zoneSetId", json!("factory"));
+        }
+        if has(F::DistanceNegative) {
+            set("distanceSinceLastNode", json!(-1.0));
+        }
         set("lastNodeId", json!(last_node));
         set("lastNodeSequenceId", json!(self.book.last_sequence));
         set("nodeStates", self.node_states(complete));
@@ -141,15 +147,18 @@ impl Agv {
             Origin::Node(sequence_id) | Origin::Edge(sequence_id) => sequence_id > self.book.base_end.1,
             Origin::Instant => false,
         };
-        let hidden = (of_horizon && self.faults.has(F::ActionStatesMissing))
+        let hidden = (of_horizon && self.faults.has(F::HorizonActionsMissing))
             || (!action.of_order() && self.faults.has(F::InstantActionUnlisted));
         if hidden {
             return None;
         }
         let waits_here = action.origin == Origin::Node(self.book.last_sequence) && !self.holds.any();
+        let early_pick =
+            self.faults.has(F::PickPreparedAsRunning) && action.kind.is_some_and(|kind| kind.deed == Deed::Pick);
         let status = match action.masked.unwrap_or(action.status) {
             Status::Waiting if self.faults.has(F::RunningFromStart) => "RUNNING",
             Status::Waiting if self.faults.has(F::InitializingFromStart) => "INITIALIZING",
+            Status::Waiting | Status::Initializing if early_pick => "RUNNING",
             Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
             status => status.literal(),
@@ -184,7 +193,7 @@ impl Agv {
             () => pose.map_id,
         };
         let number = |value: f64| {
-            if self.faults.has(F::PositionNotInitialized) {
+            if self.faults.has(F::PositionAsText) {
                 json!(value.to_string())
             } else {
                 json!(value)
@@ -235,7 +244,7 @@ impl Agv {
 
     fn battery(&self) -> Value {
         let mut battery = Map::new();
-        if !self.faults.has(F::ChargeAsFraction) {
+        if !self.faults.has(F::ChargeMissing) {
             battery.insert("batteryCharge".into(), json!(87.5));
         }
         battery.insert("batteryVoltage".into(), json!(48.2));

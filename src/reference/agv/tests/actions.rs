@@ -302,6 +302,10 @@ fn charging_is_reported_and_ends_before_driving() {
     bench.wait(1.0);
     bench.order(order("o1", 0, 0, "n1 n2"));
     assert_eq!(bench.state()["batteryState"]["charging"], false);
+    bench.instant("startCharging", "f", json!({}));
+    bench.wait(0.5);
+    assert_eq!(bench.status("f"), "FAILED");
+    assert_eq!(bench.error_types(), ["chargingError"]);
 }
 
 #[test]

@@ -115,11 +115,16 @@ proptest! {
 
     #[test]
     fn mutated_messages_never_break_the_vehicle(
-        script in prop::collection::vec((message(), any::<prop::sample::Index>(), prop::option::of(leaf()), 0.0..3.0_f64), 1..12),
+        script in prop::collection::vec(
+            (message(), any::<prop::sample::Index>(), prop::option::of(leaf()), 0.0..3.0_f64),
+            1..12,
+        ),
         fault in prop::option::of(any::<prop::sample::Index>()),
+        interval in 0_u64..600,
     ) {
         let faults: Vec<&str> = fault.iter().map(|index| index.get(crate::reference::agv::FAULTS).name).collect();
-        let mut bench = Bench::with(config(), &faults);
+        let min_state_interval = Duration::from_millis(interval.saturating_sub(300));
+        let mut bench = Bench::with(AgvConfig { min_state_interval, ..config() }, &faults);
         for ((topic, mut body), place, value, pause) in script {
             if let Some(value) = value {
                 let mut found = Vec::new();
@@ -138,7 +143,9 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_bytes_never_break_the_vehicle(payloads in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..8)) {
+    fn arbitrary_bytes_never_break_the_vehicle(
+        payloads in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..8),
+    ) {
         let mut bench = Bench::new();
         for payload in payloads {
             bench.send_raw("order", payload.clone());

@@ -29,6 +29,24 @@ fn the_vehicle_connects_with_a_will_and_says_online() {
 }
 
 #[test]
+fn error_names_come_from_the_vocabulary_where_it_has_them() {
+    let names = ErrorNames::from_vocabulary(|path| (path == "error.startTooFar").then_some("TOO_FAR"));
+    assert_eq!(
+        (names.start_out_of_range.as_str(), names.order.as_str()),
+        ("TOO_FAR", "orderError")
+    );
+    let mut bench = Bench::with(
+        AgvConfig {
+            errors: names,
+            ..config()
+        },
+        &[],
+    );
+    bench.order(order("o1", 0, 0, "n3 n4"));
+    assert_eq!(bench.error_types(), ["TOO_FAR"]);
+}
+
+#[test]
 fn headers_count_per_topic_over_reconnections() {
     let mut bench = Bench::new();
     bench.order(order("o1", 0, 0, "n1 n2 n3"));

@@ -69,7 +69,7 @@ fn a_violated_field_holds_actions_and_lets_them_go_on() {
     let mut bench = Bench::new();
     let beep = action("beep", "a", "NONE", json!({}));
     bench.order(with(order("o1", 0, 0, "n1"), "/nodes/0/actions/-", beep));
-    bench.command("violate-field", json!({}));
+    bench.command("enter-field", json!({}));
     assert_eq!(
         (
             bench.status("a"),
@@ -77,7 +77,7 @@ fn a_violated_field_holds_actions_and_lets_them_go_on() {
         ),
         ("PAUSED".into(), json!(true))
     );
-    bench.command("clear-field", json!({}));
+    bench.command("leave-field", json!({}));
     bench.wait(1.0);
     assert_eq!(bench.status("a"), "FINISHED");
 }

@@ -154,6 +154,7 @@ fn refused_orders(bench: &mut Bench) {
         ),
         with(route(), "/edges/0/trajectory", json!({})),
         with(route(), "/edges/0/orientation", json!(1.57)),
+        with(route(), "/edges/0/maxHeight", json!(0.5)),
         with(route(), "/nodes/1/nodePosition", place("moon")),
         route(),
     ];
@@ -206,7 +207,8 @@ fn orders_on_maps(bench: &mut Bench) {
 
 fn maps_on_board(bench: &mut Bench) {
     let pair = |map: &str, version: &str| json!({ "mapId": map, "mapVersion": version });
-    let download = |map: &str, version: &str| json!({ "mapId": map, "mapVersion": version, "mapDownloadLink": "http://127.0.0.1/m" });
+    let link = "http://127.0.0.1/m";
+    let download = |map: &str, version: &str| json!({ "mapId": map, "mapVersion": version, "mapDownloadLink": link });
     bench.instant("downloadMap", "d0", download("hall", "2"));
     bench.instant("downloadMap", "d1", download("new", "1"));
     bench.download(Download::Begun);
@@ -279,10 +281,16 @@ fn instant_actions(bench: &mut Bench) {
     bench.instant("initPosition", "i", pose);
     let here = json!({ "x": 1.0, "y": 2.0, "mapId": "hall" });
     bench.order(with(order("o1", 0, 0, "here n2"), "/nodes/0/nodePosition", here));
+    bench.instant("startCharging", "lane", json!({}));
     bench.wait(20.0);
 }
 
 fn held_by_hand(bench: &mut Bench) {
+    let beep = with(order("o1", 0, 0, "n1"), "/nodes/0/actions/-", beep("a", "NONE"));
+    bench.order(beep);
+    bench.command("enter-field", json!({}));
+    bench.wait(1.0);
+    bench.command("leave-field", json!({}));
     bench.command("press-pause", json!({}));
     bench.instant("stopPause", "s", json!({}));
     bench.wait(1.0);
@@ -296,6 +304,7 @@ fn modes(bench: &mut Bench) {
     bench.order(order("o1", 0, 0, "n1 n2"));
     bench.wait(0.5);
     bench.command("set-mode", json!({ "mode": "MANUAL" }));
+    bench.command("move-to", json!({ "x": 1.0 }));
     bench.wait(5.0);
 }
 
