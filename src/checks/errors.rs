@@ -118,15 +118,18 @@ impl Running for Persist {
 
 impl Persist {
     fn sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        if let Some(message) = to_vehicle("instantActions", entry, context) {
-            self.after_order = false;
-            self.instant
-                .extend(actions(message).map(|action| text(action, "actionId").to_owned()));
-            let excess = self.instant.len().saturating_sub(ACTIONS);
-            self.instant.drain(..excess);
-        } else if is_to_vehicle("order", entry, context) {
+        if is_to_vehicle("order", entry, context) {
             // Right after an instant action nobody knows which of the two an error answers.
             self.after_order = !self.instant_pending;
+        } else if is_to_vehicle("instantActions", entry, context) {
+            self.after_order = false;
+            self.instant_pending = true;
+        }
+        if let Some(message) = to_vehicle("instantActions", entry, context) {
+            let ids = actions(message).map(|action| text(action, "actionId").to_owned());
+            self.instant.extend(ids);
+            let excess = self.instant.len().saturating_sub(ACTIONS);
+            self.instant.drain(..excess);
         }
     }
 
