@@ -9,7 +9,21 @@ use vda5050_tck::checks;
 use vda5050_tck::pack::{Assets, Catalogue, Packs, Role};
 use vda5050_tck::suite::{CheckInfo, HookFacts, Suites};
 
-const HOOKS: &[&str] = &["power-cycle", "shutdown"];
+/// The hooks these suites use, with their parameters.
+const HOOKS: &[(&str, &[&str])] = &[
+    ("power-cycle", &[]),
+    ("shutdown", &[]),
+    ("start", &[]),
+    ("set-mode", &["mode"]),
+    ("emergency-stop", &[]),
+    ("release-emergency-stop", &[]),
+    ("enter-field", &[]),
+    ("leave-field", &[]),
+    ("trigger", &["actionId"]),
+    ("press-pause", &[]),
+    ("release-pause", &[]),
+    ("enable-map", &["mapId", "mapVersion"]),
+];
 
 fn load() -> (Suites, Catalogue) {
     let assets = Assets::embedded();
@@ -25,10 +39,10 @@ fn load() -> (Suites, Catalogue) {
         .collect();
     let hooks: Vec<HookFacts> = HOOKS
         .iter()
-        .map(|name| HookFacts {
+        .map(|(name, parameters)| HookFacts {
             name,
             role: Role::Agv,
-            parameters: &[],
+            parameters,
         })
         .collect();
     let suites = Suites::load(&assets, &packs, &catalogue, &known, &hooks).unwrap_or_else(|diagnostics| {

@@ -7,10 +7,11 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::orders::number;
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, state, text, to_vehicle};
+use super::traffic::{
+    Traffic, actions, broken, elements, is_to_vehicle, maybe_restarted, outside_influence, state, text, to_vehicle,
+};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
-use crate::journal::event::{Event, Packet};
 
 /// How many actionIds of instant actions are kept in mind.
 const ACTIONS: usize = 256;
@@ -31,6 +32,8 @@ struct Persist {
     traffic: Traffic,
     /// Whether the last thing sent to the vehicle was an order.
     after_order: bool,
+    /// Whether no state has come since the last instant action.
+    instant_pending: bool,
     instant: Vec<String>,
     /// What the last state showed: order, update, mode.
     shown: Option<(String, Option<u64>, String)>,
@@ -54,15 +57,7 @@ impl Running for Persist {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.sent(entry, context);
-        if outside_influence(entry)
-            || matches!(
-                entry.event(),
-                Event::Packet {
-                    packet: Packet::Connect { .. },
-                    ..
-                }
-            )
-        {
+        if outside_influence(entry) || maybe_restarted(self.traffic, entry, context) {
             self.watched.clear();
             self.shown = None;
         }
@@ -77,6 +72,7 @@ impl Running for Persist {
             number(state, "orderUpdateId"),
             text(state, "operatingMode").chars().take(64).collect(),
         );
+        self.instant_pending = false;
         let before = self.shown.replace(shown);
         if before.is_none() || before != self.shown {
             self.watched.clear();
@@ -122,21 +118,18 @@ impl Running for Persist {
 
 impl Persist {
     fn sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        if let Event::Sent { topic, .. } = entry.event() {
-            match context.topic_name(topic) {
-                Some("order") => self.after_order = true,
-                Some("instantActions") => self.after_order = false,
-                _ => {}
-            }
+        if is_to_vehicle("order", entry, context) {
+            // Right after an instant action nobody knows which of the two an error answers.
+            self.after_order = !self.instant_pending;
+        } else if is_to_vehicle("instantActions", entry, context) {
+            self.after_order = false;
+            self.instant_pending = true;
         }
         if let Some(message) = to_vehicle("instantActions", entry, context) {
-            self.after_order = false;
-            self.instant
-                .extend(actions(message).map(|action| text(action, "actionId").to_owned()));
+            let ids = actions(message).map(|action| text(action, "actionId").to_owned());
+            self.instant.extend(ids);
             let excess = self.instant.len().saturating_sub(ACTIONS);
             self.instant.drain(..excess);
-        } else if to_vehicle("order", entry, context).is_some() {
-            self.after_order = true;
         }
     }
 
@@ -153,6 +146,8 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::super::trace::Trace;
+    use crate::journal::Payload;
+    use crate::journal::event::{Event, Source};
 
     const CHECK: &str = "errors/persist-until-new-order";
 
@@ -215,7 +210,37 @@ mod tests {
     }
 
     #[test]
+    fn an_error_that_may_answer_either_of_two_messages_is_not_held_to_it() {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({})).instant("jump", "x", &json!([]));
+        trace
+            .sent("order", &json!({ "orderId": 7 }))
+            .state(&with(&["validationError"]));
+        trace.state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
+    fn an_unreadable_order_counts_as_an_order() {
+        let mut trace = Trace::subscriber();
+        trace.instant("jump", "x", &json!([])).state(&json!({}));
+        let topic = trace.topic("order");
+        let event = Event::Sent {
+            topic,
+            qos: 0,
+            retain: false,
+            payload: Payload::keep(bytes::Bytes::from_static(b"{")),
+        };
+        trace.add(Source::Harness, None, event);
+        trace.state(&with(&["validationError"])).state(&json!({}));
+        assert_eq!(trace.judge(CHECK).summary(), ["ORD-REJ-03"]);
+    }
+
+    #[test]
     fn a_restart_or_a_change_of_mode_ends_the_watch() {
+        let mut trace = rejected("validationError");
+        trace.connection("ONLINE").state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
         let mut trace = rejected("validationError");
         trace.hook().state(&json!({}));
         assert!(trace.judge(CHECK).findings.is_empty());

@@ -2,14 +2,16 @@
 //!
 //! When an action has to start or end is left to the tests.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
+use super::traffic::{
+    Traffic, actions, broken, elements, maybe_restarted, outside_influence, quote, remark, state, text, to_vehicle,
+};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
-use crate::journal::event::{Event, Packet};
+use crate::pack::Pack;
 
 /// How many actions are kept in mind; a state that lists more is judged on the first ones.
 const ACTIONS: usize = 4096;
@@ -21,7 +23,12 @@ pub(super) const TRANSITIONS: Check = Check {
     doc: "actionStatus moves only along the legal graph, where statuses may be skipped because states coalesce; \
           FINISHED and FAILED are never left; no actionId is listed twice.",
     arguments: &[],
-    start: |_| Box::new(Transitions::default()),
+    start: |context| {
+        Box::new(Transitions {
+            graph: Graph::of(context.pack),
+            ..Transitions::default()
+        })
+    },
 };
 
 /// `state/action-states-kept`.
@@ -31,38 +38,64 @@ pub(super) const KEPT: Check = Check {
     doc: "Action states stay listed until a new order is accepted, also after a cancellation. Where the factsheet \
           limits the array and it was full, leaving out finished ones is a warning.",
     arguments: &[],
-    start: |_| Box::new(Kept::default()),
+    start: |context| {
+        Box::new(Kept {
+            graph: Graph::of(context.pack),
+            ..Kept::default()
+        })
+    },
 };
 
-/// Whether some path of legal transitions leads from one status to another.
-fn reachable(from: &str, to: &str) -> bool {
-    // WAITING is where order actions begin; nothing leads back. All others but the terminal ones reach each
-    // other by way of PAUSED (and RETRIABLE in later versions), so only those two facts can be judged on
-    // states that may have been missed in between.
-    from == to || (!terminal(from) && to != "WAITING")
-}
+/// The statuses of the protocol version, and which may be seen after which.
+#[derive(Default)]
+struct Graph(BTreeMap<String, BTreeSet<String>>);
 
-fn terminal(status: &str) -> bool {
-    matches!(status, "FINISHED" | "FAILED")
-}
+impl Graph {
+    /// Every status that some path of transitions leads to: those in between may have been missed.
+    ///
+    /// The transitions that only other clauses imply count as well. On states that coalesce they cannot be
+    /// told from legal ones anyway.
+    fn of(pack: &Pack) -> Self {
+        let mut graph: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        for kind in ["legal", "implied"] {
+            let edges = pack.vocabulary().pointer(&format!("/transition/{kind}"));
+            for (from, to) in edges.and_then(Value::as_object).into_iter().flatten() {
+                let to = to.as_array().into_iter().flatten().filter_map(Value::as_str);
+                graph.entry(from.clone()).or_default().extend(to.map(str::to_owned));
+            }
+        }
+        for _ in 0..graph.len() {
+            let known = graph.clone();
+            for reached in graph.values_mut() {
+                let further = reached.iter().filter_map(|status| known.get(status)).flatten();
+                let further: Vec<String> = further.cloned().collect();
+                reached.extend(further);
+            }
+        }
+        Self(graph)
+    }
 
-fn known(status: &str) -> bool {
-    matches!(
-        status,
-        "WAITING" | "INITIALIZING" | "RUNNING" | "PAUSED" | "RETRIABLE" | "FINISHED" | "FAILED"
-    )
-}
+    fn reachable(&self, from: &str, to: &str) -> bool {
+        from == to || self.0.get(from).is_none_or(|reached| reached.contains(to))
+    }
 
-/// Id and status of every action state.
-fn statuses(state: &Value) -> impl Iterator<Item = (&str, &str)> {
-    elements(state, "actionStates")
-        .take(ACTIONS)
-        .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
-        .filter(|(id, status)| !id.is_empty() && id.len() <= 512 && known(status))
+    /// Whether nothing leads out of this status.
+    fn terminal(&self, status: &str) -> bool {
+        self.0.get(status).is_some_and(BTreeSet::is_empty)
+    }
+
+    /// Id and status of every action state; statuses that do not exist are another check's business.
+    fn statuses<'v>(&self, state: &'v Value) -> impl Iterator<Item = (&'v str, &'v str)> {
+        elements(state, "actionStates")
+            .take(ACTIONS)
+            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
+            .filter(|(id, status)| !id.is_empty() && id.len() <= 512 && self.0.contains_key(*status))
+    }
 }
 
 #[derive(Default)]
 struct Transitions {
+    graph: Graph,
     traffic: Traffic,
     last: HashMap<String, String>,
 }
@@ -78,15 +111,19 @@ impl Running for Transitions {
         };
         let seq = entry.seq();
         let mut now = HashMap::new();
-        for (id, status) in statuses(state) {
+        for (id, status) in self.graph.statuses(state) {
             if now.insert(id.to_owned(), status.to_owned()).is_some() {
                 let text = format!("actionStates lists {} more than once", quote(id));
                 findings.push(broken("STATE-MSG-09", seq, text));
                 continue;
             }
             let Some(before) = self.last.get(id) else { continue };
-            if !reachable(before, status) {
-                let requirement = if terminal(before) { "ASTATE-06" } else { "ASTATE-05" };
+            if !self.graph.reachable(before, status) {
+                let requirement = if self.graph.terminal(before) {
+                    "ASTATE-06"
+                } else {
+                    "ASTATE-05"
+                };
                 let text = format!("action {} goes from {before} to {status}", quote(id));
                 findings.push(broken(requirement, seq, text));
             }
@@ -100,6 +137,7 @@ impl Running for Transitions {
 
 #[derive(Default)]
 struct Kept {
+    graph: Graph,
     traffic: Traffic,
     order: Option<(String, u64)>,
     listed: HashMap<String, String>,
@@ -113,14 +151,7 @@ impl Running for Kept {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         // A restarted vehicle may have forgotten everything; what it keeps over a restart is not ruled.
-        let restarted = matches!(
-            entry.event(),
-            Event::Packet {
-                packet: Packet::Connect { .. },
-                ..
-            }
-        );
-        if outside_influence(entry) || restarted {
+        if outside_influence(entry) || maybe_restarted(self.traffic, entry, context) {
             self.listed.clear();
         }
         if let Some(message) = to_vehicle("instantActions", entry, context) {
@@ -143,7 +174,9 @@ impl Running for Kept {
             text(state, "orderId").to_owned(),
             state.get("orderUpdateId").and_then(Value::as_u64).unwrap_or_default(),
         );
-        let now: HashMap<String, String> = statuses(state)
+        let now: HashMap<String, String> = self
+            .graph
+            .statuses(state)
             .map(|(id, status)| (id.to_owned(), status.to_owned()))
             .collect();
         let complete = elements(state, "actionStates").count() == now.len();
@@ -178,7 +211,7 @@ impl Kept {
             "action {} was {status} and is gone, although no new order was accepted",
             quote(id)
         );
-        if !terminal(status) {
+        if !self.graph.terminal(status) {
             // An update may delete a horizon and its actions with it.
             if !updated {
                 findings.push(broken("STATE-MSG-09", seq, text));
@@ -285,6 +318,14 @@ mod tests {
             .state(&actions(&[]));
         trace.state(&actions(&[("c", "WAITING")]));
         trace.state(&json!({ "orderId": "o", "orderUpdateId": 1 }));
+        assert!(trace.judge("state/action-states-kept").findings.is_empty());
+    }
+
+    #[test]
+    fn without_the_tap_a_new_online_counts_as_a_possible_restart() {
+        let mut trace = Trace::subscriber();
+        trace.state(&actions(&[("a", "FINISHED")]));
+        trace.connection("ONLINE").state(&actions(&[]));
         assert!(trace.judge("state/action-states-kept").findings.is_empty());
     }
 

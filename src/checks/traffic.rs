@@ -125,6 +125,17 @@ pub(super) fn to_vehicle<'e>(name: &str, entry: &'e Entry, context: &CheckContex
         .flatten()
 }
 
+/// Whether this is a message towards the vehicle on `name`, readable or not.
+pub(super) fn is_to_vehicle(name: &str, entry: &Entry, context: &CheckContext<'_>) -> bool {
+    match entry.event() {
+        Event::Sent { topic, .. }
+        | Event::Message {
+            topic, retain: false, ..
+        } => context.topic_name(topic) == Some(name),
+        _ => false,
+    }
+}
+
 /// Every action of an instantActions message, whatever else is wrong with it.
 pub(super) fn actions(message: &Value) -> impl Iterator<Item = &Value> {
     // 1.1 and careless senders call the list `instantActions`.
@@ -167,6 +178,21 @@ pub(super) fn device_publish(entry: &Entry) -> Option<(u64, &str, u8, bool, bool
 /// Whether something outside the protocol may have changed the vehicle: a hook was run or a person acted.
 pub(super) fn outside_influence(entry: &Entry) -> bool {
     matches!(entry.event(), Event::Hook { .. } | Event::Answer { .. })
+}
+
+/// Whether the device may have been restarted: it opens a connection, or says something about it.
+pub(super) fn maybe_restarted(traffic: Traffic, entry: &Entry, context: &CheckContext<'_>) -> bool {
+    let connects = matches!(
+        entry.event(),
+        Event::Packet {
+            packet: Packet::Connect { .. },
+            ..
+        }
+    );
+    connects
+        || traffic
+            .delivered(entry, context)
+            .is_some_and(|message| message.name == "connection")
 }
 
 /// Whether a connection message says that the connection is broken. Spelled with or without underscore

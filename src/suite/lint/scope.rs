@@ -26,13 +26,11 @@ const TIMES: [&str; 12] = [
 ];
 
 /// The names of `device.` that a profile may give.
-const PROFILE: [&str; 6] = [
+const PROFILE: [&str; 4] = [
     "longAction.type",
     "longAction.parameters",
     "uninterruptibleAction.type",
     "uninterruptibleAction.parameters",
-    "activeMap.mapId",
-    "activeMap.mapVersion",
 ];
 
 /// Where names of a test come from.
