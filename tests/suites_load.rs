@@ -23,6 +23,8 @@ const HOOKS: &[(&str, &[&str])] = &[
     ("press-pause", &[]),
     ("release-pause", &[]),
     ("enable-map", &["mapId", "mapVersion"]),
+    ("place-load", &["loadType"]),
+    ("remove-load", &["loadType"]),
 ];
 
 fn load() -> (Suites, Catalogue) {

@@ -58,7 +58,7 @@ pub(super) const SCHEMA: Check = Check {
 /// `message/encoding`.
 pub(super) const ENCODING: Check = Check {
     name: "message/encoding",
-    decides: &["MQTT-02", "JSON-03", "JSON-08"],
+    decides: &["MQTT-02", "JSON-03", "JSON-08", "JSON-10"],
     doc: "Every payload is one JSON object in UTF-8 without NaN, Infinity or numbers beyond all limits. A byte order \
           mark and a member that occurs twice are warnings. Clearing a retained topic with nothing is no finding.",
     arguments: &[],
@@ -227,7 +227,7 @@ impl Running for Encoding {
                     findings.push(broken("MQTT-02", seq, text));
                 }
                 JsonProblem::ByteOrderMark => findings.push(remark("JSON-03", seq, text)),
-                JsonProblem::DuplicateMember(_) => findings.push(remark("MQTT-02", seq, text)),
+                JsonProblem::DuplicateMember(_) => findings.push(remark("JSON-10", seq, text)),
                 JsonProblem::Syntax(reason) => {
                     if reason.contains("number out of range") || names_no_number(payload.bytes()) {
                         findings.push(broken("JSON-08", seq, text.clone()));
@@ -372,7 +372,7 @@ mod tests {
         assert_eq!(encoded(b"{\"a\":1} {}"), ["MQTT-02"]);
         assert_eq!(encoded(b"{\"a\":\"\xff\"}"), ["JSON-03", "MQTT-02"]);
         assert_eq!(encoded(b"\xef\xbb\xbf{}"), ["JSON-03 warning"]);
-        assert_eq!(encoded(b"{\"a\":1,\"a\":2}"), ["MQTT-02 warning"]);
+        assert_eq!(encoded(b"{\"a\":1,\"a\":2}"), ["JSON-10 warning"]);
         assert_eq!(encoded(b"{\"a\":NaN}"), ["JSON-08", "MQTT-02"]);
         assert_eq!(encoded(b"{\"a\":-Infinity}"), ["JSON-08", "MQTT-02"]);
         assert_eq!(encoded(b"{\"a\":1e999}"), ["JSON-08", "MQTT-02"]);

@@ -9,6 +9,7 @@
 
 mod connection;
 mod errors;
+mod factsheet;
 mod header;
 mod header_id;
 mod message;
@@ -115,7 +116,7 @@ pub fn find(name: &str) -> Option<&'static Check> {
     REGISTRY.iter().find(|check| check.name == name)
 }
 
-static REGISTRY: [Check; 25] = [
+static REGISTRY: [Check; 26] = [
     message::SCHEMA,
     message::ENCODING,
     header_id::ID_RISES,
@@ -141,6 +142,7 @@ static REGISTRY: [Check; 25] = [
     state_values::IDENTIFIERS,
     state_values::DRIVING,
     errors::PERSIST,
+    factsheet::CONSISTENCY,
 ];
 
 #[cfg(test)]

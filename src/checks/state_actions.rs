@@ -211,23 +211,22 @@ impl Kept {
             "action {} was {status} and is gone, although no new order was accepted",
             quote(id)
         );
-        if !self.graph.terminal(status) {
+        if !self.graph.terminal(status) && updated {
             // An update may delete a horizon and its actions with it.
-            if !updated {
-                findings.push(broken("STATE-MSG-09", seq, text));
-            }
-        } else if self.limit > 0 && count >= self.limit {
-            findings.push(remark(
-                "STATE-MSG-10",
-                seq,
-                format!("{text}; the factsheet allows {} of them", self.limit),
-            ));
-        } else {
-            if cancelled && !self.cancels.iter().any(|cancel| cancel == id) {
-                findings.push(broken("ORD-CANCEL-12", seq, text.clone()));
-            }
-            findings.push(broken("STATE-MSG-10", seq, text));
+            return;
         }
+        if self.limit > 0 && count >= self.limit {
+            let text = format!("{text}; the factsheet allows {} of them", self.limit);
+            findings.push(remark("STATE-MSG-10", seq, text));
+            return;
+        }
+        if cancelled && !self.cancels.iter().any(|cancel| cancel == id) {
+            findings.push(broken("ORD-CANCEL-12", seq, text.clone()));
+        }
+        if !self.graph.terminal(status) {
+            findings.push(broken("STATE-MSG-09", seq, text.clone()));
+        }
+        findings.push(broken("STATE-MSG-10", seq, text));
     }
 
     fn factsheet_limit(&self, entry: &Entry, context: &CheckContext<'_>) -> Option<usize> {
@@ -338,7 +337,7 @@ mod tests {
             .state(&actions(&[]));
         assert_eq!(
             trace.judge("state/action-states-kept").summary(),
-            ["STATE-MSG-10", "STATE-MSG-09"]
+            ["STATE-MSG-10", "STATE-MSG-09", "STATE-MSG-10"]
         );
     }
 
