@@ -1,0 +1,66 @@
+//! Proof of every check, in virtual time: the faultless reference AGV passes everything without a warning, and
+//! every clause and monitor is failed by a named fault. The kill matrix is a snapshot.
+
+use vda5050_tck::reference::agv::FAULTS;
+use vda5050_tck::run::{Library, Qualification, qualify};
+
+/// Clauses and monitors no fault can fail yet: place, requirement, and why not.
+const UNPROVEN: &str = include_str!("qualification/unproven.tsv");
+
+/// Faults that no test or monitor finds yet, and why not: what they break is decided by tests to come.
+const UNFOUND: &str = include_str!("qualification/unfound.tsv");
+
+fn library() -> Library {
+    Library::load(None).unwrap_or_else(|all| panic!("{}", all.iter().map(ToString::to_string).collect::<String>()))
+}
+
+fn blemishes(outcome: &Qualification) -> String {
+    let lines = outcome.blemishes.iter();
+    lines.map(|(decider, verdict)| format!("{verdict} {} {}\n", decider.requirement, decider.place)).collect()
+}
+
+/// Lines of a table: the first column is the key, the last one a reason, which has to be there.
+fn table(text: &str) -> Vec<(String, String)> {
+    let rows = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
+    rows.map(|line| {
+        let (key, reason) = line.rsplit_once('\t').unwrap_or_else(|| panic!("no reason: {line}"));
+        assert!(reason.len() > 15, "no reason: {line}");
+        (key.replace('\t', " "), reason.to_owned())
+    })
+    .collect()
+}
+
+#[test]
+fn every_check_passes_without_a_fault_and_is_failed_by_one() {
+    let library = library();
+    let pack = library.rules.packs.latest().clone();
+    let outcome = qualify(&library, &pack, FAULTS).expect("qualified");
+    assert_eq!(blemishes(&outcome), "", "not a pass on the faultless reference AGV");
+
+    let excused = table(UNPROVEN);
+    let unproven: Vec<String> =
+        outcome.unproven().iter().map(|decider| format!("{} {}", decider.requirement, decider.place)).collect();
+    let new: Vec<_> = unproven.iter().filter(|one| !excused.iter().any(|(key, _)| key == *one)).collect();
+    assert!(new.is_empty(), "no fault can fail these:\n{new:#?}");
+    let old: Vec<_> = excused.iter().filter(|(key, _)| !unproven.contains(key)).collect();
+    assert!(old.is_empty(), "these are proven by now; take them out of unproven.tsv:\n{old:#?}");
+
+    let excused = table(UNFOUND);
+    let unfound: Vec<String> = outcome.missed().iter().map(|kill| kill.fault.name.to_owned()).collect();
+    let new: Vec<_> = unfound.iter().filter(|one| !excused.iter().any(|(key, _)| key == *one)).collect();
+    assert!(new.is_empty(), "no requirement they name fails with these faults:\n{new:#?}");
+    let old: Vec<_> = excused.iter().filter(|(key, _)| !unfound.contains(key)).collect();
+    assert!(old.is_empty(), "these are found by now; take them out of unfound.tsv:\n{old:#?}");
+
+    insta::assert_snapshot!("kill_matrix", outcome.matrix());
+}
+
+#[test]
+fn the_older_version_passes_without_a_fault_too() {
+    let library = library();
+    for pack in library.rules.packs.all() {
+        let outcome = qualify(&library, pack, &[]).expect("qualified");
+        assert_eq!(blemishes(&outcome), "", "VDA 5050 {}", pack.version);
+        assert!(outcome.deciders.len() > 100, "VDA 5050 {}: only {} deciders", pack.version, outcome.deciders.len());
+    }
+}
