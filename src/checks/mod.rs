@@ -19,6 +19,7 @@ mod state_actions;
 mod state_maps;
 mod state_period;
 mod state_route;
+mod state_triggers;
 mod state_values;
 mod topic;
 #[cfg(test)]
@@ -116,7 +117,7 @@ pub fn find(name: &str) -> Option<&'static Check> {
     REGISTRY.iter().find(|check| check.name == name)
 }
 
-static REGISTRY: [Check; 26] = [
+static REGISTRY: [Check; 27] = [
     message::SCHEMA,
     message::ENCODING,
     header_id::ID_RISES,
@@ -136,6 +137,7 @@ static REGISTRY: [Check; 26] = [
     state_actions::KEPT,
     state_route::REMAINING_ROUTE,
     state_route::LAST_NODE,
+    state_triggers::TRIGGERS,
     state_values::IDLE_EMPTY,
     state_maps::MAPS,
     state_values::POSITION_RANGE,

@@ -59,6 +59,31 @@ pub(super) fn number(message: &Value, name: &str) -> Option<u64> {
     value.as_u64().or_else(|| whole(value.as_f64()?))
 }
 
+/// An action of an order and where it is to be done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Placed {
+    pub action: String,
+    /// sequenceId of its node or edge.
+    pub sequence: u64,
+    pub on_edge: bool,
+}
+
+/// The actions of all elements of `list`, bounded.
+fn placed(message: &Value, list: &str, on_edge: bool) -> Vec<Placed> {
+    let of_element = |element| {
+        let sequence = number(element, "sequenceId");
+        elements(element, "actions").filter_map(move |action| {
+            let action = action.get("actionId")?.as_str()?.chars().take(512).collect();
+            Some(Placed {
+                action,
+                sequence: sequence?,
+                on_edge,
+            })
+        })
+    };
+    elements(message, list).flat_map(of_element).take(ELEMENTS).collect()
+}
+
 /// One order message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct SentOrder {
@@ -66,6 +91,7 @@ pub(super) struct SentOrder {
     pub update: u64,
     pub nodes: Vec<Element>,
     pub edges: Vec<Element>,
+    pub actions: Vec<Placed>,
     /// Whether its graph is one that a vehicle may accept. Tests also send others, on purpose.
     pub sound: bool,
 }
@@ -82,6 +108,7 @@ impl SentOrder {
             update,
             nodes: nodes.unwrap_or_default(),
             edges: edges.unwrap_or_default(),
+            actions: [placed(message, "nodes", false), placed(message, "edges", true)].concat(),
             sound,
         };
         sent.sound &= sent.is_chain();

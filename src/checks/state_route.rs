@@ -34,21 +34,21 @@ pub(super) const LAST_NODE: Check = Check {
 
 /// The order a vehicle shows in its states, and whether it can still be held against it.
 #[derive(Default)]
-struct Shown {
+pub(super) struct Shown {
     traffic: Traffic,
-    orders: Orders,
+    pub orders: Orders,
     /// orderId of the last state.
     order: Option<String>,
     /// orderId of an order that was cancelled or may have been abandoned.
     abandoned: Option<String>,
     /// Last node of the state before the order changed: not yet progress in the new one.
-    carried: Option<(String, u64)>,
-    last: Option<(String, u64)>,
+    pub carried: Option<(String, u64)>,
+    pub last: Option<(String, u64)>,
 }
 
 impl Shown {
     /// Learns from an entry; gives back a state that can be held against its order.
-    fn state<'e>(&mut self, entry: &'e Entry, context: &CheckContext<'_>) -> Option<&'e Value> {
+    pub fn state<'e>(&mut self, entry: &'e Entry, context: &CheckContext<'_>) -> Option<&'e Value> {
         self.traffic.note(entry);
         self.orders.note(entry, context);
         let moved = to_vehicle("instantActions", entry, context).is_some_and(|message| {
@@ -84,6 +84,8 @@ struct RemainingRoute {
     shown: Shown,
     /// orderUpdateIds of the present order that states have shown.
     adopted: BTreeSet<u64>,
+    /// The next node was gone before it was the last node: its sequenceId, and what to say if it stays so.
+    early: Option<(u64, Vec<CheckFinding>)>,
     of: Option<String>,
 }
 
@@ -121,16 +123,48 @@ impl Running for RemainingRoute {
         let seq = entry.seq();
         let best = candidates
             .into_iter()
-            .map(|sent| self.held_against(sent, &nodes, &edges, seq))
-            .min_by_key(Vec::len);
-        findings.extend(best.unwrap_or_default());
+            .map(|sent| (self.held_against(sent, &nodes, &edges, seq), sent))
+            .min_by_key(|(found, _)| found.len());
+        let Some((found, sent)) = best else { return false };
+        let progress = self.progress(sent);
+        if let Some((next, said)) = self.early.take() {
+            if progress.is_some_and(|progress| progress >= next) {
+                let text = "a node is removed in one state and becomes the last node in another";
+                findings.push(remark("NODE-03", seq, text));
+            } else {
+                findings.extend(said);
+            }
+        }
+        // Everything as if the next node had been reached already: perhaps the next state says so.
+        let next = self
+            .remainder(sent, progress, |order| &order.nodes)
+            .required
+            .iter()
+            .map(|node| node.sequence)
+            .min();
+        match next.filter(|_| !found.is_empty() && progress.is_some()) {
+            Some(next) if self.held_at(sent, Some(next), &nodes, &edges, seq).is_empty() => {
+                self.early = Some((next, found));
+            }
+            _ => findings.extend(found),
+        }
         true
     }
 }
 
 impl RemainingRoute {
     fn held_against(&self, sent: &SentOrder, nodes: &[Element], edges: &[Element], seq: u64) -> Vec<CheckFinding> {
-        let progress = self.progress(sent);
+        self.held_at(sent, self.progress(sent), nodes, edges, seq)
+    }
+
+    fn held_at(
+        &self,
+        sent: &SentOrder,
+        progress: Option<u64>,
+        nodes: &[Element],
+        edges: &[Element],
+        seq: u64,
+    ) -> Vec<CheckFinding> {
         let mut found = Vec::new();
         let remainder = self.remainder(sent, progress, |order| &order.nodes);
         compare("nodeStates", "node", &remainder, nodes, (progress, seq), &mut found);
@@ -436,6 +470,23 @@ mod tests {
             trace.state(&state(0, ("b", 2), &["b", "c"], 2, 2));
         });
         assert_eq!(outcome, ["NODE-03 warning"]);
+    }
+
+    #[test]
+    fn a_traversal_told_in_two_states_is_a_remark_and_a_lost_node_is_not() {
+        let told = |second: Value| {
+            route_of(|trace| {
+                trace.sent("order", &order(0, &["a", "b", "c"], 0, 3));
+                trace.state(&under_way(0, &["a", "b", "c"], 0, 3));
+                let early = json!({ "lastNodeId": "a", "lastNodeSequenceId": 0 });
+                trace.state(&merged(under_way(0, &["b", "c"], 2, 2), &early));
+                trace.state(&second);
+            })
+        };
+        assert_eq!(told(under_way(0, &["b", "c"], 2, 2)), ["NODE-03 warning"]);
+        let still = json!({ "lastNodeId": "a", "lastNodeSequenceId": 0 });
+        let lost = told(merged(under_way(0, &["b", "c"], 2, 2), &still));
+        assert_eq!(lost, ["STATE-12", "STATE-12"]);
     }
 
     #[test]
