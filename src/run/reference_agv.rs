@@ -103,6 +103,7 @@ impl ReferenceAgv {
             ("uninterruptible-action", true),
             ("edge-actions", true),
             ("no-charger-on-course", true),
+            ("carries-load", true),
             ("map-hash", true),
             ("line-guided", false),
             ("free-navigation", true),
