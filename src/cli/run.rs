@@ -22,6 +22,7 @@ use crate::link::{LinkError, Vantage};
 use crate::pack::Pack;
 use crate::profile::{self, Claim, Effective, Profile, Surroundings, TimeLimits};
 use crate::reference::agv::Agv;
+use crate::report::result::RunResult;
 use crate::report::text;
 use crate::run::device_driver::RunningDevice;
 use crate::run::hooks::{DeviceProcess, ProfileHooks};
@@ -446,10 +447,17 @@ impl Job {
         match end {
             End::Completed => Ok(Exit::of(result.verdict)),
             End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
-            End::NoDevice(why) => Err(Problem::Environment(format!("{why}; the partial report is in {shown}"))),
-            End::Broken(error) => Err(Problem::Environment(format!("{error}; the partial report is in {shown}"))),
+            End::NoDevice(why) => Ok(broken_off(&why, &shown, &result)),
+            End::Broken(error) => Ok(broken_off(&error.to_string(), &shown, &result)),
         }
     }
+}
+
+/// Says why a run broke off. A failure that was found before stands on its evidence.
+fn broken_off(why: &str, report: &str, result: &RunResult) -> Exit {
+    let problem = Problem::Environment(format!("{why}; the partial report is in {report}"));
+    eprintln!("{}", problem.render(console::colors_enabled_stderr()));
+    Exit::of_partial(result.verdict, false)
 }
 
 const NO_MOTION: &str = "motion was ruled out by --no-motion";

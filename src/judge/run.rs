@@ -210,6 +210,9 @@ impl RunJudge {
             .filter_map(|test| test.verdict)
             .chain(monitors.iter().filter_map(|monitor| monitor.verdict));
         let verdict: Accumulated = all.collect();
+        // Monitors alone make no device conform when tests were planned and none of them applied.
+        let none_applied = !tests.is_empty() && tests.iter().all(|test| test.verdict.is_none());
+        let verdict = verdict.get().filter(|verdict| !none_applied || *verdict > Verdict::Warning);
         let (partial, reason) = match &self.end {
             Some((partial, reason)) => (*partial, reason.clone()),
             None => (true, Some("the run has not ended yet".to_owned())),
@@ -225,7 +228,7 @@ impl RunJudge {
             protocol: header.protocol.clone(),
             partial,
             partial_reason: reason.filter(|_| partial),
-            verdict: verdict.get(),
+            verdict,
             device: DeviceIdentity {
                 manufacturer: header.manufacturer.clone(),
                 serial_number: header.serial_number.clone(),

@@ -9,6 +9,7 @@ use super::session::Session;
 use crate::engine::{EngineError, Operator, Recorder};
 use crate::journal::event::Event;
 use crate::link::Link;
+use crate::profile::show_duration;
 
 impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Waits for the device, its first state and its factsheet. `Err` says why it cannot be judged.
@@ -18,7 +19,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let until = self.engine.link.now().moment + patience;
         let there = |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
         if !self.engine.watch(until, there).await? {
-            return Ok(Err(format!("no device connected within {} s", patience.as_secs())));
+            return Ok(Err(format!("no device connected within {}", show_duration(patience))));
         }
         let begun = self.engine.recorder.journal().entries().len() as u64;
         let has_state = |recorder: &Recorder| {
@@ -32,8 +33,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let until = self.engine.link.now().moment + self.time("statePeriod");
         if !self.engine.watch(until, has_state).await? {
             let why = format!(
-                "the device connected (see #{begun}) but sent no state within {} s",
-                self.time("statePeriod").as_secs()
+                "the device connected (see #{begun}) but sent no state within {}",
+                show_duration(self.time("statePeriod"))
             );
             return Ok(Err(why));
         }

@@ -8,6 +8,7 @@ use crate::engine::{EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, LinkFault};
 use crate::judge::RunJudge;
 use crate::link::{Link, Vantage};
+use crate::profile::show_duration;
 
 /// Whether the device is connected, as far as the harness can see.
 pub(super) enum Presence {
@@ -103,8 +104,8 @@ pub(super) async fn revive<L: Link, O: Operator>(
         return Ok(None);
     }
     let mut why = format!(
-        "the device is gone: it did not come back within {} s",
-        session.time("reconnect").as_secs()
+        "the device is gone: it did not come back within {}",
+        show_duration(session.time("reconnect"))
     );
     if has_hook {
         let sent = last_sent(session.engine.recorder.judge(), &session.engine.recorder);

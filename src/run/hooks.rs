@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 use tokio::process::{Child, Command};
 
 use crate::engine::{HookOutcome, Operator};
-use crate::profile::{Hook, HookAction};
+use crate::profile::{Hook, HookAction, show_duration};
 
 /// A device that the harness starts itself (`device.command`).
 #[derive(Debug)]
@@ -135,7 +135,7 @@ impl ProfileHooks {
                 None => Ok(HookOutcome::Failed("the profile has no `device.command` that could be started".to_owned())),
             },
         };
-        outcome.unwrap_or_else(|_| HookOutcome::Failed(format!("not done within {} s", hook.timeout.as_secs())))
+        outcome.unwrap_or_else(|_| HookOutcome::Failed(format!("not done within {}", show_duration(hook.timeout))))
     }
 }
 

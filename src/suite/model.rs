@@ -1,5 +1,7 @@
 //! What a test is, once it has been read and linted.
 
+mod monitor;
+
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -116,6 +118,7 @@ pub enum Need {
 }
 
 pub use crate::course::CourseNeed;
+pub use monitor::{Monitor, Rule};
 
 /// One step.
 #[derive(Clone, Debug)]
@@ -556,50 +559,4 @@ impl Path {
                 other => other.get(part),
             })
     }
-}
-
-/// An always-on check.
-#[derive(Clone, Debug)]
-pub struct Monitor {
-    /// Path below `suites/monitors/` without extension.
-    pub id: String,
-    /// One sentence.
-    pub title: String,
-    /// Which side it judges.
-    pub device: Option<Role>,
-    /// Protocol versions it is written for.
-    pub spec: VersionRange,
-    /// What must be given for it to apply.
-    pub needs: Vec<Need>,
-    /// What it decides.
-    pub checks: Vec<Binding>,
-    /// Why anybody cares.
-    pub why: String,
-    /// The rule.
-    pub rule: Rule,
-    /// The file.
-    pub source: Arc<Source>,
-}
-
-/// What a monitor holds true.
-#[derive(Clone, Debug)]
-pub enum Rule {
-    /// Every message on the topic that matches `when` matches `pattern`.
-    Always {
-        /// Topic name or `mqtt/…`.
-        topic: String,
-        /// Which messages are judged; absent is all.
-        when: Option<Pattern>,
-        /// What they must show.
-        pattern: Pattern,
-    },
-    /// No message on the topic matches.
-    Never {
-        /// Topic name or `mqtt/…`.
-        topic: String,
-        /// What must not come.
-        pattern: Pattern,
-    },
-    /// A named check sees everything.
-    Check(CheckUse),
 }

@@ -138,7 +138,7 @@ pub(super) fn mistakes() -> Vec<Mistake> {
         (state, "/agvPosition/theta", put(json!(6)), Range),
         (state, "/agvPosition/positionInitialized", None, Missing),
         (state, "/agvPosition/localizationScore", put(json!(97)), Range),
-        (state, "/agvPosition/x", put(json!("2.25")), Type),
+        (state, "/agvPosition/x", put(json!("0.25")), Type),
         (state, "/velocity/vx", put(json!(null)), Type),
         (state, "/loads/0/weight", put(json!(-1)), Range),
         (state, "/loads/0/loadDimensions/width", None, Missing),

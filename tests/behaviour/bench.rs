@@ -1,0 +1,174 @@
+//! A run against a device of its own: profile, folder, and the process that is judged.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::tool::{Ended, Running, run_in, tool};
+
+pub const MANUFACTURER: &str = "ACME";
+pub const SERIAL: &str = "0001";
+
+/// A test that needs no course and is over in a moment.
+pub const QUICK: &str = "instant-actions/factsheet-request";
+/// A test that sends an order, is over in a moment, and does not move the vehicle.
+pub const REFUSAL: &str = "order-rejection/unreadable[truncated]";
+
+/// A profile that knows four nodes of the reference floor, and is patient enough for a busy machine.
+pub struct Profile {
+    pub device: String,
+    pub bench: String,
+    pub motion: bool,
+    pub time: Vec<(&'static str, &'static str)>,
+    pub more: String,
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        Self {
+            device: String::new(),
+            bench: String::new(),
+            motion: false,
+            time: vec![
+                ("connect", "20 s"),
+                ("drive", "20 s"),
+                ("event", "4 s"),
+                ("quiet", "200 ms"),
+                ("settle", "300 ms"),
+                ("reconnect", "1 s"),
+            ],
+            more: String::new(),
+        }
+    }
+}
+
+impl Profile {
+    /// For devices that do not answer: nothing is waited for long.
+    pub fn impatient() -> Self {
+        Self::default().with(&[("react", "500 ms"), ("slow", "400 ms")])
+    }
+
+    pub fn with(mut self, time: &[(&'static str, &'static str)]) -> Self {
+        self.time.retain(|(name, _)| time.iter().all(|(other, _)| other != name));
+        self.time.extend(time);
+        self
+    }
+
+    pub fn text(&self) -> String {
+        let time: String = self.time.iter().map(|(name, limit)| format!("{name} = \"{limit}\"\n")).collect();
+        format!(
+            r#"
+[device]
+manufacturer = "{MANUFACTURER}"
+serial-number = "{SERIAL}"
+{}
+[bench]
+listen = "127.0.0.1:0"
+{}
+[motion]
+allowed = {}
+[layout]
+nodes = [
+  {{ id = "A1", x = 0.0, y = 0.0, map = "reference-floor" }}, {{ id = "A2", x = 0.0, y = 2.0, map = "reference-floor" }},
+  {{ id = "A3", x = 0.0, y = 4.0, map = "reference-floor" }}, {{ id = "A4", x = 0.0, y = 6.0, map = "reference-floor" }},
+]
+edges = [
+  {{ id = "A1-A2", from = "A1", to = "A2" }}, {{ id = "A2-A1", from = "A2", to = "A1" }},
+  {{ id = "A2-A3", from = "A2", to = "A3" }}, {{ id = "A3-A2", from = "A3", to = "A2" }},
+  {{ id = "A3-A4", from = "A3", to = "A4" }}, {{ id = "A4-A3", from = "A4", to = "A3" }},
+]
+[time]
+{time}
+{}
+"#,
+            self.device, self.bench, self.motion, self.more
+        )
+    }
+}
+
+/// A folder for one run.
+pub struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Runs the program in this folder.
+    pub fn run(&self, arguments: &[&str]) -> Ended {
+        run_in(self.path(), arguments)
+    }
+
+    /// Starts `run` for the device of a profile; gives where the device is expected.
+    pub fn start(&self, profile: &Profile, arguments: &[&str]) -> (Running, u16) {
+        std::fs::write(self.path().join("device.toml"), profile.text()).unwrap();
+        let all = [&["run", "--profile", "device.toml"], arguments].concat();
+        let mut running = Running::start(&mut tool(self.path(), &all));
+        let address = running.line("the device is expected at mqtt://");
+        let port = address.rsplit(':').next().and_then(|port| port.parse().ok());
+        (running, port.unwrap_or_else(|| panic!("no port in {address}")))
+    }
+
+    /// A reference AGV in a process of its own, under the name of the profile.
+    pub fn agv(&self, port: u16, faults: &[&str]) -> Running {
+        let broker = format!("mqtt://127.0.0.1:{port}");
+        let mut arguments = vec!["simulate", "agv", "--broker", &broker, "--manufacturer", MANUFACTURER, "--serial", SERIAL];
+        arguments.extend(faults.iter().flat_map(|fault| ["--fault", fault]));
+        Running::start(&mut tool(self.path(), &arguments))
+    }
+
+    /// The folder of the only run there was.
+    pub fn bundle(&self) -> PathBuf {
+        let runs = bundles(&self.path().join("reports"));
+        assert_eq!(runs.len(), 1, "{runs:?}");
+        runs[0].clone()
+    }
+
+    /// `result.json` of the only run there was.
+    pub fn result(&self) -> Value {
+        let text = std::fs::read(self.bundle().join("result.json")).unwrap();
+        serde_json::from_slice(&text).unwrap()
+    }
+
+    /// Holds that the run left a whole report that says it is partial, and a journal that is closed.
+    #[track_caller]
+    pub fn is_partial(&self) {
+        let bundle = self.bundle();
+        assert_eq!(self.result()["partial"], true);
+        let journal = std::fs::read_to_string(bundle.join("journal.jsonl")).unwrap();
+        let last: Value = serde_json::from_str(journal.lines().last().unwrap()).unwrap();
+        assert_eq!(last["event"]["kind"], "run-ended", "{last}");
+        assert_eq!(last["event"]["partial"], true, "{last}");
+        let page = std::fs::read_to_string(bundle.join("report.html")).unwrap();
+        assert!(page.to_lowercase().contains("partial"), "the report does not say that it is partial");
+        self.is_whole();
+    }
+
+    /// Holds that everything a bundle has is there, can be read, and is what the journal gives.
+    #[track_caller]
+    pub fn is_whole(&self) {
+        let bundle = self.bundle();
+        let junit = std::fs::read_to_string(bundle.join("junit.xml")).unwrap();
+        roxmltree::Document::parse(&junit).unwrap_or_else(|error| panic!("{error}\n{junit}"));
+        let shown = bundle.display().to_string();
+        self.run(&["report", &shown, "--verify"]).code(0);
+        self.run(&["report", &shown, "--rejudge"]).code(0).prints("byte for byte");
+    }
+}
+
+/// The folders of all runs below `reports`.
+pub fn bundles(reports: &Path) -> Vec<PathBuf> {
+    let list = |folder: &Path| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten();
+        entries.map(|entry| entry.unwrap().path()).collect()
+    };
+    list(reports).iter().flat_map(|device| list(device)).collect()
+}

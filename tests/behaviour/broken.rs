@@ -1,0 +1,106 @@
+//! Devices and brokers that are not there, or not any more.
+
+use std::time::{Duration, Instant};
+
+use crate::bench::{Bench, Profile, QUICK, REFUSAL};
+use crate::mosquitto::Mosquitto;
+use crate::scripted::Scripted;
+use crate::tool::Running;
+
+/// Waits until the journal of the run shows this step begun.
+pub fn step_begun(bench: &Bench, run: &mut Running, path: &str) {
+    let wanted = format!("\"kind\":\"step-begun\",\"path\":\"{path}\"");
+    run.until(&wanted, |_| {
+        let journal = crate::bench::bundles(&bench.path().join("reports")).pop()?.join("journal.jsonl");
+        std::fs::read_to_string(journal).ok()?.contains(&wanted).then_some(())
+    });
+}
+
+/// A quick test that runs after [`REFUSAL`].
+pub const LATER: &str = "order-rejection/validation-error-stays";
+/// The step of [`REFUSAL`] that does nothing but watch.
+pub const WATCHING: &str = "steps[2]";
+
+#[test]
+fn a_device_that_never_comes_is_5_and_leaves_a_partial_report() {
+    let bench = Bench::new();
+    let (run, _) = bench.start(&Profile::default().with(&[("connect", "300 ms")]), &[QUICK]);
+    run.end().code(5).says_one_error("no device connected within 300 ms");
+    bench.is_partial();
+}
+
+#[test]
+fn a_device_that_sends_no_state_is_5() {
+    let bench = Bench::new();
+    let (run, port) = bench.start(&Profile::default().with(&[("state-period", "500 ms")]), &[QUICK]);
+    let _device = Scripted::online(port);
+    run.end().code(5).says_one_error("sent no state within 500 ms");
+    bench.is_partial();
+}
+
+#[test]
+fn a_device_killed_in_the_middle_of_a_test_leaves_the_rest_undecided() {
+    let bench = Bench::new();
+    let (mut run, port) = bench.start(&Profile::default().with(&[("quiet", "2 s")]), &[REFUSAL, LATER]);
+    let mut agv = bench.agv(port, &[]);
+    step_begun(&bench, &mut run, WATCHING);
+    agv.kill();
+    let ended = run.end().says("the device is not connected; waiting for it");
+    assert_ne!(ended.status.code(), Some(0), "{}", ended.stdout);
+    let result = bench.result();
+    let rest = result["tests"].as_array().unwrap().iter().find(|test| test["id"] == LATER).unwrap();
+    assert_eq!(rest["verdict"], "inconclusive", "{rest}");
+    assert!(rest["reason"].as_str().unwrap().contains("the device is gone"), "{rest}");
+    bench.is_whole();
+}
+
+#[test]
+fn a_device_that_is_started_again_by_the_harness_is_judged_on() {
+    let tool = env!("CARGO_BIN_EXE_vda5050-tck");
+    let profile = Profile {
+        device: format!(
+            "command = [{tool:?}, \"simulate\", \"agv\", \"--broker\", \"mqtt://{{broker-host}}:{{broker-port}}\", \
+             \"--manufacturer\", \"{{manufacturer}}\", \"--serial\", \"{{serial-number}}\"]"
+        ),
+        more: "[hooks.power-cycle]\nbuiltin = \"restart-command\"".to_owned(),
+        ..Profile::default()
+    };
+    let bench = Bench::new();
+    let (run, _) = bench.start(&profile, &["connection/online-after-start", QUICK]);
+    run.end().code(0);
+    bench.is_whole();
+}
+
+#[test]
+fn a_broker_killed_in_the_middle_of_a_test_is_5_and_the_journal_is_kept() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    let profile = Profile {
+        bench: format!("broker = \"{}\"", mosquitto.url()),
+        ..Profile::default().with(&[("quiet", "30 s")])
+    };
+    let (mut run, port) = bench.start(&profile, &[REFUSAL, LATER]);
+    let _agv = bench.agv(port, &[]);
+    step_begun(&bench, &mut run, WATCHING);
+    mosquitto.kill();
+    let killed = Instant::now();
+    run.end().code(5).says_one_error("broker").says("the partial report is in");
+    assert!(killed.elapsed() < Duration::from_secs(15), "it waited for a broker that is gone");
+    bench.is_partial();
+}
+
+#[test]
+fn without_a_tap_a_device_at_an_external_broker_is_judged_as_far_as_it_can_be_seen() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    let profile = Profile {
+        bench: format!("broker = \"{}\"\ntap = false", mosquitto.url()),
+        ..Profile::default()
+    };
+    let (run, port) = bench.start(&profile, &[REFUSAL]);
+    assert_eq!(port, mosquitto.port);
+    let _agv = bench.agv(port, &[]);
+    run.end().code(0);
+    assert_eq!(bench.result()["vantage"], "subscriber");
+    bench.is_whole();
+}

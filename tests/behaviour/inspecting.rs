@@ -1,0 +1,137 @@
+//! `validate`, `list` and `explain`.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::bench::{Bench, QUICK};
+use crate::tool::run;
+
+fn fixture(name: &str) -> String {
+    format!("{}/fixtures/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn every_kind_of_good_file_is_told_by_its_content() {
+    let bench = Bench::new();
+    bench.run(&["run", "--virtual", QUICK]).code(0);
+    let result = bench.bundle().join("result.json").display().to_string();
+    let suite = format!("{}/suites/agv/instant-actions/unknown.yaml", env!("CARGO_MANIFEST_DIR"));
+    for (file, what) in [
+        (fixture("messages/2.1/good/state-idle.json"), "a valid state message"),
+        (fixture("messages/2.0/good/order-full.json"), "a valid order message"),
+        (fixture("messages/2.1/good/connection-will.json"), "a valid connection message"),
+        (fixture("profiles/good/hall.toml"), "a profile"),
+        (fixture("layouts/hall.lif.json"), "a layout with"),
+        (suite, "test"),
+        (result, "a result of 1 tests"),
+    ] {
+        let ended = run(&["validate", &file]).code(0).prints(&file).prints(what);
+        assert_eq!(ended.stdout.lines().count(), 1, "{}", ended.stdout);
+    }
+}
+
+#[test]
+fn every_kind_of_bad_file_is_2_and_its_fault_is_named() {
+    let bench = Bench::new();
+    let state = fs::read_to_string(fixture("messages/2.1/good/state-idle.json")).unwrap();
+    let write = |name: &str, text: &[u8]| {
+        fs::write(bench.path().join(name), text).unwrap();
+        name.to_owned()
+    };
+    for (file, what) in [
+        (write("mode.json", state.replace("AUTOMATIC", "AUTOMATISCH").as_bytes()), "operatingMode"),
+        (write("twice.json", state.replacen('{', "{\"driving\": false,", 1).as_bytes()), "driving"),
+        (write("cut.json", &state.as_bytes()[..100]), "cut.json"),
+        (write("version.json", state.replace("2.1.0", "9.9.9").as_bytes()), "known versions"),
+        (write("other.json", b"{\"hello\": 1}"), "--topic"),
+        (write("binary", b"\xff\xfe\x00"), "UTF-8"),
+        (write("empty.json", b""), "empty.json"),
+        (write("layout.json", b"{\"metaInformation\": {}, \"layouts\": 3}"), "layout"),
+        (write("result.json", b"{\"format\": \"vda5050-tck.result/1\"}"), "result"),
+        (fixture("profiles/bad/unknown-key.toml"), "unknown-key.toml:"),
+        (fixture("bad-suites/unknown-topic.yaml"), "unknown-topic.yaml:"),
+        ("nowhere.json".to_owned(), "nowhere.json"),
+    ] {
+        let ended = bench.run(&["validate", &file]).code(2);
+        let said = format!("{}{}", ended.stdout, ended.stderr);
+        assert!(said.contains(what), "{file}: `{what}` is not in\n{said}");
+    }
+}
+
+#[test]
+fn of_several_files_every_one_is_checked() {
+    let good = fixture("messages/2.1/good/state-idle.json");
+    let bad = fixture("profiles/bad/unknown-key.toml");
+    let ended = run(&["validate", &bad, &good, "--format", "json"]).code(2);
+    let lines: Vec<Value> = ended.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let ok: Vec<_> = lines.iter().map(|line| (line["file"].as_str().unwrap(), line["ok"].as_bool().unwrap())).collect();
+    assert!(ok.contains(&(bad.as_str(), false)) && ok.contains(&(good.as_str(), true)), "{ok:?}");
+}
+
+#[test]
+fn what_there_is_can_be_listed() {
+    for (what, some) in [
+        ("tests", "order-rejection/lower-update-id"),
+        ("requirements", "ORD-REJ-03"),
+        ("coverage", "not testable"),
+        ("monitors", "state/remaining-route"),
+        ("faults", "outdated-update-taken-over"),
+        ("hooks", "power-cycle"),
+    ] {
+        let text = run(&["list", what]).code(0).prints(some);
+        assert_eq!(text.stderr, "");
+        let data = run(&["list", what, "--format", "json"]).code(0);
+        assert!(data.stdout.lines().count() >= 1);
+        for line in data.stdout.lines() {
+            assert!(serde_json::from_str::<Value>(line).unwrap().is_object(), "{line}");
+        }
+    }
+    run(&["list", "test"]).code(2);
+}
+
+#[test]
+fn a_list_is_of_one_version_and_one_side() {
+    let of = |arguments: &[&str]| run(&[&["list", "requirements"], arguments].concat()).code(0).stdout;
+    let (all, old) = (of(&[]), of(&["--protocol", "2.0"]));
+    assert!(all.contains("MAP-11") && !old.contains("MAP-11"), "maps came with 2.1");
+    let agv = of(&["--role", "agv"]);
+    assert!(agv.lines().count() < all.lines().count());
+}
+
+#[test]
+fn hooks_are_listed_with_what_is_true_afterwards() {
+    insta::assert_snapshot!(run(&["list", "hooks"]).code(0).stdout);
+}
+
+#[test]
+fn a_requirement_is_explained_with_what_decides_it() {
+    insta::assert_snapshot!(run(&["explain", "ORD-REJ-03"]).code(0).stdout);
+}
+
+#[test]
+fn everything_that_has_a_name_is_explained() {
+    for (name, what) in [
+        ("order-rejection/lower-update-id", "decides"),
+        ("order-rejection/unreadable", "cases          3"),
+        ("order-rejection/unreadable[empty]", "order-rejection/unreadable"),
+        ("state/remaining-route", "STATE-12"),
+        ("outdated-update-taken-over", "ORD-REJ-10"),
+        ("power-cycle", "hook power-cycle"),
+    ] {
+        run(&["explain", name]).code(0).prints(what);
+    }
+    run(&["explain", "power-cylce"]).code(2).says("did you mean `power-cycle`?");
+    let ended = run(&["explain", "\u{1b}[2Jxyzzyxyzzy"]).code(2);
+    assert!(!ended.stderr.contains('\u{1b}'));
+}
+
+#[test]
+fn help_is_no_mistake() {
+    let ended = run(&["--help"]).code(0).prints("Exit codes:");
+    assert_eq!(ended.stderr, "");
+    run(&["--version"]).code(0).prints("vda5050-tck ");
+    run(&[]).code(2);
+    assert!(Path::new(env!("CARGO_BIN_EXE_vda5050-tck")).exists());
+}

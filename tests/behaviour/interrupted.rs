@@ -1,0 +1,46 @@
+//! Ctrl-C: the run ends in good order, and what was decided is kept.
+
+use std::time::{Duration, Instant};
+
+use crate::bench::{Bench, Profile, REFUSAL};
+use crate::broken::{LATER, WATCHING, step_begun};
+use crate::tool::{Running, tool};
+
+#[test]
+fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_partial() {
+    let bench = Bench::new();
+    let (mut run, port) = bench.start(&Profile::default().with(&[("quiet", "40 s")]), &[REFUSAL, LATER]);
+    let _agv = bench.agv(port, &[]);
+    step_begun(&bench, &mut run, WATCHING);
+    run.interrupt();
+    let interrupted = Instant::now();
+    run.end().code(130);
+    assert!(interrupted.elapsed() < Duration::from_secs(20), "it waited to the end");
+    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    assert!(journal.contains("\"kind\":\"step-begun\",\"path\":\"finally"), "the postamble was left out");
+    assert!(!journal.contains(&format!("\"kind\":\"test-begun\",\"test\":\"{LATER}\"")), "it went on");
+    assert!(journal.contains("interrupted by the user"));
+    bench.is_partial();
+}
+
+#[test]
+fn while_it_waits_for_the_device_it_ends_at_once() {
+    let bench = Bench::new();
+    let (run, _) = bench.start(&Profile::default(), &[REFUSAL]);
+    std::thread::sleep(Duration::from_millis(200));
+    run.interrupt();
+    let interrupted = Instant::now();
+    run.end().code(130);
+    assert!(interrupted.elapsed() < Duration::from_secs(10));
+    bench.is_partial();
+}
+
+#[test]
+fn in_virtual_time_it_ends_as_well() {
+    let bench = Bench::new();
+    let mut run = Running::start(&mut tool(bench.path(), &["run", "--virtual"]));
+    run.until("a first test", |run| run.stdout().contains('\n').then_some(()));
+    run.interrupt();
+    run.end().code(130);
+    bench.is_partial();
+}

@@ -1,0 +1,19 @@
+//! The real program over real sockets: what it says, what it writes and how it ends, whatever the device does.
+//!
+//! Every test runs the binary in a folder of its own and on free ports, under a limit that kills it, and no run
+//! may panic. Few tests of the suite are used per run; whether the suite is right is proved elsewhere.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+mod bench;
+mod broken;
+mod exit_codes;
+mod hostile;
+mod inspecting;
+mod interrupted;
+mod mosquitto;
+mod output;
+mod rejudging;
+mod repeatable;
+mod scripted;
+mod simulating;
+mod tool;

@@ -1,0 +1,75 @@
+//! A broker that is not ours.
+
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// A mosquitto of this test's own. It is killed when the test is over.
+pub struct Mosquitto {
+    process: Child,
+    pub port: u16,
+    _folder: tempfile::TempDir,
+}
+
+impl Mosquitto {
+    /// Starts one. Without mosquitto on this machine: nothing, which in CI is a failure.
+    pub fn start() -> Option<Self> {
+        // mosquitto refuses port 0, so a free one is guessed; another test may be faster, hence several tries.
+        for _ in 0..5 {
+            let port = free_port();
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join("mosquitto.conf");
+            std::fs::write(&file, format!("listener {port} 127.0.0.1\nallow_anonymous true\n")).unwrap();
+            let path = std::env::var("PATH").unwrap_or_default() + ":/usr/sbin:/usr/local/sbin";
+            let started = Command::new("mosquitto")
+                .env("PATH", path)
+                .arg("-c")
+                .arg(&file)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn();
+            let Ok(process) = started else {
+                assert!(std::env::var_os("CI").is_none(), "mosquitto is not installed, and CI must have it");
+                eprintln!("skipped: mosquitto is not installed");
+                return None;
+            };
+            let mut this = Self {
+                process,
+                port,
+                _folder: folder,
+            };
+            for _ in 0..200 {
+                std::thread::sleep(Duration::from_millis(20));
+                if this.process.try_wait().unwrap().is_some() {
+                    break;
+                }
+                if TcpStream::connect(("127.0.0.1", port)).is_ok() {
+                    return Some(this);
+                }
+            }
+        }
+        panic!("mosquitto does not start");
+    }
+
+    pub fn url(&self) -> String {
+        format!("mqtt://127.0.0.1:{}", self.port)
+    }
+
+    /// Ends it without a warning.
+    pub fn kill(mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+}
+
+impl Drop for Mosquitto {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// A port where nobody listens.
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}

@@ -1,0 +1,118 @@
+//! The journal is the evidence: from it alone everything else is made again, and a change of it is seen.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::bench::{Bench, QUICK, REFUSAL};
+
+/// A finished run in virtual time that fails one requirement.
+fn failed_run() -> (Bench, String) {
+    let bench = Bench::new();
+    let fault = ["--fault", "validation-error-misspelled"];
+    bench.run(&[&["run", "--virtual", "order-rejection/unreadable"], &fault[..]].concat()).code(1);
+    let folder = bench.bundle().display().to_string();
+    (bench, folder)
+}
+
+fn change(file: &Path, from: &str, to: &str) {
+    let text = fs::read_to_string(file).unwrap();
+    assert!(text.contains(from), "nothing to change");
+    fs::write(file, text.replace(from, to)).unwrap();
+}
+
+#[test]
+fn a_virtual_run_is_judged_again_to_the_same_bytes_whether_it_passed_or_failed() {
+    let (bench, _) = failed_run();
+    bench.is_whole();
+    let bench = Bench::new();
+    bench.run(&["run", "--virtual", "order-rejection"]).code(0);
+    bench.is_whole();
+}
+
+#[test]
+fn a_journal_line_that_was_edited_is_noticed() {
+    let (bench, folder) = failed_run();
+    change(&bench.bundle().join("journal.jsonl"), "validationOrder", "validationError");
+    bench.run(&["report", &folder, "--rejudge"]).code(1).prints("ORD-REJ-02");
+    bench.run(&["report", &folder, "--verify"]).code(1).prints("journal.jsonl");
+}
+
+#[test]
+fn a_result_that_was_edited_is_noticed() {
+    let (bench, folder) = failed_run();
+    change(&bench.bundle().join("result.json"), "\"verdict\": \"fail\"", "\"verdict\": \"pass\"");
+    bench.run(&["report", &folder, "--rejudge"]).code(1).prints("ORD-REJ-02");
+    bench.run(&["report", &folder, "--verify"]).code(1).prints("result.json");
+}
+
+#[test]
+fn rendering_again_gives_the_same_bytes() {
+    let (bench, folder) = failed_run();
+    let files = ["report.html", "junit.xml", "result.json", "manifest.json"];
+    let read = || files.map(|name| fs::read_to_string(bench.bundle().join(name)).unwrap());
+    let before = read();
+    for name in &files[..2] {
+        fs::remove_file(bench.bundle().join(name)).unwrap();
+    }
+    bench.run(&["report", &folder]).code(1).prints("FAIL  ");
+    for (name, (before, after)) in files.into_iter().zip(before.into_iter().zip(read())) {
+        assert!(before == after, "{name} differs");
+    }
+}
+
+#[test]
+fn a_journal_that_ends_in_the_middle_of_a_line_gives_a_partial_report() {
+    let bench = Bench::new();
+    bench.run(&["run", "--virtual", "order-rejection/unreadable"]).code(0);
+    let folder = bench.bundle();
+    let journal = folder.join("journal.jsonl");
+    let text = fs::read_to_string(&journal).unwrap();
+    let begun = "\"kind\":\"test-begun\",\"test\":\"order-rejection/unreadable[truncated]\"";
+    // In the middle of the last test, and in the middle of a line.
+    let cut = text.find(begun).unwrap();
+    let cut = cut + text[cut..].match_indices('\n').nth(4).unwrap().0 + 40;
+    fs::write(&journal, &text.as_bytes()[..cut]).unwrap();
+    for name in ["report.html", "junit.xml", "result.json", "manifest.json"] {
+        fs::remove_file(folder.join(name)).unwrap();
+    }
+    let ended = bench.run(&["report", &folder.display().to_string()]).says("the last line of the journal is cut off");
+    assert_ne!(ended.status.code(), Some(0), "a run that broke off says nothing about what it did not come to");
+    assert_eq!(bench.result()["partial"], true);
+    let tests = bench.result()["tests"].clone();
+    let verdicts: Vec<&Value> = tests.as_array().unwrap().iter().map(|test| &test["verdict"]).collect();
+    assert_eq!(verdicts, ["pass", "pass", "inconclusive"]);
+    assert!(fs::read_to_string(folder.join("report.html")).unwrap().contains("the journal breaks off here"));
+}
+
+#[test]
+fn what_is_no_run_is_2() {
+    let bench = Bench::new();
+    bench.run(&["report", "nowhere"]).code(2).says("nowhere");
+    fs::write(bench.path().join("journal.jsonl"), "").unwrap();
+    bench.run(&["report", "."]).code(2);
+    fs::write(bench.path().join("journal.jsonl"), "{\"seq\": 1}\n{}\nhello\n").unwrap();
+    bench.run(&["report", "."]).code(2).says("journal.jsonl");
+    bench.run(&["report", ".", "--verify"]).code(2).says("manifest.json");
+    bench.run(&["report", "--compare", ".", "nowhere"]).code(2);
+}
+
+#[test]
+fn two_runs_are_compared_and_a_worse_one_is_1() {
+    let (bad, bad_folder) = failed_run();
+    let good = Bench::new();
+    good.run(&["run", "--virtual", "order-rejection/unreadable", QUICK]).code(0);
+    let good_folder = good.bundle().display().to_string();
+    bad.run(&["report", "--compare", &good_folder, &bad_folder]).code(1).prints("ORD-REJ-02");
+    bad.run(&["report", "--compare", &bad_folder, &good_folder]).code(0).prints("ORD-REJ-02");
+    bad.run(&["report", "--compare", &good_folder, &good_folder]).code(0);
+}
+
+#[test]
+fn the_format_for_programs_is_the_result_itself() {
+    let (bench, folder) = failed_run();
+    let ended = bench.run(&["report", &folder, "--format", "json"]).code(1);
+    assert_eq!(ended.stdout, fs::read_to_string(bench.bundle().join("result.json")).unwrap());
+    assert!(ended.stdout.contains(REFUSAL));
+}
