@@ -5,6 +5,7 @@
 //! as they happen and asks what to wait for; `report --rejudge` shows it the same entries again.
 
 mod decide;
+mod departure;
 mod limit;
 mod monitor;
 mod run;

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use serde_json::{Map, Value};
 
 use super::decide::decide;
+use super::departure::Departure;
 use super::step::{Evaluator, Position, Progress, StepOutcome};
 use super::timeline::Timeline;
 use super::window::Scene;
@@ -51,6 +52,7 @@ pub struct TestJudge {
     trouble: Option<String>,
     verdict: Accumulated,
     result: TestResult,
+    departure: Departure,
     ended: bool,
 }
 
@@ -101,6 +103,7 @@ impl TestJudge {
                 decisions: Vec::new(),
                 steps: Vec::new(),
             },
+            departure: Departure::default(),
             ended: false,
         }
     }
@@ -152,6 +155,7 @@ impl TestJudge {
     /// Shows it one entry. The timeline already holds it.
     pub fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, timeline: &Timeline, ground: &Ground) {
         self.entries.push(Arc::clone(entry));
+        self.departure.observe(entry, subject);
         if let Some(span) = &mut self.result.journal {
             span.1 = entry.seq();
         }
@@ -361,7 +365,10 @@ impl TestJudge {
             self.verdict.add(Verdict::Error);
         }
         self.result.verdict = self.verdict.get();
-        self.result.reason = self.reason(&why);
+        self.result.reason = match (self.reason(&why), self.departure.story()) {
+            (Some(reason), Some(story)) => Some(format!("{reason}; {story}")),
+            (reason, story) => reason.or(story),
+        };
     }
 
     fn reason(&self, why: &str) -> Option<String> {

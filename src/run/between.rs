@@ -1,9 +1,10 @@
 //! Between two tests: is the device there, is it idle, and how does it get back.
 
-use serde_json::{Map, Value};
+use serde_json::Map;
 
 use super::admission::is_stale;
 use super::session::Session;
+use crate::engine::vehicle::{has_open_connection, is_idle};
 use crate::engine::{EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, LinkFault};
 use crate::judge::RunJudge;
@@ -19,25 +20,7 @@ pub(super) enum Presence {
 impl Presence {
     pub(super) fn of(judge: &RunJudge, vantage: Vantage) -> Self {
         let there = match vantage {
-            Vantage::Tap => {
-                let connection = |entry: &crate::journal::Entry| match entry.event() {
-                    Event::Packet { connection, .. } | Event::Closed { connection, .. } => Some(*connection),
-                    _ => None,
-                };
-                let last = judge
-                    .timeline()
-                    .of("mqtt/connect")
-                    .last()
-                    .and_then(|entry| connection(entry));
-                let closed = |number: u64| {
-                    judge
-                        .timeline()
-                        .of("mqtt/closed")
-                        .iter()
-                        .any(|entry| connection(entry) == Some(number))
-                };
-                last.is_some_and(|number| !closed(number))
-            }
+            Vantage::Tap => has_open_connection(judge),
             Vantage::Subscriber => {
                 let said = judge.timeline().of("connection").last();
                 let online = judge.ground().pack.word("connection.online");
@@ -58,14 +41,14 @@ impl Presence {
     }
 }
 
-/// Whether the last state shows no order and no motion.
-pub(super) fn is_idle(judge: &RunJudge) -> bool {
-    let Some(state) = judge.timeline().of("state").last().and_then(|entry| entry.json()) else {
+/// Whether the device says on its own connection topic that it is online. A device that never said anything
+/// there is not held to it here: that is for the tests to find.
+pub(super) fn says_online(judge: &RunJudge) -> bool {
+    let Some(said) = judge.timeline().of("connection").last() else {
         return true;
     };
-    let empty = |name: &str| state.get(name).and_then(Value::as_array).is_none_or(Vec::is_empty);
-    let driving = state.get("driving").and_then(Value::as_bool).unwrap_or(false);
-    empty("nodeStates") && empty("edgeStates") && !driving
+    let state = said.json().and_then(|message| message.get("connectionState")?.as_str());
+    state == judge.ground().pack.word("connection.online")
 }
 
 /// Ends link faults that a test has left behind, and waits for the device to come back.
@@ -103,51 +86,88 @@ pub(super) async fn revive<L: Link, O: Operator>(
     if session.engine.watch(until, there).await? {
         return Ok(None);
     }
-    let mut why = format!(
+    let why = format!(
         "the device is gone: it did not come back within {}",
         show_duration(session.time("reconnect"))
     );
-    if has_hook {
-        let sent = last_sent(session.engine.recorder.judge(), &session.engine.recorder);
-        session.engine.note(Event::Note {
-            text: format!("the device is gone and is restarted; the last message it was sent is {sent}"),
-        })?;
-        match session.engine.hook("power-cycle", Map::new()).await? {
-            HookOutcome::Done(_) => {
-                let until = session.engine.link.now().moment + session.time("connect");
-                if session.engine.watch(until, there).await? {
-                    session.progress.note("the device was restarted and is back");
-                    return Ok(None);
-                }
-            }
-            HookOutcome::Failed(failed) => why = format!("{why}, and hook `power-cycle` failed: {failed}"),
-            HookOutcome::Missing => {}
-        }
+    if !has_hook {
+        return Ok(Some(why));
     }
-    Ok(Some(why))
+    let sent = last_sent(&session.engine.recorder);
+    let reason = format!("the device is gone and is restarted; the last message it was sent is {sent}");
+    Ok(match power_cycle(session, reason).await? {
+        Ok(()) => None,
+        Err(failed) => Some(format!("{why}, and {failed}")),
+    })
 }
 
-fn last_sent(_judge: &RunJudge, recorder: &Recorder) -> String {
-    let sent = recorder
-        .journal()
-        .entries()
-        .iter()
-        .rev()
-        .find(|entry| matches!(entry.event(), Event::Sent { .. }));
+/// Switches the device off and on by its hook, and waits for the first state of the new connection. `Err` says
+/// what did not work.
+async fn power_cycle<L: Link, O: Operator>(
+    session: &mut Session<'_, L, O>,
+    reason: String,
+) -> Result<Result<(), String>, EngineError> {
+    let vantage = session.setup.capabilities.vantage;
+    session.progress.note(&reason);
+    let before = session.engine.note(Event::Note { text: reason })?;
+    match session.engine.hook("power-cycle", Map::new()).await? {
+        HookOutcome::Done(_) => {}
+        HookOutcome::Failed(failed) => return Ok(Err(format!("hook `power-cycle` failed: {failed}"))),
+        HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),
+    }
+    let back = move |recorder: &Recorder| {
+        let timeline = recorder.judge().timeline();
+        let connected = match vantage {
+            Vantage::Tap => !timeline.since("mqtt/connect", before).is_empty(),
+            Vantage::Subscriber => true,
+        };
+        let said = timeline.since("state", before).iter().any(|entry| !is_stale(entry));
+        connected && said && Presence::of(recorder.judge(), vantage).is_there() && says_online(recorder.judge())
+    };
+    let until = session.engine.link.now().moment + session.time("connect");
+    if session.engine.watch(until, back).await? {
+        return Ok(Ok(()));
+    }
+    Ok(Err(format!(
+        "it did not come back within {} after hook `power-cycle`",
+        show_duration(session.time("connect"))
+    )))
+}
+
+fn last_sent(recorder: &Recorder) -> String {
+    let entries = recorder.journal().entries();
+    let sent = entries.iter().rev().find(|entry| matches!(entry.event(), Event::Sent { .. }));
     sent.map_or_else(|| "none".to_owned(), |entry| format!("#{}", entry.seq()))
 }
 
-/// Brings a vehicle that was left with an order back to idle by cancelOrder. Gives whether that worked.
+/// Brings a vehicle that was left with an order, or without saying that it is online, back to idle: by cancelOrder,
+/// else by the `power-cycle` hook. Gives whether it is idle.
 pub(super) async fn recover<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Result<bool, EngineError> {
+    let well = |recorder: &Recorder| is_idle(recorder.judge()) && says_online(recorder.judge());
     let idle = |recorder: &Recorder| is_idle(recorder.judge());
     let until = session.engine.link.now().moment + session.time("settle");
-    if session.engine.watch(until, idle).await? {
+    if session.engine.watch(until, well).await? {
         return Ok(true);
     }
-    session.engine.note(Event::Note {
-        text: "the test has left the vehicle with an order; the harness cancels it".to_owned(),
-    })?;
-    session.instant_action("cancelOrder").await?;
-    let until = session.engine.link.now().moment + session.time("react") + session.time("slow");
-    session.engine.watch(until, idle).await
+    let has_hook = session.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
+    let mut why = "the device is connected but does not say that it is online; it is restarted";
+    if !idle(&session.engine.recorder) {
+        why = "the vehicle was left with an order that cancelOrder does not end; it is restarted";
+        if session.engine.cancels {
+            session.engine.note(Event::Note {
+                text: "the test has left the vehicle with an order; the harness cancels it".to_owned(),
+            })?;
+            session.instant_action("cancelOrder").await?;
+            let until = session.engine.link.now().moment + session.time("react") + session.time("slow");
+            let cancelled = session.engine.watch(until, idle).await?;
+            // With another way at hand, a device that does not obey is not asked again after every test.
+            session.engine.cancels = cancelled || !has_hook;
+        }
+    }
+    if !well(&session.engine.recorder) && has_hook && !session.engine.interrupted() {
+        if let Err(failed) = power_cycle(session, why.to_owned()).await? {
+            session.progress.note(&failed);
+        }
+    }
+    Ok(idle(&session.engine.recorder))
 }

@@ -1,6 +1,6 @@
 //! The built-in reference AGV as a device under test: its floor, its profile, its configuration.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
@@ -60,6 +60,8 @@ impl ReferenceAgv {
                 .map(|(name, _)| name.to_owned())
                 .collect(),
             nodes,
+            // Tests rely on it: there is nothing to charge at on the built-in floor.
+            chargers: BTreeSet::new(),
             start_node: first.0,
             maps: vec![OnboardMap {
                 map_id: first.1,

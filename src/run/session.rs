@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use super::between::{Presence, is_idle, recover, revive, settle_link};
+use super::between::{Presence, recover, revive, says_online, settle_link};
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
 use crate::course::Layout;
+use crate::engine::vehicle::is_idle;
 use crate::engine::{Engine, EngineError, Operator, Watcher};
 use crate::journal::event::{Event, Gate, Plan, PlannedTest};
 use crate::judge::RunJudge;
@@ -221,7 +222,8 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
         settle_link(self).await?;
         self.engine.drain().await?;
-        if is_idle(self.engine.recorder.judge())
+        let judge = self.engine.recorder.judge();
+        if (is_idle(judge) && says_online(judge))
             || !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there()
         {
             return Ok(());

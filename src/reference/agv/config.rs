@@ -208,6 +208,7 @@ impl Default for AgvConfig {
                 map_id: "hall".into(),
             })
             .collect();
+        let chargers = nodes.iter().map(|node: &LayoutNode| node.id.clone()).collect();
         Self {
             manufacturer: "Reference".into(),
             serial_number: "agv-1".into(),
@@ -240,7 +241,7 @@ impl Default for AgvConfig {
             action_durations: BTreeMap::new(),
             interruptible: true,
             stops_between_nodes: true,
-            chargers: BTreeSet::new(),
+            chargers,
             map_capacity: 8,
             maps: vec![OnboardMap {
                 map_id: "hall".into(),
