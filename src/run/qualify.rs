@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::library::Library;
+use super::reference_agv::ReferenceAgv;
 use super::virtual_run::{Finished, VirtualRun, run_silently};
 use crate::engine::EngineError;
 use crate::pack::Pack;
@@ -170,29 +171,20 @@ pub fn qualify_tests(
     faults: &[Fault],
     told: &(dyn Fn(&str) + Sync),
 ) -> Result<Qualification, EngineError> {
-    let request = VirtualRun {
-        tests: tests.to_vec(),
-        ..VirtualRun::of(library, pack)
-    };
-    let Finished { result, .. } = run_silently(library, pack, request.clone())?;
+    let requests: Vec<VirtualRun> = ReferenceAgv::variants(pack)
+        .into_iter()
+        .map(|device| VirtualRun {
+            device,
+            tests: tests.to_vec(),
+            ..VirtualRun::of(library, pack)
+        })
+        .collect();
     let mut blemishes = Vec::new();
     let mut deciders = BTreeSet::new();
-    for (decider, verdict) in decided(&result) {
-        if verdict != Verdict::Pass {
-            blemishes.push((decider.clone(), verdict));
-        }
-        deciders.insert(decider);
-    }
-    for test in result
-        .tests
-        .iter()
-        .filter(|test| test.verdict.is_some_and(|verdict| verdict != Verdict::Pass) && test.decisions.is_empty())
-    {
-        let decider = Decider {
-            requirement: String::new(),
-            place: test.id.clone(),
-        };
-        blemishes.push((decider, Verdict::Error));
+    for request in &requests {
+        let Finished { result, .. } = run_silently(library, pack, request.clone())?;
+        blemishes.extend(blemishes_of(&result));
+        deciders.extend(decided(&result).into_iter().map(|(decider, _)| decider));
     }
     let next = AtomicUsize::new(0);
     let kills: Mutex<Vec<(usize, Result<Kill, EngineError>)>> = Mutex::new(Vec::new());
@@ -203,7 +195,7 @@ pub fn qualify_tests(
                 while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
                     told(fault.name);
                     let at = faults.iter().position(|other| other == fault).unwrap_or_default();
-                    let kill = kill(library, pack, &request, *fault);
+                    let kill = kill(library, pack, &requests, *fault);
                     if let Ok(mut all) = kills.lock() {
                         all.push((at, kill));
                     }
@@ -220,24 +212,44 @@ pub fn qualify_tests(
     })
 }
 
-fn kill(library: &Library, pack: &Pack, request: &VirtualRun, fault: Fault) -> Result<Kill, EngineError> {
-    let mut request = request.clone();
-    request.faults = vec![fault.name.to_owned()];
-    let finished = run_silently(library, pack, request)?;
-    let mut deciders = BTreeSet::new();
-    let mut requirements = Vec::new();
-    for (decider, verdict) in decided(&finished.result) {
-        if matches!(verdict, Verdict::Fail | Verdict::Warning) {
-            if !requirements.contains(&decider.requirement) {
-                requirements.push(decider.requirement.clone());
+/// What is not a pass.
+fn blemishes_of(result: &RunResult) -> Vec<(Decider, Verdict)> {
+    let mut all: Vec<_> = decided(result).into_iter().filter(|(_, verdict)| *verdict != Verdict::Pass).collect();
+    let unjudged = result.tests.iter().filter(|test| test.decisions.is_empty());
+    for test in unjudged.filter(|test| test.verdict.is_some_and(|verdict| verdict != Verdict::Pass)) {
+        let decider = Decider {
+            requirement: String::new(),
+            place: test.id.clone(),
+        };
+        all.push((decider, Verdict::Error));
+    }
+    all
+}
+
+/// Runs with a fault: on the usual vehicle, and only if it is not found there on the others.
+fn kill(library: &Library, pack: &Pack, requests: &[VirtualRun], fault: Fault) -> Result<Kill, EngineError> {
+    let mut kill = Kill {
+        fault,
+        deciders: BTreeSet::new(),
+        requirements: Vec::new(),
+        verdict: None,
+    };
+    for request in requests {
+        let mut request = request.clone();
+        request.faults = vec![fault.name.to_owned()];
+        let finished = run_silently(library, pack, request)?;
+        for (decider, verdict) in decided(&finished.result) {
+            if matches!(verdict, Verdict::Fail | Verdict::Warning) {
+                if !kill.requirements.contains(&decider.requirement) {
+                    kill.requirements.push(decider.requirement.clone());
+                }
+                kill.deciders.insert(decider);
             }
-            deciders.insert(decider);
+        }
+        kill.verdict = kill.verdict.max(finished.result.verdict);
+        if kill.named() {
+            break;
         }
     }
-    Ok(Kill {
-        fault,
-        deciders,
-        requirements,
-        verdict: finished.result.verdict,
-    })
+    Ok(kill)
 }

@@ -92,6 +92,16 @@ impl ReferenceAgv {
         }
     }
 
+    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well: one that can
+    /// stop on nodes only.
+    #[must_use]
+    pub fn variants(pack: &Pack) -> Vec<Self> {
+        let usual = Self::new(pack);
+        let mut node_bound = usual.clone();
+        node_bound.config.stops_between_nodes = false;
+        vec![usual, node_bound]
+    }
+
     /// What a profile would state about it.
     #[must_use]
     pub fn statements(&self) -> BTreeMap<String, bool> {

@@ -197,7 +197,7 @@ impl Default for AgvConfig {
             ("n4", 6.0, 3.0),
             ("n5", 3.0, 3.0),
         ];
-        let nodes = corners
+        let nodes: Vec<LayoutNode> = corners
             .into_iter()
             .chain([("n6", 0.0, 3.0)])
             .map(|(id, x, y)| LayoutNode {
@@ -208,7 +208,7 @@ impl Default for AgvConfig {
                 map_id: "hall".into(),
             })
             .collect();
-        let chargers = nodes.iter().map(|node: &LayoutNode| node.id.clone()).collect();
+        let chargers = nodes.iter().map(|node| node.id.clone()).collect();
         Self {
             manufacturer: "Reference".into(),
             serial_number: "agv-1".into(),

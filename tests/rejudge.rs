@@ -1,0 +1,75 @@
+//! Judging is a pure function of journal and suites: the same journal gives the same result, byte for byte.
+
+use std::sync::Arc;
+
+use vda5050_tck::judge::judge;
+use vda5050_tck::report::json;
+use vda5050_tck::run::{Library, VirtualRun, run_silently};
+
+fn library() -> Library {
+    Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]))
+}
+
+#[test]
+fn a_saved_journal_gives_the_result_of_the_live_run_byte_for_byte() {
+    let library = library();
+    for pack in library.rules.packs.all() {
+        for faults in [vec![], vec!["outdated-update-taken-over"], vec!["never-reconnects"], vec!["cancel-never-finished"]] {
+            let mut request = VirtualRun::of(&library, pack);
+            request.faults = faults.iter().map(ToString::to_string).collect();
+            let live = run_silently(&library, pack, request).expect("a run");
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().join("journal.jsonl");
+            let mut writer = vda5050_tck::journal::file::JournalWriter::create(&path).expect("a file");
+            for entry in live.recorder.journal().entries() {
+                writer.write(&entry.record).expect("written");
+            }
+            let saved = vda5050_tck::journal::file::read(&path).expect("read");
+            let again = judge(&library.rules, saved.journal.entries()).expect("judged");
+            assert_eq!(
+                json::to_string(&live.result).expect("json"),
+                json::to_string(&again).expect("json"),
+                "VDA 5050 {} with {faults:?}",
+                pack.version
+            );
+        }
+    }
+}
+
+#[test]
+fn a_journal_that_breaks_off_anywhere_gives_a_partial_result_that_accuses_nobody() {
+    let library = library();
+    let pack = library.rules.packs.latest();
+    let mut request = VirtualRun::of(&library, pack);
+    request.tests.retain(|test| test.id.starts_with("order-rejection/") || test.id.starts_with("connection/"));
+    let live = run_silently(&library, pack, request).expect("a run");
+    let entries = live.recorder.journal().entries();
+    let mut at = 1;
+    while at < entries.len() {
+        let result = judge(&library.rules, &entries[..at]).expect("judged");
+        assert!(result.partial, "cut at {at}");
+        let failed: Vec<_> = result.tests.iter().filter(|test| test.verdict == Some(vda5050_tck::verdict::Verdict::Fail)).collect();
+        assert!(failed.is_empty(), "cut at {at}: {failed:#?}");
+        at += 97;
+    }
+}
+
+#[test]
+fn seeds_jitter_and_coalescing_do_not_change_a_verdict() {
+    let library = Arc::new(library());
+    let pack = library.rules.packs.latest().clone();
+    let verdicts = |seed: u64| {
+        let mut request = VirtualRun::of(&library, &pack);
+        request.seed = seed;
+        request.jitter = std::time::Duration::from_millis(seed % 20);
+        request.coalesce = std::time::Duration::from_millis(if seed.is_multiple_of(3) { 15 } else { 0 });
+        let result = run_silently(&library, &pack, request).expect("a run").result;
+        let tests = result.tests.iter().map(|test| (test.id.clone(), test.verdict));
+        let monitors = result.monitors.iter().map(|monitor| (monitor.id.clone(), monitor.verdict));
+        tests.chain(monitors).collect::<Vec<_>>()
+    };
+    let first = verdicts(1);
+    for seed in 2..10 {
+        assert_eq!(first, verdicts(seed), "seed {seed}");
+    }
+}
