@@ -56,7 +56,10 @@ mod tests {
         for event in events {
             let is_disconnect = matches!(event, Event::Packet { .. });
             let entry = journal.append(Occurrence {
-                at: Stamp::at(Moment::from_micros(0)),
+                at: Stamp {
+                    moment: Moment::START,
+                    utc: jiff::Timestamp::UNIX_EPOCH,
+                },
                 source: Source::Tap,
                 direction: is_disconnect.then_some(Direction::FromDevice),
                 event: event.clone(),
@@ -90,7 +93,7 @@ mod tests {
     fn a_device_that_says_goodbye_has_not_crashed() {
         let goodbye = Event::Packet {
             connection: 1,
-            packet: Packet::Disconnect { reason: None },
+            packet: Packet::Disconnect { code: 0 },
         };
         assert_eq!(story(&[sent(), goodbye, CLOSED]), None);
     }
