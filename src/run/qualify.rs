@@ -5,8 +5,8 @@
 //! unproven, and is said so by name.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::library::Library;
 use super::virtual_run::{Finished, VirtualRun, run_silently};
