@@ -290,6 +290,8 @@ fn compare(
 struct LastNode {
     shown: Shown,
     before: Option<(String, String, u64)>,
+    /// Sequence ids the state before still had to reach.
+    ahead: Vec<u64>,
 }
 
 impl Running for LastNode {
@@ -309,6 +311,9 @@ impl Running for LastNode {
             findings.push(broken("STATE-MSG-04", seq, text));
         }
         let before = self.before.replace((order.clone(), node.clone(), sequence));
+        let ahead = read_elements(state, "nodeStates", "nodeId");
+        let ahead = ahead.iter().flatten().map(|element| element.sequence).collect();
+        let ahead_before = std::mem::replace(&mut self.ahead, ahead);
         let Some((_, node_before, sequence_before)) = before.filter(|before| before.0 == order) else {
             return false;
         };
@@ -343,8 +348,10 @@ impl Running for LastNode {
         }
         let was_in_order = nodes().any(|element| element.id == node_before && element.sequence == sequence_before);
         if was_in_order && self.shown.carried.is_none() && sequence < sequence_before {
-            // The node before the order began may carry a higher number of an older order.
-            let begun = nodes().any(|element| element.sequence == sequence_before && element.released);
+            // The node before the order began may carry a higher number of an older order, which may even be the number
+            // of the same node in this order; but then this order still has to reach it.
+            let begun = nodes().any(|element| element.sequence == sequence_before && element.released)
+                && !ahead_before.contains(&sequence_before);
             if begun {
                 let text = format!("the last node goes back from sequenceId {sequence_before} to {sequence}");
                 findings.push(broken("ORD-01", seq, text));
@@ -532,6 +539,17 @@ mod tests {
     fn progress_in_sequence_is_right() {
         assert!(last_nodes(3, &[("a", 8), ("a", 0), ("b", 2), ("c", 4)]).is_empty());
         assert!(last_nodes(3, &[("a", 0), ("c", 4)]).is_empty());
+    }
+
+    #[test]
+    fn a_number_of_the_order_before_is_not_held_against_the_first_node_of_the_next() {
+        let mut trace = Trace::subscriber();
+        trace.sent("order", &order(0, &["a", "b", "c"], 0, 3));
+        // Accepted, while the last node is still that of an older order, with a number that occurs in this one too.
+        let nodes = |from: u64| json!([{ "nodeId": "c", "sequenceId": from, "released": true }]);
+        trace.state(&json!({ "orderId": "o", "lastNodeId": "b", "lastNodeSequenceId": 2, "nodeStates": nodes(2) }));
+        trace.state(&json!({ "orderId": "o", "lastNodeId": "a", "lastNodeSequenceId": 0, "nodeStates": nodes(4) }));
+        assert!(trace.judge("state/last-node").summary().is_empty());
     }
 
     #[test]

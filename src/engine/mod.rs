@@ -193,7 +193,10 @@ impl<L: Link, O: Operator> Engine<L, O> {
         let judge = self.recorder.judge();
         let has_tap = !judge.timeline().of("mqtt/connect").is_empty();
         let entries = self.recorder.journal().entries();
-        let sent = entries.iter().rev().find(|entry| matches!(entry.event(), Event::Sent { .. }));
+        let sent = entries
+            .iter()
+            .rev()
+            .find(|entry| matches!(entry.event(), Event::Sent { .. }));
         let since = sent.map_or(begun, |entry| entry.seq().max(begun));
         !self.cancels || (has_tap && !vehicle::has_open_connection(judge)) || vehicle::is_idle_since(judge, since)
     }

@@ -4,14 +4,16 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::judge::RunJudge;
 use crate::journal::Entry;
 use crate::journal::event::Event;
+use crate::judge::RunJudge;
 
 /// Whether the last state shows no order and no motion.
 #[must_use]
 pub fn is_idle(judge: &RunJudge) -> bool {
-    last_state(judge).and_then(|entry| entry.json()).is_none_or(is_without_order)
+    last_state(judge)
+        .and_then(|entry| entry.json())
+        .is_none_or(is_without_order)
 }
 
 /// Whether a state that came after this journal number shows no order, no motion, and no action under way.
@@ -38,7 +40,12 @@ pub fn has_open_connection(judge: &RunJudge) -> bool {
     };
     let timeline = judge.timeline();
     let last = timeline.of("mqtt/connect").last().and_then(number);
-    let is_closed = |connection| timeline.of("mqtt/closed").iter().any(|entry| number(entry) == Some(connection));
+    let is_closed = |connection| {
+        timeline
+            .of("mqtt/closed")
+            .iter()
+            .any(|entry| number(entry) == Some(connection))
+    };
     last.is_some_and(|connection| !is_closed(connection))
 }
 

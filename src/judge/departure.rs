@@ -37,7 +37,9 @@ impl Departure {
     pub(super) fn story(&self) -> Option<String> {
         let (closed, sent) = self.left?;
         Some(match sent {
-            Some(sent) => format!("the device closed its connection without DISCONNECT (#{closed}) after it was sent #{sent}"),
+            Some(sent) => {
+                format!("the device closed its connection without DISCONNECT (#{closed}) after it was sent #{sent}")
+            }
             None => format!("the device closed its connection without DISCONNECT (#{closed})"),
         })
     }

@@ -136,7 +136,10 @@ async fn power_cycle<L: Link, O: Operator>(
 
 fn last_sent(recorder: &Recorder) -> String {
     let entries = recorder.journal().entries();
-    let sent = entries.iter().rev().find(|entry| matches!(entry.event(), Event::Sent { .. }));
+    let sent = entries
+        .iter()
+        .rev()
+        .find(|entry| matches!(entry.event(), Event::Sent { .. }));
     sent.map_or_else(|| "none".to_owned(), |entry| format!("#{}", entry.seq()))
 }
 

@@ -1,0 +1,293 @@
+//! A vehicle nobody of this project wrote: the AGV of the npm package vda-5050-lib, as it is shipped and with one
+//! obstacle removed. The harness must find exactly what stands in its list of expected findings, each traced to a
+//! place in the library, and must accuse it of nothing else.
+//!
+//! Both vehicles are run at once, each on several benches (`--shard`), because most of the time is waiting.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use serde_json::Value;
+
+const FOLDER: &str = "fixtures/devices/vda-5050-lib-agv";
+/// Name in the list, profile, and number of benches.
+const VEHICLES: [(&str, &str, usize); 2] = [
+    ("as-shipped", "device.toml", 6),
+    ("translated", "device-translated.toml", 3),
+];
+
+/// Verdict by requirement.
+type Verdicts = BTreeMap<String, String>;
+
+/// What a run found: the worst verdict by requirement, and what the harness says about it.
+#[derive(Default)]
+struct Found {
+    verdicts: Verdicts,
+    explanations: BTreeMap<String, Vec<String>>,
+}
+
+impl Found {
+    fn add(&mut self, requirement: &Value, verdict: &Value, by: &Value, message: &Value) {
+        let (Some(requirement), Some(verdict)) = (requirement.as_str(), verdict.as_str()) else {
+            return;
+        };
+        if verdict != "fail" && verdict != "warning" {
+            return;
+        }
+        let worst = self
+            .verdicts
+            .entry(requirement.to_owned())
+            .or_insert_with(|| verdict.to_owned());
+        if verdict == "fail" {
+            "fail".clone_into(worst);
+        }
+        let line = format!(
+            "{verdict} by {}: {}",
+            by.as_str().unwrap_or("?"),
+            message.as_str().unwrap_or("?")
+        );
+        self.explanations.entry(requirement.to_owned()).or_default().push(line);
+    }
+}
+
+/// One bench: a harness that starts its own broker and its own vehicle.
+struct Bench {
+    name: String,
+    out: PathBuf,
+    process: Child,
+}
+
+impl Bench {
+    fn start(vehicle: &str, profile: &str, shard: usize, of: usize) -> Self {
+        let name = format!("{vehicle}, bench {shard} of {of}");
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("foreign-{vehicle}-{shard}"));
+        let _ = std::fs::remove_dir_all(&out);
+        let process = Command::new(env!("CARGO_BIN_EXE_vda5050-tck"))
+            .args([
+                "run",
+                "--profile",
+                &format!("{FOLDER}/{profile}"),
+                "--shard",
+                &format!("{shard}/{of}"),
+            ])
+            .arg("--out")
+            .arg(&out)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        Self { name, out, process }
+    }
+
+    /// The result of a run that went to its end, or why there is none.
+    fn result(&mut self) -> Result<Value, String> {
+        let code = self
+            .process
+            .wait()
+            .map_err(|error| format!("{}: {error}", self.name))?
+            .code();
+        let bytes = find(&self.out, "result.json").and_then(|path| std::fs::read(path).ok());
+        let result: Value = bytes
+            .and_then(|bytes| serde_json::from_slice(&bytes).ok())
+            .unwrap_or_default();
+        if !matches!(code, Some(0 | 1 | 3)) || result["partial"] != false {
+            return Err(format!(
+                "{}: ended with {code:?}: {}",
+                self.name, result["partial_reason"]
+            ));
+        }
+        Ok(result)
+    }
+}
+
+fn find(folder: &Path, name: &str) -> Option<PathBuf> {
+    for entry in std::fs::read_dir(folder).ok()?.flatten() {
+        let path = entry.path();
+        let found = if path.is_dir() {
+            find(&path, name)
+        } else {
+            path.ends_with(name).then_some(path)
+        };
+        if found.is_some() {
+            return found;
+        }
+    }
+    None
+}
+
+fn list<'v>(value: &'v Value, name: &str) -> impl Iterator<Item = &'v Value> {
+    value[name].as_array().into_iter().flatten()
+}
+
+/// The list that is checked in.
+fn expected(vehicle: &str) -> Vec<toml::Table> {
+    let text = std::fs::read_to_string(format!("{FOLDER}/expected-findings.toml")).unwrap();
+    let table: toml::Table = text.parse().unwrap();
+    let findings = table["finding"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|finding| finding.as_table().unwrap().clone());
+    findings
+        .filter(|finding| {
+            finding["vehicles"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .any(|name| name.as_str() == Some(vehicle))
+        })
+        .collect()
+}
+
+fn text<'t>(table: &'t toml::Table, name: &str) -> &'t str {
+    table.get(name).and_then(toml::Value::as_str).unwrap_or_default()
+}
+
+/// What differs between the list and the run; empty when nothing does.
+fn differences(expected: &[toml::Table], found: &Found) -> String {
+    let mut report = String::new();
+    let listed: Verdicts = expected
+        .iter()
+        .map(|finding| {
+            (
+                text(finding, "requirement").to_owned(),
+                text(finding, "verdict").to_owned(),
+            )
+        })
+        .collect();
+    for (requirement, verdict) in &found.verdicts {
+        if listed.get(requirement) != Some(verdict) {
+            let _ = writeln!(report, "  new: {requirement} {verdict}");
+            for line in &found.explanations[requirement] {
+                let _ = writeln!(report, "       {line}");
+            }
+        }
+    }
+    for finding in expected {
+        let requirement = text(finding, "requirement");
+        if found.verdicts.get(requirement).map(String::as_str) != Some(text(finding, "verdict")) {
+            let (verdict, because) = (text(finding, "verdict"), text(finding, "because"));
+            let _ = writeln!(report, "  gone: {requirement} {verdict}, although {because}");
+        }
+    }
+    report
+}
+
+#[test]
+fn the_harness_finds_in_a_foreign_vehicle_what_is_listed_and_nothing_else() {
+    if !Path::new(FOLDER)
+        .join("node_modules/vda-5050-lib/package.json")
+        .exists()
+    {
+        let missing = format!("the foreign vehicle is not installed: run `npm ci` in {FOLDER}");
+        assert!(std::env::var_os("CI").is_none(), "{missing}");
+        eprintln!("skipped: {missing}");
+        return;
+    }
+    let benches = VEHICLES.map(|(vehicle, profile, of)| {
+        let benches: Vec<Bench> = (1..=of)
+            .map(|shard| Bench::start(vehicle, profile, shard, of))
+            .collect();
+        (vehicle, benches)
+    });
+    let mut report = String::new();
+    for (vehicle, benches) in benches {
+        let mut found = Found::default();
+        for mut bench in benches {
+            // Every bench is waited for, so that none is left behind.
+            let result = match bench.result() {
+                Ok(result) => result,
+                Err(why) => {
+                    let _ = writeln!(report, "{why}");
+                    continue;
+                }
+            };
+            for test in list(&result, "tests") {
+                if test["verdict"] == "error" {
+                    let _ = writeln!(report, "{vehicle}: {} is an error: {}", test["id"], test["reason"]);
+                }
+                for decision in list(test, "decisions") {
+                    found.add(
+                        &decision["requirement"],
+                        &decision["verdict"],
+                        &test["id"],
+                        &decision["message"],
+                    );
+                }
+            }
+            for monitor in list(&result, "monitors") {
+                for finding in list(monitor, "findings") {
+                    found.add(
+                        &finding["requirement"],
+                        &finding["verdict"],
+                        &monitor["id"],
+                        &finding["message"],
+                    );
+                }
+            }
+        }
+        let differences = differences(&expected(vehicle), &found);
+        if !differences.is_empty() {
+            let _ = writeln!(report, "{vehicle}:\n{differences}");
+        }
+    }
+    assert!(
+        report.is_empty(),
+        "the findings differ from {FOLDER}/expected-findings.toml\n{report}"
+    );
+}
+
+#[test]
+fn every_expected_finding_is_listed_once_and_says_why() {
+    for (vehicle, ..) in VEHICLES {
+        let mut seen = Verdicts::new();
+        for finding in expected(vehicle) {
+            let requirement = text(&finding, "requirement").to_owned();
+            assert!(
+                !text(&finding, "because").trim().is_empty(),
+                "{requirement} does not say why"
+            );
+            assert!(
+                !text(&finding, "when").trim().is_empty(),
+                "{requirement} does not say when"
+            );
+            let kind = text(&finding, "kind");
+            assert!(
+                ["true finding", "interpretation", "consequence"].contains(&kind),
+                "{requirement}: {kind}"
+            );
+            let verdict = text(&finding, "verdict").to_owned();
+            assert!(
+                ["fail", "warning"].contains(&verdict.as_str()),
+                "{requirement}: {verdict}"
+            );
+            assert_eq!(
+                seen.insert(requirement.clone(), verdict),
+                None,
+                "{requirement} is listed twice for {vehicle}"
+            );
+        }
+        assert!(!seen.is_empty(), "nothing is expected of {vehicle}");
+    }
+}
+
+#[test]
+fn a_finding_that_is_new_gone_or_changed_is_a_difference() {
+    let finding = |requirement: &str, verdict: &str| -> toml::Table {
+        format!("requirement = \"{requirement}\"\nverdict = \"{verdict}\"\nbecause = \"x.js\"")
+            .parse()
+            .unwrap()
+    };
+    let mut found = Found::default();
+    let value = |text: &str| Value::String(text.to_owned());
+    found.add(&value("A-1"), &value("warning"), &value("t"), &value("odd"));
+    found.add(&value("A-1"), &value("pass"), &value("t"), &value("fine"));
+    assert_eq!(differences(&[finding("A-1", "warning")], &found), "");
+    assert!(differences(&[], &found).contains("new: A-1 warning"));
+    assert!(differences(&[finding("A-1", "warning"), finding("A-2", "fail")], &found).contains("gone: A-2 fail"));
+    found.add(&value("A-1"), &value("fail"), &value("t"), &value("worse"));
+    assert!(differences(&[finding("A-1", "warning")], &found).contains("new: A-1 fail"));
+}
