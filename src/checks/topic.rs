@@ -29,7 +29,7 @@ pub(super) const STRUCTURE: Check = Check {
     name: "topic/structure",
     decides: &["TOPIC-02", "TOPIC-03", "TOPIC-05", "TOPIC-07"],
     doc: "Topics have five levels: interface, major version, manufacturer, serial number, name. The structure is only \
-          suggested: anything else is a warning, except characters that a serial number must not hold.",
+          suggested: anything else is a warning, and so is a level that contradicts the version of its message, except characters that a serial number must not hold.",
     arguments: &[],
     start: |_| Box::new(Structure::default()),
 };
@@ -104,6 +104,9 @@ struct Structure {
 impl Running for Structure {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
+        if let Some((_, topic, ..)) = device_publish(entry) {
+            return self.elsewhere(topic, entry, context, findings);
+        }
         if self.traffic.delivered(entry, context).is_none() {
             return false;
         }
@@ -136,6 +139,35 @@ impl Running for Structure {
             findings.push(broken("TOPIC-05", seq, text));
         }
         true
+    }
+}
+
+impl Structure {
+    /// A topic of the device that is not the configured one, but names the device: below a major version that the
+    /// message itself does not speak. A device may well speak two versions side by side.
+    fn elsewhere(
+        &mut self,
+        topic: &str,
+        entry: &Entry,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let levels: Vec<&str> = topic.split('/').collect();
+        let [_, level, manufacturer, serial, name] = levels[..] else {
+            return false;
+        };
+        let own = (manufacturer, serial) == context.identity && context.topics.contains_key(name);
+        let spoken = entry.json().and_then(|value| value.get("version")?.as_str());
+        let (Some(major), Some(spoken)) = (level.strip_prefix('v'), spoken.and_then(|text| text.split('.').next()))
+        else {
+            return false;
+        };
+        let judged = own && context.topic_name(topic).is_none() && major.bytes().all(|byte| byte.is_ascii_digit());
+        if judged && major != spoken && self.seen.first(topic) {
+            let text = format!("{} carries messages of version {}", quote(topic), quote(spoken));
+            findings.push(remark("TOPIC-03", entry.seq(), text));
+        }
+        judged
     }
 }
 

@@ -12,6 +12,8 @@ use crate::clock::{Moment, Stamp};
 /// How a reference device opens its MQTT connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConnectOptions {
+    /// MQTT protocol level: 4 is MQTT 3.1.1. Links over real sockets speak no other.
+    pub level: u8,
     /// Client identifier.
     pub client_id: String,
     /// Keep-alive; zero is off.

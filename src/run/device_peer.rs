@@ -15,6 +15,7 @@ impl<D: Device> Peer for DevicePeer<D> {
     fn connect(&mut self, now: Stamp) -> PeerConnect {
         let options = self.0.connect_options(now);
         PeerConnect {
+            level: options.level,
             client_id: options.client_id,
             keep_alive: options.keep_alive,
             clean_session: options.clean_session,

@@ -74,6 +74,9 @@ impl ReferenceAgv {
             keep_alive: Duration::from_secs(10),
             reconnect_delay: Duration::from_millis(300),
             state_interval: Duration::from_secs(5),
+            visualization_interval: Some(Duration::from_secs(1)),
+            // Few, so that an order with too many of them can be written down.
+            max_nodes: 12,
             ..AgvConfig::default()
         };
         let time = TimeLimits {

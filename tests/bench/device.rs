@@ -38,6 +38,7 @@ impl Answering {
 impl Device for Answering {
     fn connect_options(&mut self, _: Stamp) -> ConnectOptions {
         ConnectOptions {
+            level: 4,
             client_id: "answering".to_owned(),
             keep_alive: Duration::from_secs(15),
             clean_session: true,

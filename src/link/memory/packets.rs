@@ -35,7 +35,7 @@ pub(super) enum Down {
 
 pub(super) fn connect_packet(connect: &PeerConnect) -> Packet {
     Packet::Connect {
-        level: 4,
+        level: connect.level,
         client_id: connect.client_id.clone(),
         keep_alive: u16::try_from(connect.keep_alive.as_secs()).unwrap_or(u16::MAX),
         clean_session: connect.clean_session,

@@ -12,6 +12,8 @@ use crate::link::Outgoing;
 /// How a peer opens its MQTT connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PeerConnect {
+    /// MQTT protocol level: 4 is MQTT 3.1.1.
+    pub level: u8,
     /// Client identifier.
     pub client_id: String,
     /// Keep-alive; zero is off.

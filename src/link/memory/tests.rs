@@ -22,6 +22,7 @@ struct Scripted {
 impl Peer for Scripted {
     fn connect(&mut self, _: Stamp) -> PeerConnect {
         PeerConnect {
+            level: 4,
             client_id: "device".to_owned(),
             keep_alive: Duration::from_secs(self.keep_alive),
             clean_session: true,

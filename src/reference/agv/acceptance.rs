@@ -197,7 +197,10 @@ impl Agv {
         }
         let moment = self.moment();
         self.motion.halt(moment);
-        self.motion.reached = self.near(&order.nodes[0]);
+        let unknown = self.config.node(&order.nodes[0].id).is_none();
+        let uncounted = self.faults.has(F::RangeNotCounted) || (unknown && self.faults.has(F::TemporaryNodeNotReached));
+        self.motion.reached = self.near(&order.nodes[0]) && !uncounted;
+        self.lost = false;
         let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
         self.book = super::book::Book::empty(last.0);
         self.book.last_sequence = last.1;
@@ -208,6 +211,7 @@ impl Agv {
 
     /// Rows 8 and 10: takes over an update.
     fn continue_with(&mut self, order: Order) {
+        self.book.continued |= !self.is_busy();
         let keep = if order.nodes.iter().any(|node| !node.released) {
             self.faults.has(F::HorizonAppended)
         } else {

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use crate::clock::Moment;
+
 use super::order_message::{Edge, Node};
 
 /// Where a node is.
@@ -50,6 +52,12 @@ pub(super) struct Book {
     pub(super) visits: BTreeMap<String, u32>,
     /// The order was cancelled, so it cannot be continued.
     pub(super) cancelled: bool,
+    /// The order was complete and is continued (`continuation-not-driven` only).
+    pub(super) continued: bool,
+    /// When a faulty vehicle does what it does a moment later.
+    pub(super) soon: Option<Moment>,
+    /// It left the decision point by itself (`horizon-slipped-into` only).
+    pub(super) slipped: bool,
 }
 
 impl Book {
@@ -68,6 +76,9 @@ impl Book {
             left: (None, None),
             visits: BTreeMap::new(),
             cancelled: false,
+            continued: false,
+            soon: None,
+            slipped: false,
         }
     }
 

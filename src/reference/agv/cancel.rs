@@ -1,11 +1,16 @@
 //! cancelOrder, for all four capabilities of figure 9, and giving an order up altogether.
 
+use std::time::Duration;
+
 use super::Agv;
 use super::action_kinds::Deed;
 use super::actions::{Action, Status};
 use super::book::Cancel;
 use super::errors::{ActiveError, Life};
 use super::faults::FaultName as F;
+
+/// How long a faulty vehicle waits before it does what it should not.
+pub(super) const MOMENT: Duration = Duration::from_millis(50);
 
 impl Agv {
     /// A cancelOrder action begins.
@@ -28,7 +33,7 @@ impl Agv {
         if let Some(action) = self.actions.get_mut(action_id) {
             action.status = Status::Running;
         }
-        if self.config.has("cancelRunsFromReceipt") {
+        if self.config.has("cancelRunsFromReceipt") || self.faults.has(F::CancelFinishedEarly) {
             self.flush();
         }
     }
@@ -42,6 +47,9 @@ impl Agv {
         };
         if let Some(action) = self.actions.get_mut(action_id) {
             action.end(status);
+        }
+        if self.faults.has(F::CancelLeavesNodes) {
+            self.book.drop_route();
         }
         if self.faults.has(F::IdleCancelSilent) {
             return;
@@ -88,7 +96,7 @@ impl Agv {
         let keeps_nodes = self.faults.has(F::CancelKeepsNodes);
         let under_way = cancel.to_node && self.book.entered && !self.book.nodes.is_empty()
             || cancel.to_node && !keeps_nodes && !self.book.nodes.is_empty()
-            || self.motion.is_moving()
+            || self.motion.is_moving() && !self.faults.has(F::CancelFinishedMoving)
             || (self.faults.has(F::CancelDrivesOn) && self.book.nodes.iter().any(|stop| stop.node.released));
         let unfinished = self.actions.order_unfinished()
             && !self.faults.has(F::CancelFinishedEarly)
@@ -107,12 +115,27 @@ impl Agv {
         if self.faults.has(F::CancelDropsActions) {
             self.actions.retain(|action| !action.of_order());
         }
+        if self.faults.has(F::CancelForgetsActions) {
+            self.book.soon = Some(self.moment() + MOMENT);
+        }
         if !self.faults.has(F::CancelNeverFinished)
             && let Some(action) = self.actions.get_mut(&cancel.action_id)
         {
             action.end(Status::Finished);
         }
         true
+    }
+
+    /// What a faulty vehicle does a moment after it stopped or was cancelled.
+    pub(super) fn a_moment_later(&mut self) {
+        if self.book.soon.is_none_or(|soon| soon > self.moment()) {
+            return;
+        }
+        self.book.soon = None;
+        self.book.slipped = self.faults.has(F::HorizonSlippedInto);
+        if self.faults.has(F::CancelForgetsActions) {
+            self.actions.retain(|action| !action.of_order());
+        }
     }
 
     /// Drops the order at once, with everything that belongs to it.

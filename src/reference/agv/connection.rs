@@ -23,6 +23,8 @@ pub(super) struct Connection {
     returning: bool,
     /// The next headerId by topic name (HDR-02).
     header_ids: BTreeMap<&'static str, u32>,
+    /// When to say ONLINE (`online-late` only).
+    pub(super) online_at: Option<Moment>,
 }
 
 impl Connection {
@@ -34,6 +36,7 @@ impl Connection {
             shut_down: false,
             returning: false,
             header_ids: BTreeMap::new(),
+            online_at: None,
         }
     }
 
@@ -45,6 +48,7 @@ impl Connection {
     /// The link is gone, and to be restored at a time.
     pub(super) fn dropped(&mut self, attempt_at: Moment) {
         self.online = false;
+        self.online_at = None;
         self.shut_down = false;
         self.attempt_at = Some(attempt_at);
     }
@@ -95,7 +99,9 @@ impl Agv {
             () if self.faults.has(F::KeepAliveLong) => Duration::from_secs(600),
             () => self.config.keep_alive,
         };
-        let wanted: &[&str] = if self.faults.has(F::InstantActionsNotSubscribed) {
+        let wanted: &[&str] = if self.connection.returning && self.faults.has(F::NotSubscribedAgain) {
+            &[]
+        } else if self.faults.has(F::InstantActionsNotSubscribed) {
             &["order"]
         } else {
             &["order", "instantActions"]
@@ -105,6 +111,7 @@ impl Agv {
             .filter_map(|name| self.config.topic(name))
             .map(|topic| (topic.to_owned(), 0));
         ConnectOptions {
+            level: if self.faults.has(F::OldMqtt) { 3 } else { 4 },
             client_id: format!("{}.{}", self.config.manufacturer, self.config.serial_number),
             keep_alive,
             clean_session: true,
@@ -120,7 +127,9 @@ impl Agv {
         self.connection.returning = true;
         self.connection.attempt_at = None;
         self.connection.shut_down = false;
-        if !self.faults.has(F::NoOnline) && (first || !self.faults.has(F::NoOnlineAfterReconnect)) {
+        if !first && self.faults.has(F::OnlineLate) {
+            self.connection.online_at = Some(self.moment() + Duration::from_secs(25));
+        } else if !self.faults.has(F::NoOnline) && (first || !self.faults.has(F::NoOnlineAfterReconnect)) {
             let online = if self.faults.has(F::ConnectionStateConnected) {
                 "CONNECTED"
             } else {
@@ -129,7 +138,7 @@ impl Agv {
             self.publish_connection(online);
         }
         self.publish_factsheet();
-        self.start_reporting();
+        self.start_reporting(first);
     }
 
     /// The link broke. The order goes on (MQTT-03, MQTT-04).
@@ -139,6 +148,7 @@ impl Agv {
             self.book.order_id.clear();
         }
         self.connection.online = false;
+        self.connection.online_at = None;
         let ended = self.connection.shut_down || self.faults.has(F::NeverReconnects);
         if !ended && self.connection.attempt_at.is_none() {
             self.connection.attempt_at = Some(self.moment() + self.config.reconnect_delay);
@@ -147,6 +157,10 @@ impl Agv {
 
     /// Asks for a connection when it is time.
     pub(super) fn attempt_connection(&mut self) {
+        if self.connection.online_at.is_some_and(|at| at <= self.moment()) {
+            self.connection.online_at = None;
+            self.publish_connection("ONLINE");
+        }
         if self.connection.next_attempt().is_some_and(|at| at <= self.moment()) {
             self.connection.attempt_at = None;
             self.pending.push(Output::Connect);
@@ -158,6 +172,9 @@ impl Agv {
         if self.connection.online {
             if !self.faults.has(F::NoOffline) {
                 self.publish_connection("OFFLINE");
+            }
+            if self.faults.has(F::OfflineThenBroken) {
+                self.publish_connection("CONNECTIONBROKEN");
             }
             let silent = self.faults.has(F::NoDisconnect);
             self.pending
@@ -200,7 +217,9 @@ impl Agv {
             return;
         };
         let mut message = self.header(name, true);
-        if name == "visualization" && self.faults.has(F::VisualizationWithoutHeader) {
+        let headless = (name == "visualization" && self.faults.has(F::VisualizationWithoutHeader))
+            || (name == "factsheet" && self.faults.has(F::FactsheetWithoutHeader));
+        if headless {
             message.clear();
         }
         if name == "connection" && self.faults.has(F::HeaderNested) {
@@ -280,7 +299,13 @@ impl Agv {
         header.insert("timestamp".into(), self.timestamp());
         header.insert("version".into(), json!(version));
         if !(name == "state" && self.faults.has(F::HeaderWithoutManufacturer)) {
-            header.insert("manufacturer".into(), json!(self.config.manufacturer));
+            let own = &self.config.manufacturer;
+            let manufacturer = match () {
+                () if name == "state" && self.faults.has(F::ManufacturerEmpty) => String::new(),
+                () if self.faults.has(F::ManufacturerWithSlash) => format!("{own}/agv"),
+                () => own.clone(),
+            };
+            header.insert("manufacturer".into(), json!(manufacturer));
         }
         header.insert("serialNumber".into(), json!(serial_number));
         header

@@ -92,6 +92,9 @@ impl Agv {
         let duration = self.duration_of(action);
         let Some(action) = self.actions.get_mut(id) else { return };
         match action.kind {
+            Some(kind) if kind.deed == Deed::WaitForTrigger && self.faults.has(F::TriggerSkipped) => {
+                action.end(Status::Finished);
+            }
             None => action.end(Status::Failed),
             Some(kind) if kind.prepares => {
                 action.status = Status::Initializing;
@@ -111,7 +114,9 @@ impl Agv {
         let stuck = self.faults.has(F::InstantActionStuck);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.status = Status::Running;
-        let awaits = awaits && action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
+        let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
+        let duration = if waits { super::cancel::MOMENT } else { duration };
+        let awaits = awaits && waits;
         let endless = awaits || (stuck && !action.of_order());
         action.due = (!endless).then(|| moment + duration);
     }
@@ -299,6 +304,7 @@ impl Agv {
         }
         let map_id = action.text("mapId");
         if !unchecked && !self.maps.on_board(map_id) {
+            self.take_map_anyway(action);
             return invalid("the map is not on board");
         }
         if action.origin == Origin::Instant && (!self.book.nodes.is_empty() || self.actions.order_unfinished()) {
@@ -307,6 +313,7 @@ impl Agv {
         if self.faults.has(F::InitPositionWithoutEffect) {
             return Ok(());
         }
+        self.lost = self.faults.has(F::InitPositionUninitialized);
         self.maps.enable_any(map_id);
         self.motion.place(Pose {
             x,
@@ -318,6 +325,14 @@ impl Agv {
             action.text("lastNodeId").clone_into(&mut self.book.last_node);
         }
         Ok(())
+    }
+
+    /// `init-position-taken-anyway`: the map of a pose that is refused.
+    pub(super) fn take_map_anyway(&mut self, action: &Action) {
+        let init = action.kind.is_some_and(|kind| kind.deed == Deed::InitPosition);
+        if init && self.faults.has(F::InitPositionTakenAnyway) {
+            self.motion.set_map(action.text("mapId").to_owned());
+        }
     }
 
     fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {

@@ -55,6 +55,12 @@ impl Agv {
             let silent = self.faults.has(F::DuplicateMapSilent) && reason.contains("already")
                 || self.faults.has(F::StorageFullSilent) && reason.contains("room");
             self.fail(action_id, &Problem::map(&action, reason).silent_if(silent));
+            self.renumber_if(F::FailedDownloadRenumbers);
+            return;
+        }
+        if self.faults.has(F::MapNotFetched) {
+            self.maps.store(map_id, version, self.faults);
+            self.finish(action_id, None);
             return;
         }
         let token = self.downloads.next;
@@ -105,6 +111,7 @@ impl Agv {
             self.download_failed(action_id, "the file does not have the announced hash");
         } else {
             self.downloads.forget(action_id);
+            self.renumber_if(F::DownloadRenumbers);
             self.maps
                 .store(action.text("mapId"), action.text("mapVersion"), self.faults);
             self.finish(action_id, None);
@@ -121,13 +128,14 @@ impl Agv {
             self.finish(action_id, None);
             return;
         }
-        if self.faults.has(F::DownloadRetried) {
-            self.pending.push(Output::Fetch {
-                token: u64::MAX,
-                url: action.text("mapDownloadLink").to_owned(),
-            });
-        }
         let silent = self.faults.has(F::DownloadFailureSilent);
         self.fail(action_id, &Problem::map(&action, reason).silent_if(silent));
+        self.renumber_if(F::FailedDownloadRenumbers);
+    }
+
+    fn renumber_if(&mut self, fault: F) {
+        if self.faults.has(fault) {
+            self.maps.renumber();
+        }
     }
 }

@@ -94,6 +94,9 @@ impl Agv {
             parameters["width"] = json!(0.8);
             parameters["length"] = json!(1.2);
         }
+        if self.faults.has(F::SpeedMinAboveMax) {
+            parameters["speedMin"] = json!(self.config.speed + 1.0);
+        }
         parameters
     }
 
@@ -207,15 +210,20 @@ impl Agv {
     }
 
     fn geometry(&self) -> Value {
+        let typeless = self.faults.has(F::WheelWithoutType);
         let wheel = |y: f64| {
-            json!({
+            let mut wheel = json!({
                 "type": "DRIVE",
                 "isActiveDriven": true,
                 "isActiveSteered": false,
                 "position": { "x": 0.0, "y": y },
                 "diameter": 0.2,
                 "width": 0.05,
-            })
+            });
+            if let Some(fields) = wheel.as_object_mut().filter(|_| typeless) {
+                fields.remove("type");
+            }
+            wheel
         };
         let point = |x: f64, y: f64| json!({ "x": x, "y": y });
         let mut contour = vec![point(0.6, 0.4), point(-0.6, 0.4), point(-0.6, -0.4), point(0.6, -0.4)];
@@ -229,14 +237,19 @@ impl Agv {
     }
 
     fn load_specification(&self) -> Value {
+        let typeless = self.faults.has(F::LoadSetWithoutType);
         let set = |name: &str, load_type: &str| {
-            json!({
+            let mut set = json!({
                 "setName": name,
                 "loadType": load_type,
                 "loadPositions": LOAD_POSITIONS,
                 "maxWeight": 500.0,
                 "maxLoadhandlingHeight": MAX_HEIGHT,
-            })
+            });
+            if let Some(fields) = set.as_object_mut().filter(|_| typeless) {
+                fields.remove("loadType");
+            }
+            set
         };
         let second = if self.faults.has(F::LoadSetTwice) {
             "DEFAULT"

@@ -22,6 +22,7 @@ faults! {
     OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
     StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
     HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07"] "Drives into the horizon while the link is down.";
+    OldMqtt "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1.";
     StateQosOne "state-qos-1" ["MQTT-07"] "Publishes the state with QoS 1.";
     FactsheetQosTwo "factsheet-qos-2" ["MQTT-07"] "Publishes the factsheet with QoS 2.";
     ConnectionQosZero "connection-qos-0" ["MQTT-08"] "Publishes the connection topic with QoS 0.";
@@ -33,12 +34,16 @@ faults! {
     OtherMajorVersion "other-major-version" ["TOPIC-03", "TOPIC-02"] "Publishes its visualization below another major version.";
     EchoesOrder "echoes-order" ["TOPIC-15"] "Publishes the accepted order back on the order topic.";
     InstantActionsNotSubscribed "instant-actions-not-subscribed" ["TOPIC-10"] "Does not subscribe to instantActions.";
+    NotSubscribedAgain "not-subscribed-again" ["TOPIC-10", "MQTT-10"] "Does not subscribe again when it reconnects.";
     SerialNumberWithSpace "serial-number-with-space" ["TOPIC-05", "HDR-05"] "Writes its serial number with a space in the header.";
 
     // Header and JSON
     HeaderWithoutManufacturer "header-without-manufacturer" ["HDR-01", "HDR-05"] "Leaves the manufacturer out of the header of its states.";
     HeaderNested "header-nested" ["HDR-01", "CONN-10"] "Packs the header of connection messages into an object of its own.";
     VisualizationWithoutHeader "visualization-without-header" ["VIS-01", "HDR-01"] "Publishes the visualization without a header.";
+    FactsheetWithoutHeader "factsheet-without-header" ["HDR-01"] "Publishes the factsheet without a header.";
+    ManufacturerEmpty "manufacturer-empty" ["HDR-05"] "Leaves the manufacturer empty in its states.";
+    ManufacturerWithSlash "manufacturer-with-slash" ["TOPIC-06", "TOPIC-04"] "Writes its manufacturer with a slash in the header.";
     HeaderIdConstant "header-id-constant" ["HDR-02"] "Sends every state with the same headerId.";
     HeaderIdShared "header-id-shared" ["HDR-02"] "Counts one headerId over all topics.";
     HeaderIdAsText "header-id-as-text" ["JSON-06", "HDR-02"] "Sends the headerId as a string.";
@@ -51,6 +56,7 @@ faults! {
     LatinOneText "latin-1-text" ["JSON-03"] "Encodes the text of its periodic states in Latin-1.";
     BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15"] "Sends charging as a word in quotes.";
     NanVelocity "nan-velocity" ["JSON-08", "MQTT-02"] "Writes NaN as turning speed into its periodic states.";
+    NanAsText "nan-as-text" ["JSON-08", "STATE-MSG-05"] "Writes the word NaN as turning speed into its periodic states.";
     ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15"] "Estimates its reach in fractions of a metre.";
     DuplicateKey "duplicate-key" ["JSON-10"] "Repeats the key driving in its periodic states, with another value.";
     IdWithSpace "id-with-space" ["JSON-04"] "Reports the id of its map with a space.";
@@ -72,11 +78,17 @@ faults! {
     ConnectionStateConnected "connection-state-connected" ["CONN-10", "CONN-05"] "Says CONNECTED instead of ONLINE.";
     NoOnlineAfterReconnect "no-online-after-reconnect" ["CONN-11"] "Says ONLINE only the first time it connects.";
 
+    OnlineLate "online-late" ["CONN-05", "CONN-11"] "Says ONLINE only 25 seconds after it reconnected.";
+    OfflineThenBroken "offline-then-broken" ["CONN-10", "CONN-08"] "Says CONNECTIONBROKEN itself after OFFLINE.";
+
     // Factsheet
     FactsheetNotRetained "factsheet-not-retained" ["FACT-01"] "Publishes the factsheet without the retain flag.";
     FactsheetWithoutLimits "factsheet-without-limits" ["FACT-02", "FACT-05"] "Leaves protocolLimits out of the factsheet.";
     FactsheetKinematicsUnknown "factsheet-kinematics-unknown" ["FACT-03"] "Gives DIFFERENTIAL as its kinematics.";
     FactsheetWithoutSize "factsheet-without-size" ["FACT-04"] "Leaves width and length out of the factsheet.";
+    SpeedMinAboveMax "speed-min-above-max" ["FACT-04"] "States a lowest speed above its highest.";
+    WheelWithoutType "wheel-without-type" ["FACT-08"] "Leaves the type of its wheels out of the factsheet.";
+    LoadSetWithoutType "load-set-without-type" ["FACT-09"] "Leaves the type of the load out of its load sets.";
     FactsheetWithoutTiming "factsheet-without-timing" ["FACT-05"] "Leaves the timing out of its limits.";
     FactsheetSupportYes "factsheet-support-yes" ["FACT-06"] "Says YES where the support of a parameter is asked for.";
     OptionalParametersMissing "optional-parameters-missing" ["OPT-04", "FACT-06"] "Leaves optionalParameters out of the factsheet.";
@@ -96,6 +108,7 @@ faults! {
     DeviationIgnored "deviation-ignored" ["ORD-05", "ORD-CANCEL-16"] "Counts itself as on the first node only when it stands exactly there.";
     StopsBeforeEndOfBase "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base.";
     HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05"] "Drives into the horizon without waiting for its release.";
+    HorizonSlippedInto "horizon-slipped-into" ["ORD-07"] "Stops at the decision point and rolls on into the horizon a moment later.";
     HorizonDemanded "horizon-demanded" ["ORD-10"] "Refuses new orders without a horizon.";
     GraphUnchecked "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense.";
     SingleNodeRefused "single-node-refused" ["ORD-13"] "Refuses orders with one node.";
@@ -110,12 +123,14 @@ faults! {
     RunningActionIgnored "running-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs.";
     HorizonNotBusy "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point.";
     FarOrderAccepted "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is.";
+    StartErrorMisnamed "start-error-misnamed" ["ORD-FLOW-04"] "Calls the first node out of reach an error of its own name.";
     OldActionStatesKept "old-action-states-kept" ["ORD-FLOW-05", "STATE-MSG-11"] "Keeps the action states of the old order.";
     HorizonNotReported "horizon-not-reported" ["ORD-FLOW-06", "STATE-12"] "Leaves the horizon out of its node and edge states.";
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
     CompletedUpdateGapAccepted "completed-update-gap-accepted" ["ORD-FLOW-10"] "Continues a completed order from whatever node the update begins with.";
+    ContinuationNotDriven "continuation-not-driven" ["ORD-06", "ORD-FLOW-11"] "Takes over an update of a completed order and does not drive it.";
     CompletedNotContinued "completed-not-continued" ["ORD-FLOW-11"] "Refuses updates of a completed order.";
     RejectionStopsOrder "rejection-stops-order" ["ORD-FLOW-12", "ORD-REJ-11"] "Stops driving when it has to refuse a message.";
 
@@ -125,6 +140,8 @@ faults! {
     CancelLetsRun "cancel-lets-run" ["ORD-CANCEL-04"] "Lets interruptible actions run to their end when the order is cancelled.";
     CancelFailsEarly "cancel-fails-early" ["ORD-CANCEL-05"] "Reports an action FAILED on cancellation and FINISHED when it ends.";
     CancelFinishedEarly "cancel-finished-early" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while an action still runs.";
+    CancelFinishedMoving "cancel-finished-moving" ["ORD-CANCEL-07"] "Reports cancelOrder FINISHED while it still rolls out.";
+    CancelForgetsActions "cancel-forgets-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Forgets the actions of a cancelled order a moment later.";
     CancelNeverFinished "cancel-never-finished" ["ORD-CANCEL-07", "IACT-04"] "Leaves cancelOrder RUNNING for ever.";
     CancelClearsOrderId "cancel-clears-order-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Empties the orderId when the order is cancelled.";
     CancelKeepsNodes "cancel-keeps-nodes" ["ORD-CANCEL-09"] "Keeps all node states while it drives to the node where it stops.";
@@ -133,6 +150,8 @@ faults! {
     CancelDropsActions "cancel-drops-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Removes the action states of a cancelled order.";
     DeadAfterCancel "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation.";
     TemporaryNodeRefused "temporary-node-refused" ["ORD-CANCEL-15"] "Refuses orders that begin at a node it has never heard of.";
+    TemporaryNodeNotReached "temporary-node-not-reached" ["ORD-CANCEL-15"] "Takes over orders that begin at a node it has never heard of, and never counts it as reached.";
+    RangeNotCounted "range-not-counted" ["ORD-CANCEL-16"] "Drives to the exact place of a first node in whose range it stands.";
     IdleCancelFinished "idle-cancel-finished" ["ORD-CANCEL-18"] "Reports cancelOrder FINISHED although there is no order.";
     IdleCancelSilent "idle-cancel-silent" ["ORD-CANCEL-19", "ORD-CANCEL-20"] "Raises no error when there is no order to cancel.";
     IdleCancelFatal "idle-cancel-fatal" ["ORD-CANCEL-19"] "Calls a missing order to cancel FATAL.";
@@ -140,16 +159,19 @@ faults! {
 
     // Rejection
     MalformedTakenOver "malformed-taken-over" ["ORD-REJ-01"] "Reports the orderId of a malformed order as its own.";
+    UnreadableClearsOrder "unreadable-clears-order" ["ORD-REJ-01", "ORD-FLOW-12"] "Clears its order when it cannot read a message.";
+    MissingIdTakenOver "missing-id-taken-over" ["ORD-REJ-01", "STATE-MSG-02"] "Reads a missing orderId as an empty one and reports it.";
     ValidationErrorMisspelled "validation-error-misspelled" ["ORD-REJ-02"] "Calls a malformed order validationOrder, as an old figure does.";
     ValidationErrorFatal "validation-error-fatal" ["ORD-REJ-02"] "Reports a malformed order as FATAL.";
-    ValidationErrorDroppedEarly "validation-error-dropped-early" ["ORD-REJ-03"] "Forgets the validationError after a second.";
+    ValidationErrorDroppedEarly "validation-error-dropped-early" ["ORD-REJ-03"] "Forgets the validationError after a moment.";
     ValidationErrorLingers "validation-error-lingers" ["ORD-REJ-03"] "Keeps order errors although a new order was accepted.";
     UnknownActionAccepted "unknown-action-accepted" ["ORD-REJ-04", "ORD-REJ-09"] "Accepts orders with unknown actions and fails the action.";
+    RefusedActionsListed "refused-actions-listed" ["ORD-REJ-09"] "Lists the actions of an order it cannot perform as FAILED.";
     UnsupportedFieldIgnored "unsupported-field-ignored" ["ORD-REJ-05", "OPT-02"] "Ignores fields of an order it has no use for.";
     OrderErrorAsValidation "order-error-as-validation" ["ORD-REJ-06"] "Reports orders it cannot perform as malformed.";
     OrderErrorFatal "order-error-fatal" ["ORD-REJ-06"] "Reports orders it cannot perform as FATAL.";
     OrderErrorUnreferenced "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform.";
-    OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a second.";
+    OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a moment.";
     OutdatedUpdateTakenOver "outdated-update-taken-over" ["ORD-REJ-10"] "Goes back to an outdated order update.";
     OutdatedUpdateDropsOrder "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives.";
     OutdatedUpdateMisnamed "outdated-update-misnamed" ["ORD-REJ-12"] "Reports an outdated update as validationError.";
@@ -173,6 +195,7 @@ faults! {
 
     TurnsOnEdge "turns-on-edge" ["ORD-MSG-24", "ORD-MSG-12"] "Turns to the orientation of an edge when it is on it already.";
     MaxHeightIgnored "max-height-ignored" ["ORD-MSG-21", "OPT-02"] "Accepts edges too low for it.";
+    TrajectoryWithoutPoints "trajectory-without-points" ["ORD-MSG-28"] "Reports the trajectory it planned without control points.";
     ZoneSetInvented "zone-set-invented" ["STATE-MSG-03"] "Reports a zone set no order named.";
 
     // Maps
@@ -202,7 +225,12 @@ faults! {
     UsedMapDeleted "used-map-deleted" ["MAP-32"] "Deletes the map it drives on.";
     DeleteUnknownFinished "delete-unknown-finished" ["MAP-33"] "Reports deleteMap FINISHED for a map it does not have.";
     HashIgnored "hash-ignored" ["MAP-34"] "Does not verify the hash of a map.";
-    DownloadRetried "download-retried" ["MAP-06"] "Fetches a map again by itself when a download failed.";
+    MapNotFetched "map-not-fetched" ["MAP-06"] "Reports downloadMap FINISHED without asking the server for anything.";
+    DownloadRenumbers "download-renumbers" ["MAP-22", "MAP-31"] "Counts the versions of all its maps up when it downloads one.";
+    FailedDownloadRenumbers "failed-download-renumbers" ["MAP-22", "MAP-31"] "Counts the versions of all its maps up when a download fails.";
+    EnableOnlyUpwards "enable-only-upwards" ["MAP-24"] "Reports enableMap FINISHED and keeps the newer version enabled.";
+    EnableUnknownDisables "enable-unknown-disables" ["MAP-25"] "Disables its maps before it fails to enable one it does not have.";
+    UsedMapDisabled "used-map-disabled" ["MAP-32"] "Disables the map it drives on before it fails to delete it.";
     LiftMapStale "lift-map-stale" ["MAP-35"] "Keeps its old mapId when it arrives on another floor.";
 
     // Actions
@@ -223,7 +251,9 @@ faults! {
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
     ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
     ChargingFailureFinished "charging-failure-finished" ["ACT-20"] "Reports startCharging FINISHED although there is no charger.";
-    InitPositionWithoutEffect "init-position-without-effect" ["ACT-23"] "Reports initPosition FINISHED and keeps its pose.";
+    InitPositionWithoutEffect "init-position-without-effect" ["ACT-23", "ACT-24"] "Reports initPosition FINISHED and does nothing.";
+    InitPositionUninitialized "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose.";
+    InitPositionTakenAnyway "init-position-taken-anyway" ["ACT-25"] "Changes its map although it fails an initPosition.";
     InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
     InitPositionUnchecked "init-position-unchecked" ["ACT-25"] "Takes over a pose on a map it does not have.";
     StateRequestUnanswered "state-request-unanswered" ["ACT-26"] "Reports stateRequest FINISHED only with the next periodic state.";
@@ -232,6 +262,7 @@ faults! {
     PickFailureFinished "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was no room for the load.";
     FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick or drop fails.";
     TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
+    TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
     InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09"] "Performs instant actions without an action state.";
@@ -244,6 +275,8 @@ faults! {
     // State
     StateSilence "state-silence" ["STATE-02"] "Sends states only every 45 seconds when nothing happens.";
     StatesByClock "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens.";
+    StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
+    SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
     OrderWithoutState "order-without-state" ["STATE-03"] "Does not send a state when an order arrives.";
     LoadWithoutState "load-without-state" ["STATE-04"] "Does not send a state when its load changes.";
     ErrorWithoutState "error-without-state" ["STATE-05"] "Does not send a state when an error appears.";
@@ -260,11 +293,16 @@ faults! {
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02"] "Empties the orderId when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
     LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
+    LastNodeUnknownOnRequest "last-node-unknown-on-request" ["STATE-MSG-04"] "Answers a stateRequest without its last node.";
+    RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
     PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06"] "Reports its coordinates as strings.";
     LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
+    DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";
     DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
     FinishedInstantForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
+    LastInstantActionOnly "last-instant-action-only" ["STATE-MSG-10", "STATE-MSG-09"] "Removes finished instant actions from its states when another one arrives.";
+    InstantActionListedTwice "instant-action-listed-twice" ["STATE-MSG-09"] "Lists instant actions twice.";
     FinishedActionsRemoved "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done.";
     RunningInstantDropped "running-instant-dropped" ["STATE-MSG-11"] "Removes running instant actions from its states when a new order is accepted.";
     NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13"] "Leaves the sequenceId out of its node states.";
@@ -285,6 +323,8 @@ faults! {
 
     // Action life cycle and blocking
     HorizonActionsMissing "horizon-actions-missing" ["ASTATE-01"] "Lists the actions of the horizon only when they are released.";
+    SingleNodeActionUnlisted "single-node-action-unlisted" ["ASTATE-01"] "Does not list the actions of orders with one node.";
+    HorizonActionsBegun "horizon-actions-begun" ["ASTATE-02"] "Begins the actions of the horizon when it stops at the decision point.";
     RunningFromStart "running-from-start" ["ASTATE-02"] "Reports all actions RUNNING when the order is accepted.";
     InitializingFromStart "initializing-from-start" ["ASTATE-03", "ASTATE-02"] "Reports all actions INITIALIZING when the order is accepted.";
     PausedWithoutPause "paused-without-pause" ["ASTATE-04"] "Reports actions PAUSED that only wait for others.";

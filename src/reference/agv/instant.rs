@@ -38,6 +38,10 @@ impl Agv {
             self.malformed("the message has no array of actions");
             return;
         };
+        if self.faults.has(F::LastInstantActionOnly) {
+            self.actions
+                .retain(|action| action.of_order() || !action.status.is_terminal());
+        }
         let limit = if self.faults.has(F::OnlyFirstInstantAction) {
             1
         } else {
@@ -87,6 +91,7 @@ impl Agv {
         match refusal {
             Some(_) if self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
             Some(reason) => {
+                self.take_map_anyway(&action);
                 let silent = self.faults.has(F::UnknownInstantSilent);
                 self.fail(&id, &Problem::unable(&action, &reason).silent_if(silent));
             }

@@ -69,16 +69,26 @@ impl Maps {
         });
     }
 
+    /// `download-renumbers`, `failed-download-renumbers`: all versions change.
+    pub(super) fn renumber(&mut self) {
+        self.all.iter_mut().for_each(|map| map.map_version.push_str(".1"));
+    }
+
     /// Enables a version, and disables the others of that mapId (MAP-24).
     pub(super) fn enable(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
         if self.position(map_id, version).is_none() {
+            if faults.has(F::EnableUnknownDisables) {
+                self.all.iter_mut().for_each(|map| map.enabled = false);
+            }
             return if faults.has(F::EnableUnknownFinished) {
                 Ok(())
             } else {
                 Err("the map is not on board")
             };
         }
-        if faults.has(F::EnableWithoutEffect) {
+        let newer = |map: &OnboardMap| map.map_id == map_id && map.enabled && map.map_version.as_str() > version;
+        let kept = faults.has(F::EnableOnlyUpwards) && self.all.iter().any(newer);
+        if kept || faults.has(F::EnableWithoutEffect) {
             return Ok(());
         }
         for map in &mut self.all {
@@ -116,6 +126,7 @@ impl Maps {
             };
         };
         if self.all[index].enabled && used(map_id) && !faults.has(F::UsedMapDeleted) {
+            self.all[index].enabled = !faults.has(F::UsedMapDisabled);
             return Err("the map is in use");
         }
         if !faults.has(F::DeleteKeepsEntry) {

@@ -116,6 +116,8 @@ pub struct Agv {
     mode: Mode,
     loads: Vec<Load>,
     charging: bool,
+    /// It has not found its pose (`init-position-uninitialized` only).
+    lost: bool,
     connection: Connection,
     report: Report,
     /// Counts logs.
@@ -167,6 +169,7 @@ impl Agv {
             mode: Mode::Automatic,
             loads: Vec::new(),
             charging: false,
+            lost: false,
             connection: Connection::new(),
             report: Report::default(),
             logs: 0,
@@ -199,6 +202,8 @@ impl Agv {
             self.actions.next_end(),
             self.errors.next_end(),
             self.connection.next_attempt(),
+            self.connection.online_at,
+            self.book.soon,
             self.next_report(),
         ];
         events.into_iter().flatten().min()
@@ -227,6 +232,7 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
+        self.a_moment_later();
         self.attempt_connection();
         self.settle();
         self.flush();
@@ -268,6 +274,9 @@ impl Agv {
 
     /// How long an action runs.
     fn duration_of(&self, action: &actions::Action) -> Duration {
+        if self.faults.has(FaultName::EdgeActionOutlivesEdge) && matches!(action.origin, actions::Origin::Edge(_)) {
+            return Duration::from_secs(60);
+        }
         let asked = action
             .number("duration")
             .filter(|seconds| (0.0..=86_400.0).contains(seconds));

@@ -43,11 +43,14 @@ impl Agv {
 
     /// Whether anything forbids driving now.
     fn may_drive(&self) -> bool {
-        let rolling_out = self.faults.has(F::PauseDrivesOn) && self.book.entered && !self.motion.reached;
+        let rolling_out = self.faults.has(F::PauseDrivesOn) && self.book.entered;
         let held = self.holds.any() && !(rolling_out && self.holds.pause);
         let cancelled = match &self.book.cancel {
-            Some(cancel) => !cancel.to_node && !self.faults.has(F::CancelDrivesOn),
-            None => self.book.cancelled,
+            Some(cancel) => {
+                let rolls_on = self.faults.has(F::CancelDrivesOn) || self.faults.has(F::CancelFinishedMoving);
+                !cancel.to_node && !rolls_on
+            }
+            None => self.book.cancelled && !self.faults.has(F::CancelFinishedMoving),
         };
         let offline = !self.connection.online && self.faults.has(F::StopsOnLinkLoss);
         let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
@@ -71,7 +74,7 @@ impl Agv {
     fn is_released(&self, stop: &Stop) -> bool {
         let ignored =
             self.faults.has(F::HorizonDriven) || (self.faults.has(F::HorizonDrivenOffline) && !self.connection.online);
-        stop.node.released || ignored
+        stop.node.released || ignored || self.book.slipped
     }
 
     /// The next thing the vehicle does on its way, if it may; whether it did something.
@@ -100,7 +103,10 @@ impl Agv {
     /// Goes on towards the next node.
     fn set_out(&mut self, stop: &Stop) -> bool {
         let early_end = stop.node.sequence_id == self.book.base_end.1 && self.faults.has(F::StopsBeforeEndOfBase);
-        if early_end || self.faults.has(F::NeverStarts) {
+        let unreached =
+            self.faults.has(F::TemporaryNodeNotReached) && self.config.node(&stop.node.id).is_none();
+        let undriven = self.faults.has(F::ContinuationNotDriven) && self.book.continued;
+        if early_end || unreached || undriven || self.faults.has(F::NeverStarts) {
             return false;
         }
         let moment = self.moment();
@@ -161,6 +167,7 @@ impl Agv {
         let own = match self.mode {
             Mode::Semiautomatic if self.faults.has(F::SemiautomaticFaster) => self.config.speed * 2.0,
             Mode::Semiautomatic => self.config.speed / 2.0,
+            _ if self.book.slipped => self.config.speed * 4.0,
             _ => self.config.speed,
         };
         self.motion.roll(
@@ -281,8 +288,22 @@ impl Agv {
             if let Some(ahead) = ahead.filter(|_| self.faults.has(F::EdgeActionsOnNode)) {
                 self.actions.trigger(Origin::Edge(ahead), self.faults);
             }
+            self.stop_at_decision_point();
         }
         self.book.left.0 = Some(stop);
+    }
+
+    /// What a faulty vehicle does at the decision point.
+    fn stop_at_decision_point(&mut self) {
+        let Some(planned) = self.book.nodes.front().filter(|stop| !stop.node.released) else {
+            return;
+        };
+        if self.faults.has(F::HorizonActionsBegun) {
+            self.actions.trigger(Origin::Node(planned.node.sequence_id), self.faults);
+        }
+        if self.faults.has(F::HorizonSlippedInto) {
+            self.book.soon = Some(self.now.moment + super::cancel::MOMENT);
+        }
     }
 
     fn update_last_node(&mut self, stop: &Stop) {

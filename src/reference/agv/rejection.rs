@@ -1,12 +1,12 @@
 //! Why an order is not taken over, and how the vehicle reports that (section 6.6.4).
 
-use std::time::Duration;
-
 use serde_json::Value;
 
 use super::Agv;
+use super::actions::{Action, Origin, Status};
 use super::errors::{ActiveError, Life};
 use super::faults::FaultName as F;
+use super::order_message::Order;
 use super::read::Defect;
 
 /// Which rule refused an order.
@@ -75,6 +75,7 @@ impl Agv {
             Rule::Memory => &names.memory,
             Rule::UnknownMap => &names.unknown_map,
             Rule::OtherOrderActive => &names.other_order_active,
+            Rule::StartOutOfRange if self.faults.has(F::StartErrorMisnamed) => "tooFarAway",
             Rule::StartOutOfRange => &names.start_out_of_range,
             Rule::Outdated if self.faults.has(F::OutdatedUpdateMisnamed) => &names.validation,
             Rule::Outdated | Rule::Duplicate => &names.outdated_update,
@@ -93,7 +94,7 @@ impl Agv {
             _ => (false, false),
         };
         let life = match (early, short) {
-            (true, _) => Life::Until(self.moment() + Duration::from_secs(1)),
+            (true, _) => Life::Until(self.moment() + super::cancel::MOMENT),
             (_, true) => Life::Until(self.moment() + self.config.error_duration),
             _ => Life::UntilNewOrder,
         };
@@ -121,6 +122,26 @@ impl Agv {
             || rule != Rule::Outdated && self.faults.has(F::RejectedIdReported);
         if let Some(id) = message.get("orderId").and_then(Value::as_str).filter(|_| taken) {
             id.clone_into(&mut self.book.order_id);
+        }
+        if rule == Rule::Malformed {
+            let without_id = message.is_object() && message.get("orderId").is_none();
+            if without_id && self.faults.has(F::MissingIdTakenOver) {
+                self.book.order_id.clear();
+            }
+            if !message.is_object() && self.faults.has(F::UnreadableClearsOrder) {
+                self.give_up_order();
+                self.book.order_id.clear();
+            }
+        }
+        if rule == Rule::Unable
+            && self.faults.has(F::RefusedActionsListed)
+            && let Ok(order) = Order::read(message)
+        {
+            for request in order.actions() {
+                let mut action = Action::waiting(request.clone(), None, Origin::Instant);
+                action.end(Status::Failed);
+                self.actions.push(action);
+            }
         }
         if self.faults.has(F::RejectionStopsOrder)
             || (rule == Rule::Outdated && self.faults.has(F::OutdatedUpdateDropsOrder))

@@ -28,6 +28,8 @@ pub(super) struct Report {
     /// A state is due and only waits for the minimum interval.
     delayed: bool,
     next_visualization: Option<Moment>,
+    /// No state before this (`silent-after-reconnect` only).
+    silent_until: Option<Moment>,
 }
 
 /// Members that change without being an event.
@@ -97,15 +99,19 @@ impl Changes {
 
 impl Agv {
     /// Begins to report on a new connection.
-    pub(super) fn start_reporting(&mut self) {
+    pub(super) fn start_reporting(&mut self, first: bool) {
         self.report.last = None;
         self.report.requested = true;
+        let silent = !first && self.faults.has(F::SilentAfterReconnect);
+        self.report.silent_until = silent.then(|| self.moment() + Duration::from_secs(35));
         self.report.next_visualization = self.visualization_interval().map(|_| self.moment());
     }
 
     fn state_interval(&self) -> Duration {
         if self.faults.has(F::StateSilence) {
             Duration::from_secs(45)
+        } else if self.faults.has(F::StateIntervalExceeded) {
+            self.stated_interval() * 2 + Duration::from_secs(2)
         } else {
             self.stated_interval()
         }
@@ -130,6 +136,9 @@ impl Agv {
     pub(super) fn next_report(&self) -> Option<Moment> {
         if !self.connection.online {
             return None;
+        }
+        if self.report.silent_until.is_some() {
+            return self.report.silent_until;
         }
         let last = self.report.last.as_ref().map(|(sent, _)| *sent)?;
         let state = if self.report.delayed {
@@ -160,7 +169,11 @@ impl Agv {
 
     fn flush_state(&mut self) {
         let moment = self.moment();
-        let body = self.state_picture();
+        if self.report.silent_until.is_some_and(|until| until > moment) {
+            return;
+        }
+        let mut body = self.state_picture();
+        self.distort_answer(&mut body);
         let Some((sent, last)) = &self.report.last else {
             self.send_state(body, false);
             return;
@@ -179,6 +192,19 @@ impl Agv {
             } else {
                 self.send_state(body, false);
             }
+        }
+    }
+
+    /// What a faulty vehicle says only when it is asked.
+    fn distort_answer(&self, body: &mut Map<String, Value>) {
+        if !self.report.requested || self.report.last.is_none() {
+            return;
+        }
+        if self.faults.has(F::LastNodeUnknownOnRequest) {
+            body.insert("lastNodeId".into(), json!(""));
+        }
+        if self.faults.has(F::RouteRepeatedOnRequest) && self.book.nodes.is_empty() {
+            body.insert("nodeStates".into(), self.last_node_state());
         }
     }
 
@@ -216,6 +242,9 @@ impl Agv {
         if periodic && self.faults.has(F::NanVelocity) {
             body.insert("velocity".into(), json!({ "vx": 0.0, "vy": 0.0, "omega": "@" }));
             mangle.push(("\"@\"", b"NaN"));
+        }
+        if periodic && self.faults.has(F::NanAsText) {
+            body.insert("velocity".into(), json!({ "vx": 0.0, "vy": 0.0, "omega": "NaN" }));
         }
         if periodic && self.faults.has(F::DuplicateKey) {
             let other: &[u8] = if self.motion.is_moving() {

@@ -57,7 +57,11 @@ impl Agv {
             "actionStates",
             self.actions
                 .iter()
-                .filter_map(|action| self.action_state(action))
+                .flat_map(|action| {
+                    let twice = has(F::InstantActionListedTwice) && !action.of_order();
+                    std::iter::repeat_n(self.action_state(action), if twice { 2 } else { 1 })
+                })
+                .flatten()
                 .collect(),
         );
         set("batteryState", self.battery());
@@ -86,14 +90,14 @@ impl Agv {
 
     fn shows_driving(&self) -> bool {
         let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
-        self.motion.is_moving()
+        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported))
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
 
     fn node_states(&self, complete: bool) -> Value {
         let left = self.book.left.0.as_ref().filter(|_| {
-            self.faults.has(F::TraversedNodesListed)
+            (!complete && self.faults.has(F::TraversedNodesListed))
                 || (complete && self.book.has_order() && self.faults.has(F::FinishedOrderListed))
         });
         let shown = self
@@ -105,6 +109,12 @@ impl Agv {
             .chain(shown)
             .map(|stop| self.node_state(stop))
             .collect()
+    }
+
+    /// The node traversed last, as if it were still ahead (`route-repeated-on-request`).
+    pub(super) fn last_node_state(&self) -> Value {
+        let left = self.book.left.0.iter();
+        left.map(|stop| self.node_state(stop)).collect()
     }
 
     fn node_state(&self, stop: &Stop) -> Value {
@@ -132,12 +142,17 @@ impl Agv {
             .edges
             .iter()
             .filter(|edge| edge.released || !self.faults.has(F::HorizonNotReported));
+        let planned = self.faults.has(F::TrajectoryWithoutPoints);
         let picture = |edge: &Edge| {
-            json!({
+            let mut picture = json!({
                 "edgeId": edge.id,
                 "sequenceId": edge.sequence_id,
                 "released": edge.released || self.faults.has(F::HorizonReportedReleased),
-            })
+            });
+            if planned {
+                picture["trajectory"] = json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0] });
+            }
+            picture
         };
         left.into_iter().chain(shown).map(picture).collect()
     }
@@ -148,7 +163,8 @@ impl Agv {
             Origin::Instant => false,
         };
         let hidden = (of_horizon && self.faults.has(F::HorizonActionsMissing))
-            || (!action.of_order() && self.faults.has(F::InstantActionUnlisted));
+            || (!action.of_order() && self.faults.has(F::InstantActionUnlisted))
+            || (action.of_order() && self.book.base_end.1 == 0 && self.faults.has(F::SingleNodeActionUnlisted));
         if hidden {
             return None;
         }
@@ -200,7 +216,7 @@ impl Agv {
             }
         };
         json!({
-            "positionInitialized": true,
+            "positionInitialized": !self.lost,
             "localizationScore": 0.98,
             "x": number(pose.x),
             "y": number(y),
