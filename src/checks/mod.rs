@@ -13,6 +13,7 @@ mod factsheet;
 mod header;
 mod header_id;
 mod message;
+mod motion;
 mod mqtt;
 mod orders;
 mod state_actions;
@@ -117,7 +118,7 @@ pub fn find(name: &str) -> Option<&'static Check> {
     REGISTRY.iter().find(|check| check.name == name)
 }
 
-static REGISTRY: [Check; 27] = [
+static REGISTRY: [Check; 35] = [
     message::SCHEMA,
     message::ENCODING,
     header_id::ID_RISES,
@@ -145,6 +146,14 @@ static REGISTRY: [Check; 27] = [
     state_values::DRIVING,
     errors::PERSIST,
     factsheet::CONSISTENCY,
+    motion::EDGE_SPEED,
+    motion::EDGE_ROTATION_SPEED,
+    motion::EDGE_ORIENTATION,
+    motion::ROTATION_PLACE,
+    motion::NODE_TOLERANCE,
+    motion::NODE_THETA,
+    motion::AXES,
+    motion::VELOCITY_SIGN,
 ];
 
 #[cfg(test)]

@@ -151,6 +151,22 @@ impl Course {
         self.nodes.iter().map(|(name, node)| (name.as_str(), node))
     }
 
+    /// What is known of an edge, with `heading`, the direction of the straight line from node to node, and `back`,
+    /// the direction back, both in radians against the map.
+    fn edge_value(&self, from: &str, to: &str, edge: &Edge) -> Value {
+        let mut value = edge.value();
+        let ends = self.nodes.get(from).zip(self.nodes.get(to));
+        if let Some((start, end)) = ends.filter(|(start, end)| start.distance(end.x, end.y) > 0.0)
+            && let Value::Object(members) = &mut value
+        {
+            let heading = (end.y - start.y).atan2(end.x - start.x);
+            let back = (start.y - end.y).atan2(start.x - end.x);
+            members.insert("heading".into(), heading.into());
+            members.insert("back".into(), back.into());
+        }
+        value
+    }
+
     /// The value of `course`: `a` is a nodeId, `a-b` an edgeId; everything else about them stands below
     /// `nodes` and `edges`, where `course.a.x` is to be looked up as `course.nodes.a.x`.
     #[must_use]
@@ -164,7 +180,7 @@ impl Course {
         }
         for ((from, to), edge) in &self.edges {
             all.insert(format!("{from}-{to}"), edge.id.as_str().into());
-            edges.insert(format!("{from}-{to}"), edge.value());
+            edges.insert(format!("{from}-{to}"), self.edge_value(from, to, edge));
         }
         all.insert("nodes".into(), nodes.into());
         all.insert("edges".into(), edges.into());

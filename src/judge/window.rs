@@ -5,12 +5,14 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
+use super::step::Holds;
 use super::timeline::Timeline;
 use crate::checks::{self, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::pack::Pack;
 use crate::pattern::Bindings;
 use crate::suite::model::CheckUse;
+use crate::verdict::Verdict;
 
 /// Everything around a step.
 #[derive(Clone, Copy)]
@@ -36,8 +38,30 @@ pub(super) struct CheckWindow {
     running: Box<dyn Running>,
     with: Map<String, Value>,
     findings: Vec<CheckFinding>,
-    /// Whether it judged anything at all.
-    pub(super) judged: u64,
+    /// How many entries of the test it has seen.
+    seen: usize,
+}
+
+/// What a named check says about an entry.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Said {
+    /// It had nothing to judge there.
+    Nothing,
+    /// It found nothing wrong.
+    Right,
+    /// What it found: how the clause comes out, and why.
+    Wrong(Holds, String),
+}
+
+impl Said {
+    fn of(finding: &CheckFinding) -> Self {
+        let holds = match finding.verdict {
+            Some(Verdict::Warning) => Holds::Softly,
+            Some(Verdict::Inconclusive) => Holds::Unseen(finding.message.clone()),
+            _ => Holds::No,
+        };
+        Self::Wrong(holds, finding.message.clone())
+    }
 }
 
 impl CheckWindow {
@@ -55,39 +79,52 @@ impl CheckWindow {
             running,
             with,
             findings: Vec::new(),
-            judged: 0,
+            seen: 0,
         })
     }
 
-    /// Shows it one entry; returns what it found there.
-    pub(super) fn observe(&mut self, entry: &Entry, scene: &Scene<'_>) -> Option<String> {
-        let before = self.findings.len();
-        if self
-            .running
-            .observe(entry, &context(scene, &self.with), &mut self.findings)
-        {
-            self.judged += 1;
+    /// Shows it everything of the test up to and including this entry, which may be of any topic: a check of the
+    /// states has to know the orders. Returns what it says about this very entry.
+    pub(super) fn observe(&mut self, entry: &Entry, scene: &Scene<'_>) -> Said {
+        let mut said = Said::Nothing;
+        while let Some(next) = scene.entries.get(self.seen).filter(|next| next.seq() <= entry.seq()) {
+            self.seen += 1;
+            let before = self.findings.len();
+            let judged = self
+                .running
+                .observe(next, &context(scene, &self.with), &mut self.findings);
+            if next.seq() == entry.seq() {
+                said = match self.worst(before, Some(entry.seq())) {
+                    Some(found) => found,
+                    None if judged => Said::Right,
+                    None => Said::Nothing,
+                };
+            }
         }
-        self.findings.get(before).map(|finding| finding.message.clone())
+        said
     }
 
-    /// Shows it everything of the test up to `seq`; returns what it found at that very entry.
-    pub(super) fn run_to(&mut self, seq: u64, scene: &Scene<'_>) -> Option<String> {
-        for entry in scene.entries.iter().take_while(|entry| entry.seq() <= seq) {
-            self.observe(entry, scene);
-        }
-        self.findings
-            .iter()
-            .find(|finding| finding.seq == seq)
-            .map(|finding| finding.message.clone())
+    /// The worst finding from `first` on, about one entry or about any.
+    fn worst(&self, first: usize, seq: Option<u64>) -> Option<Said> {
+        let severity = |finding: &&CheckFinding| match finding.verdict {
+            Some(Verdict::Warning) => 0,
+            Some(Verdict::Inconclusive) => 1,
+            _ => 2,
+        };
+        let found = self.findings.get(first..)?.iter();
+        let found = found.filter(|finding| seq.is_none_or(|seq| finding.seq == seq));
+        found.max_by_key(severity).map(Said::of)
     }
 
     /// The window has ended; returns what was found by that.
-    pub(super) fn finish(&mut self, end: crate::clock::Moment, scene: &Scene<'_>) -> Option<String> {
+    pub(super) fn finish(&mut self, end: crate::clock::Moment, scene: &Scene<'_>) -> Option<(Holds, String)> {
         let before = self.findings.len();
         self.running
             .finish(end, &context(scene, &self.with), &mut self.findings);
-        self.findings.get(before).map(|finding| finding.message.clone())
+        match self.worst(before, None)? {
+            Said::Wrong(holds, message) => Some((holds, message)),
+            Said::Nothing | Said::Right => None,
+        }
     }
 }
 

@@ -103,10 +103,14 @@ fn fresh_names(test: &Test) -> BTreeSet<String> {
     names
 }
 
-/// `course.a.x` beside `course.nodes.a.x`: suites name a node and its members in one breath.
+/// `course.a.x` beside `course.nodes.a.x`, and `course.a-b.heading` beside `course.edges.a-b.heading`: suites name
+/// a node or an edge and its members in one breath.
 fn flat(mut course: Value) -> Value {
     let mut short = Map::new();
-    for (name, node) in course.get("nodes").and_then(Value::as_object).into_iter().flatten() {
+    let groups = ["nodes", "edges"]
+        .into_iter()
+        .filter_map(|group| course.get(group)?.as_object());
+    for (name, node) in groups.flatten() {
         for (member, value) in node.as_object().into_iter().flatten() {
             short.insert(format!("{name}.{member}"), value.clone());
         }

@@ -9,7 +9,7 @@ use super::{
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::judge::limit::Limit;
-use crate::judge::window::{CheckWindow, Scene};
+use crate::judge::window::{CheckWindow, Said, Scene};
 use crate::suite::model::{Always, Extent, From, Step, Until};
 
 pub(crate) struct Holding {
@@ -21,6 +21,10 @@ pub(crate) struct Holding {
     ends: Moment,
     seen: u64,
     violated: Option<Violation>,
+    /// What a check remarked on without ending the step.
+    remarked: Option<(u64, Holds, String)>,
+    /// Whether the check had anything to judge.
+    judged: bool,
 }
 
 struct Goal {
@@ -34,6 +38,7 @@ struct Goal {
 
 struct Violation {
     seq: u64,
+    holds: Holds,
     message: String,
     near: Option<Near>,
 }
@@ -70,6 +75,8 @@ impl Holding {
             ends,
             seen: 0,
             violated: None,
+            remarked: None,
+            judged: false,
         };
         let from = position.start(verb.from, From::Mark);
         let mut past = backlog(scene.timeline, &verb.topic, from);
@@ -110,13 +117,13 @@ impl Holding {
     }
 
     fn judge(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>) {
-        if let Some(found) = self.check.as_mut().and_then(|check| check.observe(entry, scene)) {
-            self.violated = Some(Violation {
-                seq: entry.seq(),
-                message: format!("#{}: {found}", entry.seq()),
-                near: None,
-            });
-        } else if !self.selector.takes(entry, scene) {
+        let said = self.check.as_mut().map(|check| check.observe(entry, scene));
+        self.judged |= said.as_ref().is_some_and(|said| *said != Said::Nothing);
+        if let Some(Said::Wrong(holds, found)) = said {
+            let message = format!("#{}: {found}", entry.seq());
+            self.remark(entry.seq(), holds, message);
+        }
+        if self.violated.is_none() && !self.selector.takes(entry, scene) {
             let near = self.selector.closeness(entry);
             let message = match near.as_ref().and_then(|near| near.miss.as_ref()) {
                 Some(miss) => {
@@ -132,9 +139,24 @@ impl Holding {
             };
             self.violated = Some(Violation {
                 seq: entry.seq(),
+                holds: Holds::No,
                 message,
                 near,
             });
+        }
+    }
+
+    /// Keeps what the check found: a violation ends the step, anything softer waits for the end.
+    fn remark(&mut self, seq: u64, holds: Holds, message: String) {
+        if holds == Holds::No {
+            self.violated.get_or_insert(Violation {
+                seq,
+                holds,
+                message,
+                near: None,
+            });
+        } else if self.remarked.is_none() || matches!(holds, Holds::Unseen(_)) {
+            self.remarked = Some((seq, holds, message));
         }
     }
 
@@ -151,16 +173,13 @@ impl Holding {
     }
 
     pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
-        if let Some(found) = self.check.as_mut().and_then(|check| check.finish(at, scene)) {
-            self.violated.get_or_insert(Violation {
-                seq: 0,
-                message: found,
-                near: None,
-            });
+        if let Some((holds, found)) = self.check.as_mut().and_then(|check| check.finish(at, scene)) {
+            self.judged = true;
+            self.remark(0, holds, found);
         }
         let mut clauses = Vec::new();
         let (holds, message, witness) = self.held(cut_short);
-        let mut reached = if holds == Holds::Yes {
+        let mut reached = if matches!(holds, Holds::Yes | Holds::Softly) {
             Ok(())
         } else {
             Err(message.clone())
@@ -201,7 +220,7 @@ impl Holding {
     fn held(&self, cut_short: Option<&str>) -> (Holds, String, Option<u64>) {
         if let Some(violation) = &self.violated {
             return (
-                Holds::No,
+                violation.holds.clone(),
                 violation.message.clone(),
                 Some(violation.seq).filter(|seq| *seq > 0),
             );
@@ -209,7 +228,14 @@ impl Holding {
         if let Some(why) = cut_short {
             return (Holds::Unseen(why.to_owned()), why.to_owned(), None);
         }
+        if let Some((seq, holds, message)) = &self.remarked {
+            return (holds.clone(), message.clone(), Some(*seq).filter(|seq| *seq > 0));
+        }
         match self.seen {
+            n if n > 0 && self.check.is_some() && !self.judged => {
+                let why = format!("none of {n} {} messages shows what is to be judged", self.verb.topic);
+                (Holds::Unseen(why.clone()), why, None)
+            }
             0 => {
                 let why = format!("no {} message came that could have been judged", self.verb.topic);
                 (Holds::Unseen(why.clone()), why, None)

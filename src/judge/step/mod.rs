@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use super::limit::Limit;
 use super::timeline::Timeline;
-use super::window::{CheckWindow, Scene};
+use super::window::{CheckWindow, Said, Scene};
 use crate::clock::Moment;
 use crate::diagnostic::Span;
 use crate::journal::Entry;
@@ -243,15 +243,15 @@ impl Selector {
                 .subject()
                 .is_some_and(|message| pattern.matches(&message, self.baseline.as_ref())),
         };
-        matches && self.check_holds(entry, scene).is_none()
+        matches && !matches!(self.check_says(entry, scene), Said::Wrong(..))
     }
 
-    /// What the named check finds at this entry.
-    pub(super) fn check_holds(&self, entry: &Entry, scene: &Scene<'_>) -> Option<String> {
-        let check = self.check.as_ref()?;
+    /// What the named check says about this entry; right where there is no check.
+    fn check_says(&self, entry: &Entry, scene: &Scene<'_>) -> Said {
+        let Some(check) = &self.check else { return Said::Right };
         match CheckWindow::start(check, scene) {
-            Err(why) => Some(why),
-            Ok(mut window) => window.run_to(entry.seq(), scene),
+            Err(why) => Said::Wrong(Holds::Unseen(why.clone()), why),
+            Ok(mut window) => window.observe(entry, scene),
         }
     }
 
@@ -372,7 +372,13 @@ pub(super) fn assertion_clause(
         }
     };
     clause.expected = selector.expected();
+    let said = selector.check_says(entry, scene);
     if selector.takes(entry, scene) {
+        if said == Said::Nothing {
+            let why = "the message does not show what is to be judged".to_owned();
+            clause.holds = Holds::Unseen(why.clone());
+            clause.message = why;
+        }
         return clause;
     }
     clause.holds = if word == "prefer" { Holds::Softly } else { Holds::No };
@@ -394,9 +400,13 @@ pub(super) fn assertion_clause(
             clause.nearest = near.miss;
         }
         None => {
-            let found = selector
-                .check_holds(entry, scene)
-                .unwrap_or_else(|| "does not hold".to_owned());
+            let mut found = "does not hold".to_owned();
+            if let Said::Wrong(holds, why) = said {
+                if clause.holds == Holds::No {
+                    clause.holds = holds;
+                }
+                found = why;
+            }
             clause.label.clone_from(&found);
             clause.message = format!("#{}: {found}", entry.seq());
         }

@@ -6,7 +6,7 @@ use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_cla
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
-use crate::judge::window::{CheckWindow, Scene};
+use crate::judge::window::{CheckWindow, Said, Scene};
 use crate::suite::model::{From, Never, Step};
 
 pub(crate) struct Forbidding {
@@ -68,7 +68,7 @@ impl Forbidding {
         }
         self.seen += 1;
         if let Some(check) = &mut self.check {
-            if let Some(found) = check.observe(entry, scene) {
+            if let Said::Wrong(_, found) = check.observe(entry, scene) {
                 self.violated = Some((entry.seq(), found));
             }
         } else if self.selector.takes(entry, scene) {

@@ -18,6 +18,9 @@ const EXACT: f64 = 1e-6;
 /// How far onto an edge the vehicle rolls out before an action that stops it begins, in metres.
 const BRAKING: f64 = 0.3;
 
+/// How fast the vehicle ends a way it has reported already, in metres per second.
+const CREEPING: f64 = 0.5;
+
 impl Agv {
     /// Draws all consequences that need no time.
     pub(super) fn settle(&mut self) {
@@ -91,7 +94,7 @@ impl Agv {
             return false;
         }
         let Some(stop) = self.book.nodes.front().filter(|stop| self.is_released(stop)).cloned() else {
-            return false;
+            return self.roll_out();
         };
         if self.motion.reached {
             self.arrive(&stop)
@@ -177,6 +180,20 @@ impl Agv {
             backwards,
             to_node,
         );
+    }
+
+    /// `traversed-early`: the rest of the way to the last node, which is reported already.
+    fn roll_out(&mut self) -> bool {
+        let Some(left) = self.book.left.0.as_ref().filter(|_| self.faults.has(F::TraversedEarly)) else {
+            return false;
+        };
+        let to = (left.place.x, left.place.y);
+        let moment = self.moment();
+        let rolls = self.motion.pose(moment).distance(to.0, to.1) > 1e-6;
+        if rolls {
+            self.motion.roll(moment, to, CREEPING, false, false);
+        }
+        rolls
     }
 
     /// `turns-on-edge`: rolls on as it stands, until the node it left is well behind.

@@ -1,0 +1,264 @@
+//! Where the vehicle is on its way, state by state: pose, velocity, and the edge it says it is on.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::lane::{Demands, Lane, Stop, finite};
+use crate::checks::CheckContext;
+use crate::checks::orders::{number, read_elements};
+use crate::checks::state_route::Shown;
+use crate::checks::traffic::{Traffic, elements, text, to_vehicle};
+use crate::clock::Moment;
+use crate::journal::Entry;
+
+/// How many order messages are kept, and how many elements of each.
+const MESSAGES: usize = 64;
+const ELEMENTS: usize = 1024;
+
+/// Slower than this is at rest, in metres and radians per second.
+pub(super) const AT_REST: f64 = 0.02;
+
+/// agvPosition, where it is initialized and complete.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Pose {
+    pub map: String,
+    pub x: f64,
+    pub y: f64,
+    pub theta: f64,
+}
+
+impl Pose {
+    fn read(state: &Value) -> Option<Self> {
+        let position = state.get("agvPosition")?;
+        let initialized = position.get("positionInitialized").and_then(Value::as_bool);
+        (initialized == Some(true)).then_some(())?;
+        Some(Self {
+            map: text(position, "mapId").chars().take(512).collect(),
+            x: finite(position, "x")?,
+            y: finite(position, "y")?,
+            theta: finite(position, "theta").filter(|theta| theta.abs() < 3.2)?,
+        })
+    }
+}
+
+/// velocity in vehicle coordinates; each member is optional.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Velocity {
+    pub vx: Option<f64>,
+    pub vy: Option<f64>,
+    pub omega: Option<f64>,
+}
+
+impl Velocity {
+    fn read(state: &Value) -> Self {
+        let member = |name| state.get("velocity").and_then(|velocity| finite(velocity, name));
+        Self {
+            vx: member("vx"),
+            vy: member("vy"),
+            omega: member("omega"),
+        }
+    }
+
+    /// Metres per second, whatever the direction.
+    pub fn speed(&self) -> Option<f64> {
+        self.vx.map(|vx| vx.hypot(self.vy.unwrap_or_default()))
+    }
+}
+
+/// What one state shows.
+#[derive(Clone, Debug)]
+pub(super) struct View {
+    pub seq: u64,
+    pub moment: Moment,
+    /// `timestamp` of the header, if it can be read.
+    stamped: Option<jiff::Timestamp>,
+    pub order: String,
+    /// The last node.
+    pub node: Stop,
+    /// Whether this is the first state that shows this last node of this order.
+    pub fresh: bool,
+    /// The released edge behind the last node, while the state lists it with its end node.
+    pub lane: Option<Lane>,
+    pub pose: Option<Pose>,
+    pub velocity: Velocity,
+    pub driving: Option<bool>,
+    /// Whether no released node is left.
+    pub base_done: bool,
+}
+
+impl View {
+    /// Whether the vehicle stands, by its own account.
+    pub fn stands(&self) -> bool {
+        let still = |speed: Option<f64>| speed.is_none_or(|speed| speed.abs() <= AT_REST);
+        self.driving == Some(false) && still(self.velocity.speed()) && still(self.velocity.omega)
+    }
+
+    /// Whether an earlier view shows the same last node of the same order.
+    pub fn same_lane(&self, earlier: &Self) -> bool {
+        (&self.order, self.node.sequence) == (&earlier.order, earlier.node.sequence) && self.lane == earlier.lane
+    }
+
+    /// The longest time that can lie between what two states show: late delivery makes the time between the
+    /// arrivals shorter than it was, a coarse clock that between the timestamps.
+    pub fn time_since(&self, earlier: &Self) -> Duration {
+        let arrived = self.moment.since(earlier.moment);
+        let stamped = self.stamped.zip(earlier.stamped).and_then(|(now, then)| {
+            let span = now.duration_since(then);
+            Duration::try_from(span).ok()
+        });
+        stamped.map_or(arrived, |stamped| stamped.max(arrived))
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Plan {
+    order: String,
+    update: u64,
+    stops: Vec<Stop>,
+    edges: Vec<Demands>,
+}
+
+impl Plan {
+    fn read(message: &Value) -> Option<Self> {
+        Some(Self {
+            order: text(message, "orderId").chars().take(512).collect(),
+            update: number(message, "orderUpdateId")?,
+            stops: elements(message, "nodes")
+                .take(ELEMENTS)
+                .filter_map(Stop::read)
+                .collect(),
+            edges: elements(message, "edges")
+                .take(ELEMENTS)
+                .filter_map(Demands::read)
+                .collect(),
+        })
+    }
+}
+
+/// Follows the vehicle over its orders.
+#[derive(Default)]
+pub(super) struct Way {
+    shown: Shown,
+    traffic: Traffic,
+    plans: VecDeque<Plan>,
+    before: Option<View>,
+}
+
+/// A state, and the one before it if both belong to one order and nothing came in between.
+pub(super) struct Step {
+    pub now: View,
+    pub before: Option<View>,
+}
+
+impl Way {
+    /// Learns from an entry; gives back what a state shows, if the vehicle can be held to its order.
+    pub fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Step> {
+        self.traffic.note(entry);
+        if let Some(plan) = to_vehicle("order", entry, context).and_then(Plan::read)
+            && self.plans.back() != Some(&plan)
+        {
+            if self.plans.len() == MESSAGES {
+                self.plans.pop_front();
+            }
+            self.plans.push_back(plan);
+        }
+        let state = self.shown.state(entry, context);
+        let is_state = crate::checks::traffic::state(self.traffic, entry, context).is_some();
+        // Messages that the harness holds up tell nothing about time.
+        if self.traffic.disturbed || !is_state {
+            if is_state || self.traffic.disturbed {
+                self.before = None;
+            }
+            return None;
+        }
+        let view = state.and_then(|state| self.view(entry, state));
+        let Some(mut now) = view else {
+            self.before = None;
+            return None;
+        };
+        let before = self.before.take().filter(|before| before.order == now.order);
+        now.fresh = before
+            .as_ref()
+            .is_none_or(|before| before.node.sequence != now.node.sequence);
+        self.before = Some(now.clone());
+        Some(Step { now, before })
+    }
+
+    fn view(&self, entry: &Entry, state: &Value) -> Option<View> {
+        let order = text(state, "orderId");
+        let update = number(state, "orderUpdateId")?;
+        let mut sent = self.shown.orders.candidates(order, update).peekable();
+        sent.peek()?;
+        if !sent.all(|sent| sent.sound) {
+            return None;
+        }
+        let (id, sequence) = self.shown.last.as_ref()?;
+        let node = self.agreed(order, update, |plan| {
+            plan.stops.iter().find(|stop| stop.sequence == *sequence)
+        })?;
+        // Before the first node is reached, the last node is one of the order before.
+        let first = self
+            .shown
+            .orders
+            .candidates(order, update)
+            .any(|sent| sent.first() == *sequence);
+        if node.id != *id || (self.shown.carried.is_some() && !first) {
+            return None;
+        }
+        let nodes = read_elements(state, "nodeStates", "nodeId")?;
+        let edges = read_elements(state, "edgeStates", "edgeId")?;
+        let on = |list: &[crate::checks::orders::Element], sequence: u64| {
+            list.iter()
+                .any(|element| element.sequence == sequence && element.released)
+        };
+        let listed = on(&nodes, sequence + 2) && on(&edges, sequence + 1) && !on(&edges, sequence.wrapping_sub(1));
+        let lane = listed.then(|| self.lane(order, update, node)).flatten();
+        let ahead = |element: &crate::checks::orders::Element| element.released && element.sequence > *sequence;
+        Some(View {
+            seq: entry.seq(),
+            moment: entry.at().moment,
+            stamped: text(state, "timestamp").parse().ok(),
+            order: order.chars().take(512).collect(),
+            node: node.clone(),
+            fresh: true,
+            lane,
+            pose: Pose::read(state),
+            velocity: Velocity::read(state),
+            driving: state.get("driving").and_then(Value::as_bool),
+            base_done: !nodes.iter().any(ahead),
+        })
+    }
+
+    fn lane(&self, order: &str, update: u64, from: &Stop) -> Option<Lane> {
+        let demands = self.agreed(order, update, |plan| {
+            plan.edges.iter().find(|edge| edge.sequence == from.sequence + 1)
+        })?;
+        let to = self.agreed(order, update, |plan| {
+            plan.stops.iter().find(|stop| stop.sequence == from.sequence + 2)
+        })?;
+        Some(Lane {
+            demands: demands.clone(),
+            from: from.clone(),
+            to: to.clone(),
+        })
+    }
+
+    /// What all messages of an order up to an update say alike; `None` when they say different things, for it is
+    /// not known which of them the vehicle took over.
+    fn agreed<'p, T: PartialEq>(
+        &'p self,
+        order: &str,
+        update: u64,
+        of: impl Fn(&'p Plan) -> Option<&'p T>,
+    ) -> Option<&'p T> {
+        let plans = self
+            .plans
+            .iter()
+            .filter(|plan| plan.order == order && plan.update <= update);
+        let mut said = plans.filter_map(of);
+        let first = said.next()?;
+        said.all(|other| other == first).then_some(first)
+    }
+}
