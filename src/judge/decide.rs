@@ -34,7 +34,7 @@ pub(super) fn decide(
         Holds::Unseen(_) => Verdict::Inconclusive,
     };
     let broken = matches!(clause.holds, Holds::No | Holds::Softly | Holds::Late);
-    let explanation = broken.then(|| explain(&clause, waited.as_ref()));
+    let explanation = broken.then(|| explain(&clause));
     Some(Decision {
         requirement: clause.requirement.as_str().to_owned(),
         verdict,
@@ -54,38 +54,8 @@ pub(super) fn decide(
     })
 }
 
-/// The clause with a caret, what was awaited, and the nearest miss.
-fn explain(clause: &Clause, waited: Option<&Waited>) -> String {
-    let caret = Diagnostic::new("", clause.span.clone(), "", clause.label.clone()).render_place();
-    let mut text = caret;
-    let mut note = |word: &str, what: String| text.push_str(&format!("\n    = {word:<8} {what}"));
-    if let Some(expected) = &clause.expected {
-        note("expected", expected.clone());
-    }
-    if let Some(waited) = waited {
-        let messages = match waited.messages {
-            1 => "1 message came".to_owned(),
-            n => format!("{n} messages came"),
-        };
-        note(
-            "waited",
-            format!("{:.1} s since #{}; {messages}", waited.seconds, waited.since),
-        );
-    }
-    if let Some(miss) = &clause.nearest {
-        note(
-            "closest",
-            format!(
-                "#{}: {} is {}, expected {}",
-                miss.seq,
-                super::step::shown_path(&miss.path),
-                miss.found,
-                miss.expected
-            ),
-        );
-    } else {
-        note("found", clause.message.clone());
-    }
-    note("see", format!("vda5050-tck explain {}", clause.requirement));
-    text
+/// The clause with a caret. What was awaited, the nearest miss and the next command stand in the decision itself;
+/// the renderings put them below.
+fn explain(clause: &Clause) -> String {
+    Diagnostic::new("", clause.span.clone(), "", clause.label.clone()).render_place()
 }

@@ -141,6 +141,9 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
         let lead = color.gutter().apply_to(lead);
         let _ = writeln!(text, "{lead} {name:<8} {value}");
     };
+    if let Some(expected) = &decision.expected {
+        note("expected", short(&line(expected), 400).into_owned());
+    }
     let find = |seq| journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
     if let Some(Waited {
         seconds: time,
@@ -158,6 +161,9 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
     let is_nearest = |seq| decision.nearest.as_ref().is_some_and(|nearest| nearest.seq == seq);
     if let Some(witness) = decision.witness.filter(|witness| !is_nearest(*witness)) {
         note("decided", format!("by {}", reference(find(witness), witness)));
+    }
+    if decision.nearest.is_none() && decision.explanation.is_some() {
+        note("found", short(&line(&decision.message), 400).into_owned());
     }
     if let Some(nearest) = &decision.nearest {
         let since = decision.waited.as_ref().and_then(|waited| find(waited.since));
