@@ -4,6 +4,8 @@
 //!
 //! Both vehicles are run at once, each on several benches (`--shard`), because most of the time is waiting.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -157,10 +157,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 if step.spec.as_ref().is_some_and(|spec| !spec.contains(version)) {
                     continue;
                 }
-                if section == Section::Finally && is_cancelling(step) {
-                    if *spared.get_or_insert_with(|| self.spares_cancelling(begun)) {
-                        continue;
-                    }
+                if section == Section::Finally
+                    && is_cancelling(step)
+                    && *spared.get_or_insert_with(|| self.spares_cancelling(begun))
+                {
+                    continue;
                 }
                 let goes_on = self
                     .recorder

@@ -167,10 +167,12 @@ pub(super) async fn recover<L: Link, O: Operator>(session: &mut Session<'_, L, O
             session.engine.cancels = cancelled || !has_hook;
         }
     }
-    if !well(&session.engine.recorder) && has_hook && !session.engine.interrupted() {
-        if let Err(failed) = power_cycle(session, why.to_owned()).await? {
-            session.progress.note(&failed);
-        }
+    if !well(&session.engine.recorder)
+        && has_hook
+        && !session.engine.interrupted()
+        && let Err(failed) = power_cycle(session, why.to_owned()).await?
+    {
+        session.progress.note(&failed);
     }
     Ok(idle(&session.engine.recorder))
 }
