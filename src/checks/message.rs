@@ -149,6 +149,9 @@ fn requirements(topic: &str, finding: &Finding, value: &Value) -> Vec<&'static s
         FindingKind::Missing | FindingKind::Pattern | FindingKind::Other => None,
     });
     all.extend(of_field(topic, &path, finding.kind));
+    if topic == "visualization" && !all.contains(&"VIS-01") {
+        all.push("VIS-01");
+    }
     if all.ends_with(&["STATE-MSG-01"]) && finding.kind == FindingKind::Missing {
         all.push("STATE-01");
     }

@@ -201,6 +201,10 @@ impl Agv {
         let uncounted = self.faults.has(F::RangeNotCounted) || (unknown && self.faults.has(F::TemporaryNodeNotReached));
         self.motion.reached = self.near(&order.nodes[0]) && !uncounted;
         self.lost = false;
+        self.claimed_map = None;
+        if self.holds.stuck {
+            self.set_holds(|holds| holds.stuck = false);
+        }
         let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
         self.book = super::book::Book::empty(last.0);
         self.book.last_sequence = last.1;

@@ -260,7 +260,7 @@ impl Agv {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
         }
         if self.faults.has(F::PauseNotLifted) {
-            self.set_holds(|holds| holds.field |= holds.pause);
+            self.set_holds(|holds| holds.stuck |= holds.pause);
         }
         self.set_holds(|holds| holds.pause = false);
         Outcome::Done(None)
@@ -331,7 +331,7 @@ impl Agv {
     pub(super) fn take_map_anyway(&mut self, action: &Action) {
         let init = action.kind.is_some_and(|kind| kind.deed == Deed::InitPosition);
         if init && self.faults.has(F::InitPositionTakenAnyway) {
-            self.motion.set_map(action.text("mapId").to_owned());
+            self.claimed_map = Some(action.text("mapId").to_owned());
         }
     }
 

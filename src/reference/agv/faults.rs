@@ -150,7 +150,7 @@ faults! {
     CancelDropsActions "cancel-drops-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Removes the action states of a cancelled order.";
     DeadAfterCancel "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation.";
     TemporaryNodeRefused "temporary-node-refused" ["ORD-CANCEL-15"] "Refuses orders that begin at a node it has never heard of.";
-    TemporaryNodeNotReached "temporary-node-not-reached" ["ORD-CANCEL-15"] "Takes over orders that begin at a node it has never heard of, and never counts it as reached.";
+    TemporaryNodeNotReached "temporary-node-not-reached" ["ORD-CANCEL-15"] "Takes over an order with one node it has never heard of, and never counts it as reached.";
     RangeNotCounted "range-not-counted" ["ORD-CANCEL-16"] "Drives to the exact place of a first node in whose range it stands.";
     IdleCancelFinished "idle-cancel-finished" ["ORD-CANCEL-18"] "Reports cancelOrder FINISHED although there is no order.";
     IdleCancelSilent "idle-cancel-silent" ["ORD-CANCEL-19", "ORD-CANCEL-20"] "Raises no error when there is no order to cancel.";
@@ -267,7 +267,7 @@ faults! {
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
     InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09"] "Performs instant actions without an action state.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
-    InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions only when its order is complete.";
+    InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
     UnknownInstantSilent "unknown-instant-silent" ["IACT-06"] "Raises no error for an instant action it does not know.";
     UnknownInstantFinished "unknown-instant-finished" ["IACT-06"] "Reports an instant action it does not know as FINISHED.";
     OnlyFirstInstantAction "only-first-instant-action" ["IACT-07", "IACT-03"] "Performs only the first action of an instantActions message.";

@@ -95,7 +95,7 @@ impl Agv {
                 let silent = self.faults.has(F::UnknownInstantSilent);
                 self.fail(&id, &Problem::unable(&action, &reason).silent_if(silent));
             }
-            None if self.faults.has(F::InstantActionDeferred) => {}
+            None if self.faults.has(F::InstantActionDeferred) && action.request.action_type != "cancelOrder" => {}
             None => self.begin_instant(&id),
         }
     }

@@ -83,11 +83,13 @@ struct Holds {
     emergency: bool,
     /// Something stands in the protective field.
     field: bool,
+    /// Nothing at all (`pause-not-lifted` only).
+    stuck: bool,
 }
 
 impl Holds {
     fn any(self) -> bool {
-        self.pause || self.button || self.emergency || self.field
+        self.pause || self.button || self.emergency || self.field || self.stuck
     }
 }
 
@@ -118,6 +120,8 @@ pub struct Agv {
     charging: bool,
     /// It has not found its pose (`init-position-uninitialized` only).
     lost: bool,
+    /// The map it says it is on (`init-position-taken-anyway` only).
+    claimed_map: Option<String>,
     connection: Connection,
     report: Report,
     /// Counts logs.
@@ -170,6 +174,7 @@ impl Agv {
             loads: Vec::new(),
             charging: false,
             lost: false,
+            claimed_map: None,
             connection: Connection::new(),
             report: Report::default(),
             logs: 0,

@@ -106,8 +106,8 @@ impl Agv {
     /// Goes on towards the next node.
     fn set_out(&mut self, stop: &Stop) -> bool {
         let early_end = stop.node.sequence_id == self.book.base_end.1 && self.faults.has(F::StopsBeforeEndOfBase);
-        let unreached =
-            self.faults.has(F::TemporaryNodeNotReached) && self.config.node(&stop.node.id).is_none();
+        let alone = self.book.base_end.1 == 0 && self.config.node(&stop.node.id).is_none();
+        let unreached = alone && self.faults.has(F::TemporaryNodeNotReached);
         let undriven = self.faults.has(F::ContinuationNotDriven) && self.book.continued;
         if early_end || unreached || undriven || self.faults.has(F::NeverStarts) {
             return false;

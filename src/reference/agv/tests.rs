@@ -152,7 +152,7 @@ impl Bench {
             }
         });
         self.give(Input::Download {
-            token: token.unwrap(),
+            token: token.unwrap_or_default(),
             progress,
         });
     }

@@ -40,7 +40,7 @@ impl Agv {
         set("lastNodeId", json!(last_node));
         set("lastNodeSequenceId", json!(self.book.last_sequence));
         set("nodeStates", self.node_states(complete));
-        set("edgeStates", self.edge_states());
+        set("edgeStates", self.edge_states(complete));
         set("agvPosition", self.position_picture());
         set("velocity", self.velocity_picture());
         set("loads", self.loads_picture());
@@ -135,8 +135,9 @@ impl Agv {
         picture
     }
 
-    fn edge_states(&self) -> Value {
-        let left = self.book.left.1.as_ref().filter(|_| self.faults.has(F::EdgeStatesStay));
+    fn edge_states(&self, complete: bool) -> Value {
+        let stays = self.faults.has(F::EdgeStatesStay) && !complete;
+        let left = self.book.left.1.as_ref().filter(|_| stays);
         let shown = self
             .book
             .edges
@@ -206,7 +207,7 @@ impl Agv {
         let map_id = match () {
             () if self.faults.has(F::PositionMapStale) => "factory-default".to_owned(),
             () if self.faults.has(F::IdWithSpace) => format!("{} 1", pose.map_id),
-            () => pose.map_id,
+            () => self.claimed_map.clone().unwrap_or(pose.map_id),
         };
         let number = |value: f64| {
             if self.faults.has(F::PositionAsText) {

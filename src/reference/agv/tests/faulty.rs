@@ -17,7 +17,8 @@ fn every_fault_shows_in_some_scenario() {
         let mut bench = Bench::with(config.clone(), faults);
         let before = bench.options();
         scenario(&mut bench);
-        (bench.outputs, before)
+        let after = bench.options();
+        (bench.outputs, before, after)
     };
     let scenarios = super::scenarios::all();
     let good: Vec<_> = scenarios.iter().map(|scenario| run(scenario, &[])).collect();

@@ -41,6 +41,7 @@ pub(super) fn all() -> Vec<Scenario> {
         (config(), held_by_hand),
         (config(), modes),
         (config(), broken_link),
+        (many_maps(), asked_afterwards),
     ]
 }
 
@@ -306,6 +307,21 @@ fn modes(bench: &mut Bench) {
     bench.command("set-mode", json!({ "mode": "MANUAL" }));
     bench.command("move-to", json!({ "x": 1.0 }));
     bench.wait(5.0);
+}
+
+fn asked_afterwards(bench: &mut Bench) {
+    bench.order(order("o1", 0, 0, "n1 n2"));
+    bench.wait(10.0);
+    bench.instant("stateRequest", "r", json!({}));
+    for (id, version) in [("e1", "2"), ("e2", "1")] {
+        bench.instant("enableMap", id, json!({ "mapId": "hall", "mapVersion": version }));
+    }
+    let mut nameless = order("o2", 0, 0, "n2");
+    nameless.as_object_mut().unwrap().remove("orderId");
+    bench.order(nameless);
+    bench.wait(1.0);
+    bench.send_raw("order", "{");
+    bench.wait(1.0);
 }
 
 fn broken_link(bench: &mut Bench) {
