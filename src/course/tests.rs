@@ -229,6 +229,8 @@ fn bindings_give_ids_as_text_and_the_rest_below_nodes_and_edges() {
     assert_eq!(bindings["nodes"]["b"]["x"], 3.0);
     assert_eq!(bindings["nodes"]["a"]["mapId"], "hall");
     assert_eq!(bindings["edges"]["a-b"]["maxSpeed"], 1.2);
+    assert_eq!(bindings["edges"]["a-b"]["heading"], 0.0);
+    assert_eq!(bindings["edges"]["a-b"]["back"], std::f64::consts::PI);
 }
 
 #[test]

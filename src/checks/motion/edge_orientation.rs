@@ -42,7 +42,7 @@ impl Running for EdgeOrientation {
             return false;
         };
         if lane.demands.rotation_allowed != Some(false) {
-            let late = lane.along(pose).is_some_and(|along| along.made > along.length / 2.0);
+            let past_half = lane.along(pose).is_some_and(|along| along.made > along.length / 2.0);
             let before = step.before.as_ref().filter(|before| now.same_lane(before));
             let steady = match (now.velocity.omega, before.and_then(|before| before.pose.as_ref())) {
                 (Some(omega), _) => omega.abs() <= STEADY,
@@ -50,7 +50,7 @@ impl Running for EdgeOrientation {
                 (None, None) => false,
             };
             let turns_for_node = lane.to.place.as_ref().is_none_or(|place| place.theta.is_some());
-            if !late || !steady || turns_for_node {
+            if !past_half || !steady || turns_for_node {
                 return false;
             }
         }

@@ -39,7 +39,11 @@ struct NodeTolerance {
 pub(super) fn margin(now: &View, before: &View, speed: impl Fn(&View) -> Option<f64>) -> Option<f64> {
     if now.base_done {
         // It had nowhere else to go: it can only be still on its way to the node.
-        return if now.stands() { Some(0.0) } else { Some(speed(now)?.abs() * LATE) };
+        return if now.stands() {
+            Some(0.0)
+        } else {
+            Some(speed(now)?.abs() * LATE)
+        };
     }
     let fastest = speed(now)?.abs().max(speed(before)?.abs());
     Some(fastest * (now.time_since(before).as_secs_f64() + LATE))
