@@ -31,7 +31,9 @@ impl Scripted {
             socket: socket.try_clone().unwrap(),
             headers: 0,
         };
-        let will = this.message(json!({ "connectionState": "CONNECTIONBROKEN" })).to_string();
+        let will = this
+            .message(json!({ "connectionState": "CONNECTIONBROKEN" }))
+            .to_string();
         // Last will with QoS 1 and RETAIN, clean session, no keep-alive.
         let mut connect = [text("MQTT").as_slice(), &[4, 0b0010_1110, 0, 0]].concat();
         for field in ["scripted", &topic("connection"), &will] {
