@@ -56,11 +56,12 @@ impl Profile {
     }
 
     pub fn text(&self) -> String {
-        let time: String = self
+        let time: Vec<String> = self
             .time
             .iter()
-            .map(|(name, limit)| format!("{name} = \"{limit}\"\n"))
+            .map(|(name, limit)| format!("{name} = \"{limit}\""))
             .collect();
+        let time = time.join("\n");
         format!(
             r#"
 [device]

@@ -138,7 +138,7 @@ fn garbage_on_a_good_connection_is_held_against_the_device() {
 fn hostile_strings_reach_no_page_and_no_terminal() {
     const SCRIPT: &str = "<script>alert('x')</script>]]>\u{1b}[2J\u{0}\u{8}\u{202e}&\"'";
     let (bench, ended) = run_against(|device| {
-        let sheet = device.message(json!({
+        let sheet = device.message(&json!({
             "typeSpecification": { "seriesName": SCRIPT, "agvKinematic": SCRIPT },
             "protocolFeatures": {
                 "agvActions": [{ "actionType": SCRIPT, "actionScopes": [SCRIPT] }],

@@ -175,7 +175,7 @@ impl Running {
         self.child.wait().unwrap();
     }
 
-    /// Closes the reading ends of its output: nobody reads any more.
+    /// Waits for its end, and kills it when it does not come.
     pub fn wait(&mut self) -> ExitStatus {
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
