@@ -445,7 +445,12 @@ impl Job {
             }
         }
         match end {
-            End::Completed => Ok(Exit::of(result.verdict)),
+            End::Completed => match result.tests.iter().find_map(|test| test.not_applicable.as_deref()) {
+                Some(why) if result.verdict.is_none() => {
+                    Err(Problem::NothingToDo(format!("no selected test applies to the device: {why}")))
+                }
+                _ => Ok(Exit::of(result.verdict)),
+            },
             End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
             End::NoDevice(why) => Ok(broken_off(&why, &shown, &result)),
             End::Broken(error) => Ok(broken_off(&error.to_string(), &shown, &result)),

@@ -2,6 +2,7 @@
 
 use std::io::Read as _;
 use std::path::Path;
+use std::sync::Arc;
 
 use serde_json::Value;
 
@@ -65,7 +66,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Problem> {
 fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
     let parsed = Parsed::of_bytes(bytes);
     if let Some(value) = parsed.value() {
-        return json_file(name, value, &parsed, arguments, library);
+        return json_file(name, value, bytes, &parsed, arguments, library);
     }
     let Ok(text) = std::str::from_utf8(bytes) else {
         return Ok(Found::Bad(vec![Diagnostic::whole("not-text", format!("{name} is not UTF-8"))]));
@@ -92,11 +93,11 @@ fn looks_like_toml(text: &str) -> bool {
     text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#')).is_some_and(|line| line.starts_with('[') || line.contains(" = "))
 }
 
-fn json_file(name: &str, value: &Value, parsed: &Parsed, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
+fn json_file(name: &str, value: &Value, bytes: &[u8], parsed: &Parsed, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
     if value.get("metaInformation").is_some() && value.get("layouts").is_some() {
-        let text = value.to_string();
-        return Ok(match Layout::from_lif(&Source::new(name, text), None) {
-            Ok(layout) => Found::Good(format!("a layout with {} nodes and {} edges", layout.nodes().count(), layout.edges().count())),
+        // The text itself, so that a mistake is shown where it stands.
+        return Ok(match layout(&Source::new(name, String::from_utf8_lossy(bytes))) {
+            Ok(what) => Found::Good(what),
             Err(all) => Found::Bad(all),
         });
     }
@@ -107,6 +108,17 @@ fn json_file(name: &str, value: &Value, parsed: &Parsed, arguments: &Validate, l
         });
     }
     message(name, value, parsed, arguments, library)
+}
+
+/// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it.
+fn layout(source: &Arc<Source>) -> Result<String, Vec<Diagnostic>> {
+    let mut said = Vec::new();
+    for vehicle_type in Layout::vehicle_types(source)? {
+        let layout = Layout::from_lif(source, Some(&vehicle_type))?;
+        let (nodes, edges) = (layout.nodes().count(), layout.edges().count());
+        said.push(format!("{nodes} nodes and {edges} edges for {vehicle_type}"));
+    }
+    Ok(format!("a layout with {}", said.join(", ")))
 }
 
 fn message(name: &str, value: &Value, parsed: &Parsed, arguments: &Validate, library: &Library) -> Result<Found, Problem> {

@@ -103,6 +103,19 @@ struct Station {
 }
 
 impl Layout {
+    /// The vehicle types a layout file is for. At least one, so that reading for each of them reads something.
+    ///
+    /// # Errors
+    /// When it is no layout, or for no vehicle type.
+    pub fn vehicle_types(source: &Arc<Source>) -> Result<Vec<String>, Vec<Diagnostic>> {
+        let file = File::read(source)?;
+        let types = file.vehicle_types();
+        if types.is_empty() {
+            choose_type(source, &file, None)?;
+        }
+        Ok(types.into_iter().map(str::to_owned).collect())
+    }
+
     /// Reads what `vehicle_type` may drive on; the one type in the file unless said. Nodes and edges of other
     /// types, edges an empty vehicle must not use, and those that demand an action are left out, which
     /// [`Layout::left_out`] tells.
@@ -110,20 +123,7 @@ impl Layout {
     /// # Errors
     /// The first mistakes, each naming its node or edge.
     pub fn from_lif(source: &Arc<Source>, vehicle_type: Option<&str>) -> Result<Self, Vec<Diagnostic>> {
-        let file: File = serde_json::from_str(&source.text).map_err(|error| {
-            let at = offset(&source.text, error.line(), error.column());
-            let message = error.to_string();
-            let label = message
-                .rsplit_once(" at line ")
-                .map_or(message.as_str(), |(label, _)| label);
-            let span = Span::new(source, at.saturating_sub(1), at);
-            vec![Diagnostic::new(
-                "lif",
-                span,
-                "this is not a layout in the format LIF 1.0",
-                label,
-            )]
-        })?;
+        let file = File::read(source)?;
         let vehicle_type = choose_type(source, &file, vehicle_type)?;
         let mut reader = Reader {
             source,
@@ -145,6 +145,34 @@ impl Layout {
     }
 }
 
+impl File {
+    fn read(source: &Arc<Source>) -> Result<Self, Vec<Diagnostic>> {
+        serde_json::from_str(&source.text).map_err(|error| {
+            let at = offset(&source.text, error.line(), error.column());
+            let message = error.to_string();
+            let label = message
+                .rsplit_once(" at line ")
+                .map_or(message.as_str(), |(label, _)| label);
+            let span = Span::new(source, at.saturating_sub(1), at);
+            vec![Diagnostic::new(
+                "lif",
+                span,
+                "this is not a layout in the format LIF 1.0",
+                label,
+            )]
+        })
+    }
+
+    /// The vehicle types that some node is for.
+    fn vehicle_types(&self) -> BTreeSet<&str> {
+        let nodes = self.layouts.iter().flat_map(|layout| &layout.nodes);
+        nodes
+            .flat_map(|node| &node.vehicle_type_node_properties)
+            .map(|properties| properties.vehicle_type_id.as_str())
+            .collect()
+    }
+}
+
 /// Byte offset of a line and a column, both counted from 1.
 fn offset(text: &str, line: usize, column: usize) -> usize {
     let before: usize = text
@@ -156,11 +184,7 @@ fn offset(text: &str, line: usize, column: usize) -> usize {
 }
 
 fn choose_type(source: &Arc<Source>, file: &File, wanted: Option<&str>) -> Result<String, Vec<Diagnostic>> {
-    let nodes = file.layouts.iter().flat_map(|layout| &layout.nodes);
-    let types: BTreeSet<&str> = nodes
-        .flat_map(|node| &node.vehicle_type_node_properties)
-        .map(|properties| properties.vehicle_type_id.as_str())
-        .collect();
+    let types = file.vehicle_types();
     let refuse = |title: String, hint: String| {
         let span = Span::new(source, 0, 0);
         vec![Diagnostic::new("lif", span, title, "in this file").hint(hint)]

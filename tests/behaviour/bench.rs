@@ -49,13 +49,19 @@ impl Profile {
     }
 
     pub fn with(mut self, time: &[(&'static str, &'static str)]) -> Self {
-        self.time.retain(|(name, _)| time.iter().all(|(other, _)| other != name));
+        self.time
+            .retain(|(name, _)| time.iter().all(|(other, _)| other != name));
         self.time.extend(time);
         self
     }
 
     pub fn text(&self) -> String {
-        let time: String = self.time.iter().map(|(name, limit)| format!("{name} = \"{limit}\"\n")).collect();
+        let time: Vec<String> = self
+            .time
+            .iter()
+            .map(|(name, limit)| format!("{name} = \"{limit}\""))
+            .collect();
+        let time = time.join("\n");
         format!(
             r#"
 [device]
@@ -120,7 +126,16 @@ impl Bench {
     /// A reference AGV in a process of its own, under the name of the profile.
     pub fn agv(&self, port: u16, faults: &[&str]) -> Running {
         let broker = format!("mqtt://127.0.0.1:{port}");
-        let mut arguments = vec!["simulate", "agv", "--broker", &broker, "--manufacturer", MANUFACTURER, "--serial", SERIAL];
+        let mut arguments = vec![
+            "simulate",
+            "agv",
+            "--broker",
+            &broker,
+            "--manufacturer",
+            MANUFACTURER,
+            "--serial",
+            SERIAL,
+        ];
         arguments.extend(faults.iter().flat_map(|fault| ["--fault", fault]));
         Running::start(&mut tool(self.path(), &arguments))
     }
@@ -148,7 +163,10 @@ impl Bench {
         assert_eq!(last["event"]["kind"], "run-ended", "{last}");
         assert_eq!(last["event"]["partial"], true, "{last}");
         let page = std::fs::read_to_string(bundle.join("report.html")).unwrap();
-        assert!(page.to_lowercase().contains("partial"), "the report does not say that it is partial");
+        assert!(
+            page.to_lowercase().contains("partial"),
+            "the report does not say that it is partial"
+        );
         self.is_whole();
     }
 
@@ -160,7 +178,9 @@ impl Bench {
         roxmltree::Document::parse(&junit).unwrap_or_else(|error| panic!("{error}\n{junit}"));
         let shown = bundle.display().to_string();
         self.run(&["report", &shown, "--verify"]).code(0);
-        self.run(&["report", &shown, "--rejudge"]).code(0).prints("byte for byte");
+        self.run(&["report", &shown, "--rejudge"])
+            .code(0)
+            .prints("byte for byte");
     }
 }
 

@@ -29,13 +29,22 @@ fn a_device_of_a_profile_that_conforms_is_0() {
 #[test]
 fn a_broken_requirement_is_1_and_is_named() {
     let fault = ["--virtual", "--fault", "outdated-update-taken-over"];
-    run(&[&["run", "order-rejection"], &fault[..]].concat()).code(1).prints("ORD-REJ-10").prints("FAIL  ");
+    run(&[&["run", "order-rejection"], &fault[..]].concat())
+        .code(1)
+        .prints("ORD-REJ-10")
+        .prints("FAIL  ");
     // And over TCP.
     let bench = Bench::new();
-    bench.run(&["run", REFUSAL, "--fault", "validation-error-misspelled"]).code(1).prints("ORD-REJ-02");
+    bench
+        .run(&["run", REFUSAL, "--fault", "validation-error-misspelled"])
+        .code(1)
+        .prints("ORD-REJ-02");
     let result = bench.result();
     let decided = result["requirements"].as_array().unwrap();
-    let decided = decided.iter().find(|requirement| requirement["id"] == "ORD-REJ-02").unwrap();
+    let decided = decided
+        .iter()
+        .find(|requirement| requirement["id"] == "ORD-REJ-02")
+        .unwrap();
     assert_eq!(decided["verdict"], "fail");
     bench.is_whole();
 }
@@ -43,9 +52,17 @@ fn a_broken_requirement_is_1_and_is_named() {
 #[test]
 fn a_wrong_command_line_is_2_and_says_what_was_meant() {
     run(&["run", "--virtaul"]).code(2).says("--virtual");
-    run(&["run", "--virtual", "order-rejektion"]).code(2).says("no test matches").says("did you mean");
-    run(&["run", "--virtual", "--fault", "outdated-update-taken-ovr"]).code(2).says("did you mean `outdated-update-taken-over`?");
-    run(&["run", "--virtual", "--protocol", "9.9.9"]).code(2).says("9.9.9").says("known versions");
+    run(&["run", "--virtual", "order-rejektion"])
+        .code(2)
+        .says("no test matches")
+        .says("did you mean");
+    run(&["run", "--virtual", "--fault", "outdated-update-taken-ovr"])
+        .code(2)
+        .says("did you mean `outdated-update-taken-over`?");
+    run(&["run", "--virtual", "--protocol", "9.9.9"])
+        .code(2)
+        .says("9.9.9")
+        .says("known versions");
     run(&["run", "--profile", "missing.toml"]).code(2).says("missing.toml");
     run(&["explain", "ORD-REJ-3"]).code(2).says("did you mean `ORD-REJ-");
     run(&["simulate", "agv", "--fault", "x"]).code(2).says("list faults");
@@ -56,30 +73,60 @@ fn a_wrong_profile_is_2_and_shows_the_place() {
     let bench = Bench::new();
     fs::write(bench.path().join("device.toml"), "[device]\nmanufacterer = \"ACME\"\n").unwrap();
     let arguments = ["run", "--profile", "device.toml"];
-    bench.run(&arguments).code(2).says("device.toml:2").says("did you mean `manufacturer`?");
+    bench
+        .run(&arguments)
+        .code(2)
+        .says("device.toml:2")
+        .says("did you mean `manufacturer`?");
     fs::write(bench.path().join("device.toml"), "[device]\nmanufacturer = \"ACME\"\n").unwrap();
-    bench.run(&arguments).code(2).says("device.serial-number").says("--serial");
+    bench
+        .run(&arguments)
+        .code(2)
+        .says("device.serial-number")
+        .says("--serial");
     let contract = Profile::default().text();
     fs::write(bench.path().join("device.toml"), contract).unwrap();
-    bench.run(&["certify", "--profile", "device.toml"]).code(2).says("[time]");
-    assert!(!bench.path().join("reports").exists(), "nothing was judged, so there is no report");
+    bench
+        .run(&["certify", "--profile", "device.toml"])
+        .code(2)
+        .says("[time]");
+    assert!(
+        !bench.path().join("reports").exists(),
+        "nothing was judged, so there is no report"
+    );
 }
 
 #[test]
 fn a_wrong_suite_is_2_and_shows_the_place() {
     let bench = Bench::new();
     let own = bench.path().join("own");
-    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("suites/requirements"), &own.join("requirements"));
+    copy(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("suites/requirements"),
+        &own.join("requirements"),
+    );
     let folder = own.join("agv/own");
     fs::create_dir_all(&folder).unwrap();
     let text = "test: own/typo\ntitle: A typo\ndevice: agv\nspec: \">=2.0, <4\"\nwhy: It happens.\nsteps:\n  \
                 - expect: stat\n    checks: [STATE-01]\n    within: 5 s\n";
     fs::write(folder.join("typo.yaml"), text).unwrap();
-    bench.run(&["run", "--virtual", "--suites", "own"]).code(2).says("typo.yaml:7").says("did you mean `state`?");
-    bench.run(&["list", "tests", "--suites", "own"]).code(2).says("typo.yaml:7");
-    bench.run(&["run", "--virtual", "--suites", "nowhere"]).code(2).says("nowhere");
+    bench
+        .run(&["run", "--virtual", "--suites", "own"])
+        .code(2)
+        .says("typo.yaml:7")
+        .says("did you mean `state`?");
+    bench
+        .run(&["list", "tests", "--suites", "own"])
+        .code(2)
+        .says("typo.yaml:7");
+    bench
+        .run(&["run", "--virtual", "--suites", "nowhere"])
+        .code(2)
+        .says("nowhere");
     fs::remove_dir_all(own.join("requirements")).unwrap();
-    bench.run(&["list", "tests", "--suites", "own"]).code(2).says("needs a copy of that folder");
+    bench
+        .run(&["list", "tests", "--suites", "own"])
+        .code(2)
+        .says("needs a copy of that folder");
 }
 
 fn copy(from: &Path, to: &Path) {
@@ -103,10 +150,17 @@ fn what_cannot_be_decided_is_3() {
 #[test]
 fn nothing_selected_and_nothing_applicable_are_4() {
     let bench = Bench::new();
-    bench.run(&["run", "--virtual", QUICK, "--shard", "2/2"]).code(4).says_one_error("no test was selected");
+    bench
+        .run(&["run", "--virtual", QUICK, "--shard", "2/2"])
+        .code(4)
+        .says_one_error("no test was selected");
     assert!(!bench.path().join("reports").exists());
     let arguments = ["run", "cancel-order/while-driving", "--no-motion"];
-    bench.run(&arguments).code(4).prints("No test applied").prints("--no-motion");
+    bench
+        .run(&arguments)
+        .code(4)
+        .prints("No test applied")
+        .says_one_error("--no-motion");
     assert_eq!(bench.result()["verdict"], serde_json::Value::Null);
     bench.is_whole();
 }
@@ -115,13 +169,17 @@ fn nothing_selected_and_nothing_applicable_are_4() {
 fn a_port_in_use_is_5() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
-    run(&["run", QUICK, "--listen", &address]).code(5).says_one_error(&address);
+    run(&["run", QUICK, "--listen", &address])
+        .code(5)
+        .says_one_error(&address);
 }
 
 #[test]
 fn a_broker_nobody_reaches_is_5() {
     let url = format!("mqtt://127.0.0.1:{}", free_port());
-    run(&["run", QUICK, "--broker", &url]).code(5).says_one_error(url.trim_start_matches("mqtt://"));
+    run(&["run", QUICK, "--broker", &url])
+        .code(5)
+        .says_one_error(url.trim_start_matches("mqtt://"));
     run(&["simulate", "agv", "--broker", &url]).code(5).says_one_error(&url);
 }
 
@@ -129,5 +187,8 @@ fn a_broker_nobody_reaches_is_5() {
 fn a_folder_that_cannot_be_written_is_5() {
     let bench = Bench::new();
     fs::write(bench.path().join("reports"), "a file").unwrap();
-    bench.run(&["run", "--virtual", QUICK]).code(5).says_one_error("reports");
+    bench
+        .run(&["run", "--virtual", QUICK])
+        .code(5)
+        .says_one_error("reports");
 }

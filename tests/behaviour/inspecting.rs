@@ -21,7 +21,10 @@ fn every_kind_of_good_file_is_told_by_its_content() {
     for (file, what) in [
         (fixture("messages/2.1/good/state-idle.json"), "a valid state message"),
         (fixture("messages/2.0/good/order-full.json"), "a valid order message"),
-        (fixture("messages/2.1/good/connection-will.json"), "a valid connection message"),
+        (
+            fixture("messages/2.1/good/connection-will.json"),
+            "a valid connection message",
+        ),
         (fixture("profiles/good/hall.toml"), "a profile"),
         (fixture("layouts/hall.lif.json"), "a layout with"),
         (suite, "test"),
@@ -41,15 +44,30 @@ fn every_kind_of_bad_file_is_2_and_its_fault_is_named() {
         name.to_owned()
     };
     for (file, what) in [
-        (write("mode.json", state.replace("AUTOMATIC", "AUTOMATISCH").as_bytes()), "operatingMode"),
-        (write("twice.json", state.replacen('{', "{\"driving\": false,", 1).as_bytes()), "driving"),
+        (
+            write("mode.json", state.replace("AUTOMATIC", "AUTOMATISCH").as_bytes()),
+            "operatingMode",
+        ),
+        (
+            write("twice.json", state.replacen('{', "{\"driving\": false,", 1).as_bytes()),
+            "driving",
+        ),
         (write("cut.json", &state.as_bytes()[..100]), "cut.json"),
-        (write("version.json", state.replace("2.1.0", "9.9.9").as_bytes()), "known versions"),
+        (
+            write("version.json", state.replace("2.1.0", "9.9.9").as_bytes()),
+            "known versions",
+        ),
         (write("other.json", b"{\"hello\": 1}"), "--topic"),
         (write("binary", b"\xff\xfe\x00"), "UTF-8"),
         (write("empty.json", b""), "empty.json"),
-        (write("layout.json", b"{\"metaInformation\": {}, \"layouts\": 3}"), "layout"),
-        (write("result.json", b"{\"format\": \"vda5050-tck.result/1\"}"), "result"),
+        (
+            write("layout.json", b"{\"metaInformation\": {}, \"layouts\": 3}"),
+            "layout",
+        ),
+        (
+            write("result.json", b"{\"format\": \"vda5050-tck.result/1\"}"),
+            "result",
+        ),
         (fixture("profiles/bad/unknown-key.toml"), "unknown-key.toml:"),
         (fixture("bad-suites/unknown-topic.yaml"), "unknown-topic.yaml:"),
         ("nowhere.json".to_owned(), "nowhere.json"),
@@ -65,9 +83,19 @@ fn of_several_files_every_one_is_checked() {
     let good = fixture("messages/2.1/good/state-idle.json");
     let bad = fixture("profiles/bad/unknown-key.toml");
     let ended = run(&["validate", &bad, &good, "--format", "json"]).code(2);
-    let lines: Vec<Value> = ended.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    let ok: Vec<_> = lines.iter().map(|line| (line["file"].as_str().unwrap(), line["ok"].as_bool().unwrap())).collect();
-    assert!(ok.contains(&(bad.as_str(), false)) && ok.contains(&(good.as_str(), true)), "{ok:?}");
+    let lines: Vec<Value> = ended
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let ok: Vec<_> = lines
+        .iter()
+        .map(|line| (line["file"].as_str().unwrap(), line["ok"].as_bool().unwrap()))
+        .collect();
+    assert!(
+        ok.contains(&(bad.as_str(), false)) && ok.contains(&(good.as_str(), true)),
+        "{ok:?}"
+    );
 }
 
 #[test]
@@ -122,7 +150,9 @@ fn everything_that_has_a_name_is_explained() {
     ] {
         run(&["explain", name]).code(0).prints(what);
     }
-    run(&["explain", "power-cylce"]).code(2).says("did you mean `power-cycle`?");
+    run(&["explain", "power-cylce"])
+        .code(2)
+        .says("did you mean `power-cycle`?");
     let ended = run(&["explain", "\u{1b}[2Jxyzzyxyzzy"]).code(2);
     assert!(!ended.stderr.contains('\u{1b}'));
 }

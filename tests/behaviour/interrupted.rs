@@ -17,8 +17,14 @@ fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_p
     run.end().code(130);
     assert!(interrupted.elapsed() < Duration::from_secs(20), "it waited to the end");
     let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
-    assert!(journal.contains("\"kind\":\"step-begun\",\"path\":\"finally"), "the postamble was left out");
-    assert!(!journal.contains(&format!("\"kind\":\"test-begun\",\"test\":\"{LATER}\"")), "it went on");
+    assert!(
+        journal.contains("\"kind\":\"step-begun\",\"path\":\"finally"),
+        "the postamble was left out"
+    );
+    assert!(
+        !journal.contains(&format!("\"kind\":\"test-begun\",\"test\":\"{LATER}\"")),
+        "it went on"
+    );
     assert!(journal.contains("interrupted by the user"));
     bench.is_partial();
 }

@@ -29,7 +29,10 @@ impl Mosquitto {
                 .stderr(Stdio::null())
                 .spawn();
             let Ok(process) = started else {
-                assert!(std::env::var_os("CI").is_none(), "mosquitto is not installed, and CI must have it");
+                assert!(
+                    std::env::var_os("CI").is_none(),
+                    "mosquitto is not installed, and CI must have it"
+                );
                 eprintln!("skipped: mosquitto is not installed");
                 return None;
             };

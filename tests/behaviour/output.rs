@@ -11,10 +11,16 @@ use crate::tool::{run, tool};
 #[test]
 fn the_format_for_programs_is_one_document_and_nothing_else() {
     let bench = Bench::new();
-    let ended = bench.run(&["run", "--virtual", QUICK, REFUSAL, "--format", "json", "-vv"]).code(0);
+    let ended = bench
+        .run(&["run", "--virtual", QUICK, REFUSAL, "--format", "json", "-vv"])
+        .code(0);
     let printed: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(printed, bench.result());
-    assert!(ended.stderr.contains("device.role = "), "the settings are no data:\n{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("device.role = "),
+        "the settings are no data:\n{}",
+        ended.stderr
+    );
 }
 
 #[test]
@@ -25,14 +31,25 @@ fn a_verdict_is_data_and_progress_is_not() {
         assert!(lines.len() == 1 && lines[0].starts_with("pass "), "{}", ended.stdout);
     }
     assert!(ended.stdout.contains("root    sha256:"));
-    assert!(!ended.stdout.contains("2 tests") && ended.stderr.contains("2 tests"), "{}", ended.stderr);
+    assert!(
+        !ended.stdout.contains("2 tests") && ended.stderr.contains("2 tests"),
+        "{}",
+        ended.stderr
+    );
 }
 
 #[test]
 fn nothing_is_coloured_where_nobody_looks() {
-    for arguments in [&["run", "--virtual", REFUSAL, "--fault", "validation-error-fatal"][..], &["run", "--nonsense"], &["list", "hooks"]] {
+    for arguments in [
+        &["run", "--virtual", REFUSAL, "--fault", "validation-error-fatal"][..],
+        &["run", "--nonsense"],
+        &["list", "hooks"],
+    ] {
         let ended = run(arguments);
-        assert!(!ended.stdout.contains('\u{1b}') && !ended.stderr.contains('\u{1b}'), "{arguments:?}: {ended:?}");
+        assert!(
+            !ended.stdout.contains('\u{1b}') && !ended.stderr.contains('\u{1b}'),
+            "{arguments:?}: {ended:?}"
+        );
     }
 }
 
@@ -47,22 +64,37 @@ fn no_color_wins_over_a_wish_for_colour() {
         assert_eq!(output.status.code(), Some(1));
         output.stdout.contains(&0x1b)
     };
-    assert!(with("UNUSED", "1"), "colour that was asked for did not come, so this test shows nothing");
+    assert!(
+        with("UNUSED", "1"),
+        "colour that was asked for did not come, so this test shows nothing"
+    );
     assert!(!with("NO_COLOR", "1"));
 }
 
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
-    for arguments in [&["list", "requirements"][..], &["run", "--virtual", "order-rejection"], &["--help"], &["explain", "ORD-REJ-03"]] {
+    for arguments in [
+        &["list", "requirements"][..],
+        &["run", "--virtual", "order-rejection/unreadable"],
+        &["--help"],
+        &["explain", "ORD-REJ-03"],
+    ] {
         let bench = Bench::new();
-        let mut child = tool(bench.path(), arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = tool(bench.path(), arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
         // `head -1`: one byte, and then nobody reads any more.
         let mut stdout = child.stdout.take().unwrap();
         let _ = stdout.read(&mut [0]);
         drop(stdout);
         let output = child.wait_with_output().unwrap();
         let stderr = String::from_utf8_lossy(&output.stderr);
-        assert!(!stderr.contains("panicked") && !stderr.contains("error"), "{arguments:?}: {stderr}");
+        assert!(
+            !stderr.contains("panicked") && !stderr.contains("error"),
+            "{arguments:?}: {stderr}"
+        );
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {stderr}");
     }
 }
@@ -70,7 +102,7 @@ fn a_reader_that_goes_away_is_no_failure() {
 #[test]
 fn nobody_who_reads_at_all_is_no_failure_either() {
     let bench = Bench::new();
-    let mut child = tool(bench.path(), &["run", "--virtual", "order-rejection"])
+    let mut child = tool(bench.path(), &["run", "--virtual", "order-rejection/unreadable"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -11,7 +11,9 @@ use crate::bench::{Bench, QUICK, REFUSAL};
 fn failed_run() -> (Bench, String) {
     let bench = Bench::new();
     let fault = ["--fault", "validation-error-misspelled"];
-    bench.run(&[&["run", "--virtual", "order-rejection/unreadable"], &fault[..]].concat()).code(1);
+    bench
+        .run(&[&["run", "--virtual", "order-rejection/unreadable"], &fault[..]].concat())
+        .code(1);
     let folder = bench.bundle().display().to_string();
     (bench, folder)
 }
@@ -27,24 +29,44 @@ fn a_virtual_run_is_judged_again_to_the_same_bytes_whether_it_passed_or_failed()
     let (bench, _) = failed_run();
     bench.is_whole();
     let bench = Bench::new();
-    bench.run(&["run", "--virtual", "order-rejection"]).code(0);
+    bench.run(&["run", "--virtual", "order-update"]).code(0);
     bench.is_whole();
 }
 
 #[test]
 fn a_journal_line_that_was_edited_is_noticed() {
     let (bench, folder) = failed_run();
-    change(&bench.bundle().join("journal.jsonl"), "validationOrder", "validationError");
-    bench.run(&["report", &folder, "--rejudge"]).code(1).prints("ORD-REJ-02");
-    bench.run(&["report", &folder, "--verify"]).code(1).prints("journal.jsonl");
+    change(
+        &bench.bundle().join("journal.jsonl"),
+        "validationOrder",
+        "validationError",
+    );
+    bench
+        .run(&["report", &folder, "--rejudge"])
+        .code(1)
+        .prints("ORD-REJ-02");
+    bench
+        .run(&["report", &folder, "--verify"])
+        .code(1)
+        .prints("journal.jsonl");
 }
 
 #[test]
 fn a_result_that_was_edited_is_noticed() {
     let (bench, folder) = failed_run();
-    change(&bench.bundle().join("result.json"), "\"verdict\": \"fail\"", "\"verdict\": \"pass\"");
-    bench.run(&["report", &folder, "--rejudge"]).code(1).prints("ORD-REJ-02");
-    bench.run(&["report", &folder, "--verify"]).code(1).prints("result.json");
+    change(
+        &bench.bundle().join("result.json"),
+        "\"verdict\": \"fail\"",
+        "\"verdict\": \"pass\"",
+    );
+    bench
+        .run(&["report", &folder, "--rejudge"])
+        .code(1)
+        .prints("ORD-REJ-02");
+    bench
+        .run(&["report", &folder, "--verify"])
+        .code(1)
+        .prints("result.json");
 }
 
 #[test]
@@ -77,13 +99,23 @@ fn a_journal_that_ends_in_the_middle_of_a_line_gives_a_partial_report() {
     for name in ["report.html", "junit.xml", "result.json", "manifest.json"] {
         fs::remove_file(folder.join(name)).unwrap();
     }
-    let ended = bench.run(&["report", &folder.display().to_string()]).says("the last line of the journal is cut off");
-    assert_ne!(ended.status.code(), Some(0), "a run that broke off says nothing about what it did not come to");
+    let ended = bench
+        .run(&["report", &folder.display().to_string()])
+        .says("the last line of the journal is cut off");
+    assert_ne!(
+        ended.status.code(),
+        Some(0),
+        "a run that broke off says nothing about what it did not come to"
+    );
     assert_eq!(bench.result()["partial"], true);
     let tests = bench.result()["tests"].clone();
     let verdicts: Vec<&Value> = tests.as_array().unwrap().iter().map(|test| &test["verdict"]).collect();
     assert_eq!(verdicts, ["pass", "pass", "inconclusive"]);
-    assert!(fs::read_to_string(folder.join("report.html")).unwrap().contains("the journal breaks off here"));
+    assert!(
+        fs::read_to_string(folder.join("report.html"))
+            .unwrap()
+            .contains("the journal breaks off here")
+    );
 }
 
 #[test]
@@ -102,10 +134,15 @@ fn what_is_no_run_is_2() {
 fn two_runs_are_compared_and_a_worse_one_is_1() {
     let (bad, bad_folder) = failed_run();
     let good = Bench::new();
-    good.run(&["run", "--virtual", "order-rejection/unreadable", QUICK]).code(0);
+    good.run(&["run", "--virtual", "order-rejection/unreadable", QUICK])
+        .code(0);
     let good_folder = good.bundle().display().to_string();
-    bad.run(&["report", "--compare", &good_folder, &bad_folder]).code(1).prints("ORD-REJ-02");
-    bad.run(&["report", "--compare", &bad_folder, &good_folder]).code(0).prints("ORD-REJ-02");
+    bad.run(&["report", "--compare", &good_folder, &bad_folder])
+        .code(1)
+        .prints("ORD-REJ-02");
+    bad.run(&["report", "--compare", &bad_folder, &good_folder])
+        .code(0)
+        .prints("ORD-REJ-02");
     bad.run(&["report", "--compare", &good_folder, &good_folder]).code(0);
 }
 
@@ -113,6 +150,9 @@ fn two_runs_are_compared_and_a_worse_one_is_1() {
 fn the_format_for_programs_is_the_result_itself() {
     let (bench, folder) = failed_run();
     let ended = bench.run(&["report", &folder, "--format", "json"]).code(1);
-    assert_eq!(ended.stdout, fs::read_to_string(bench.bundle().join("result.json")).unwrap());
+    assert_eq!(
+        ended.stdout,
+        fs::read_to_string(bench.bundle().join("result.json")).unwrap()
+    );
     assert!(ended.stdout.contains(REFUSAL));
 }

@@ -18,7 +18,7 @@ impl Scripted {
     /// but it empties its socket, so that the broker is not held up.
     pub fn online(port: u16) -> Self {
         let mut this = Self::open(port);
-        let online = this.message(json!({ "connectionState": "ONLINE" }));
+        let online = this.message(&json!({ "connectionState": "ONLINE" }));
         this.publish("connection", online.to_string().as_bytes(), true);
         this
     }
@@ -31,7 +31,9 @@ impl Scripted {
             socket: socket.try_clone().unwrap(),
             headers: 0,
         };
-        let will = this.message(json!({ "connectionState": "CONNECTIONBROKEN" })).to_string();
+        let will = this
+            .message(&json!({ "connectionState": "CONNECTIONBROKEN" }))
+            .to_string();
         // Last will with QoS 1 and RETAIN, clean session, no keep-alive.
         let mut connect = [text("MQTT").as_slice(), &[4, 0b0010_1110, 0, 0]].concat();
         for field in ["scripted", &topic("connection"), &will] {
@@ -56,7 +58,7 @@ impl Scripted {
     }
 
     /// A message with header.
-    pub fn message(&mut self, members: Value) -> Value {
+    pub fn message(&mut self, members: &Value) -> Value {
         let header = json!({
             "headerId": self.headers, "timestamp": "2026-03-02T08:15:30.12Z", "version": version(),
             "manufacturer": MANUFACTURER, "serialNumber": SERIAL,
@@ -71,7 +73,7 @@ impl Scripted {
 
     /// An idle state.
     pub fn state(&mut self) -> Value {
-        self.message(json!({
+        self.message(&json!({
             "maps": [], "orderId": "", "orderUpdateId": 0, "lastNodeId": "", "lastNodeSequenceId": 0,
             "nodeStates": [], "edgeStates": [], "driving": false, "actionStates": [],
             "batteryState": { "batteryCharge": 80, "charging": false }, "operatingMode": "AUTOMATIC", "errors": [],

@@ -18,7 +18,9 @@ fn retained(port: u16, wanted: &str) -> Value {
         let mut options = rumqttc::MqttOptions::new("late", "127.0.0.1", port);
         options.set_keep_alive(Duration::from_secs(5));
         let (client, mut connection) = rumqttc::Client::new(options, 10);
-        client.subscribe(topic("connection"), rumqttc::QoS::AtLeastOnce).unwrap();
+        client
+            .subscribe(topic("connection"), rumqttc::QoS::AtLeastOnce)
+            .unwrap();
         while let Ok(Ok(event)) = connection.recv_timeout(Duration::from_millis(200)) {
             if let rumqttc::Event::Incoming(rumqttc::Packet::Publish(message)) = event {
                 let value: Value = serde_json::from_slice(&message.payload).unwrap();
@@ -39,7 +41,10 @@ fn it_is_online_until_it_is_interrupted_and_offline_afterwards() {
     let mut agv = bench.agv(mosquitto.port, &[]);
     agv.line("1 reference AGV(s) on ");
     let online = retained(mosquitto.port, "ONLINE");
-    assert_eq!((&online["manufacturer"], &online["serialNumber"]), (&MANUFACTURER.into(), &SERIAL.into()));
+    assert_eq!(
+        (&online["manufacturer"], &online["serialNumber"]),
+        (&MANUFACTURER.into(), &SERIAL.into())
+    );
     agv.interrupt();
     agv.end().code(0);
     retained(mosquitto.port, "OFFLINE");
@@ -62,16 +67,37 @@ fn a_fleet_has_numbers() {
     let url = mosquitto.url();
     // The device of `topic` is the second of three.
     let (base, number) = ("fleet", 2);
-    let arguments = ["simulate", "agv", "--count", "3", "--broker", &url, "--manufacturer", MANUFACTURER, "--serial", base];
+    let arguments = [
+        "simulate",
+        "agv",
+        "--count",
+        "3",
+        "--broker",
+        &url,
+        "--manufacturer",
+        MANUFACTURER,
+        "--serial",
+        base,
+    ];
     let agvs = Running::start(&mut tool(bench.path(), &arguments));
     let mut options = rumqttc::MqttOptions::new("late", "127.0.0.1", mosquitto.port);
     options.set_keep_alive(Duration::from_secs(5));
     let (client, mut connection) = rumqttc::Client::new(options, 10);
-    client.subscribe(topic("connection").replace(SERIAL, &format!("{base}-{number}")), rumqttc::QoS::AtLeastOnce).unwrap();
+    client
+        .subscribe(
+            topic("connection").replace(SERIAL, &format!("{base}-{number}")),
+            rumqttc::QoS::AtLeastOnce,
+        )
+        .unwrap();
     let begun = Instant::now();
     loop {
-        assert!(begun.elapsed() < Duration::from_secs(20), "the second of three does not come");
-        if let Ok(Ok(rumqttc::Event::Incoming(rumqttc::Packet::Publish(_)))) = connection.recv_timeout(Duration::from_millis(200)) {
+        assert!(
+            begun.elapsed() < Duration::from_secs(20),
+            "the second of three does not come"
+        );
+        if let Ok(Ok(rumqttc::Event::Incoming(rumqttc::Packet::Publish(_)))) =
+            connection.recv_timeout(Duration::from_millis(200))
+        {
             break;
         }
     }
@@ -82,6 +108,10 @@ fn a_fleet_has_numbers() {
 #[test]
 fn nobody_there_is_5_at_once() {
     let url = format!("mqtt://127.0.0.1:{}", free_port());
-    run(&["simulate", "agv", "--broker", &url]).code(5).says_one_error("not reachable");
-    run(&["simulate", "agv", "--broker", "http://127.0.0.1"]).code(2).says("mqtt://host:port");
+    run(&["simulate", "agv", "--broker", &url])
+        .code(5)
+        .says_one_error("not reachable");
+    run(&["simulate", "agv", "--broker", "http://127.0.0.1"])
+        .code(2)
+        .says("mqtt://host:port");
 }

@@ -48,21 +48,33 @@ impl Ended {
     #[track_caller]
     pub fn code(self, expected: i32) -> Self {
         let Self { status, stdout, stderr } = &self;
-        assert_eq!(status.code(), Some(expected), "{status}\n--- stdout\n{stdout}\n--- stderr\n{stderr}");
+        assert_eq!(
+            status.code(),
+            Some(expected),
+            "{status}\n--- stdout\n{stdout}\n--- stderr\n{stderr}"
+        );
         self
     }
 
     /// Holds that standard error says this.
     #[track_caller]
     pub fn says(self, text: &str) -> Self {
-        assert!(self.stderr.contains(text), "standard error does not say `{text}`:\n{}", self.stderr);
+        assert!(
+            self.stderr.contains(text),
+            "standard error does not say `{text}`:\n{}",
+            self.stderr
+        );
         self
     }
 
     /// Holds that standard output has this.
     #[track_caller]
     pub fn prints(self, text: &str) -> Self {
-        assert!(self.stdout.contains(text), "standard output does not have `{text}`:\n{}", self.stdout);
+        assert!(
+            self.stdout.contains(text),
+            "standard output does not have `{text}`:\n{}",
+            self.stdout
+        );
         self
     }
 
@@ -70,7 +82,11 @@ impl Ended {
     #[track_caller]
     pub fn says_one_error(self, text: &str) -> Self {
         let errors: Vec<&str> = self.stderr.lines().filter(|line| line.starts_with("error")).collect();
-        assert!(errors.len() == 1 && errors[0].contains(text), "not one error with `{text}`:\n{}", self.stderr);
+        assert!(
+            errors.len() == 1 && errors[0].contains(text),
+            "not one error with `{text}`:\n{}",
+            self.stderr
+        );
         self
     }
 }
@@ -132,7 +148,10 @@ impl Running {
     /// Waits for a line of standard error that begins like this; gives the rest of it.
     #[track_caller]
     pub fn line(&mut self, beginning: &str) -> String {
-        let rest = |text: &str| text.lines().find_map(|line| line.strip_prefix(beginning).map(str::to_owned));
+        let rest = |text: &str| {
+            text.lines()
+                .find_map(|line| line.strip_prefix(beginning).map(str::to_owned))
+        };
         self.until(beginning, |running| {
             let said = running.stderr();
             // Only whole lines.
@@ -143,7 +162,10 @@ impl Running {
     /// Ctrl-C.
     pub fn interrupt(&self) {
         let id = self.child.id();
-        let sent = Command::new("sh").args(["-c", &format!("kill -INT {id}")]).status().unwrap();
+        let sent = Command::new("sh")
+            .args(["-c", &format!("kill -INT {id}")])
+            .status()
+            .unwrap();
         assert!(sent.success());
     }
 
@@ -153,7 +175,7 @@ impl Running {
         self.child.wait().unwrap();
     }
 
-    /// Closes the reading ends of its output: nobody reads any more.
+    /// Waits for its end, and kills it when it does not come.
     pub fn wait(&mut self) -> ExitStatus {
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
