@@ -7,15 +7,27 @@ use std::path::{Path, PathBuf};
 use vda5050_tck::pack::Role;
 use vda5050_tck::run::{Bundle, Library, VirtualRun, run_silently, sources, write_all};
 
-const FILES: [&str; 5] = ["journal.jsonl", "junit.xml", "manifest.json", "report.html", "result.json"];
+const FILES: [&str; 5] = [
+    "journal.jsonl",
+    "junit.xml",
+    "manifest.json",
+    "report.html",
+    "result.json",
+];
 
 fn make(folder: &Path) {
     let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let pack = library.rules.packs.latest().clone();
     let mut request = VirtualRun::of(&library, &pack);
-    let wanted = ["order-rejection/lower-update-id", "order-update/", "cancel-order/while-driving"];
+    let wanted = [
+        "order-rejection/lower-update-id",
+        "order-update/",
+        "cancel-order/while-driving",
+    ];
     request.tests = library.tests(Role::Agv, &pack.id);
-    request.tests.retain(|test| wanted.iter().any(|prefix| test.id.starts_with(prefix)));
+    request
+        .tests
+        .retain(|test| wanted.iter().any(|prefix| test.id.starts_with(prefix)));
     request.complete = false;
     request.faults = vec!["outdated-update-taken-over".to_owned()];
     request.begun = "2026-01-01T08:00:00Z".parse().expect("a time");
@@ -54,7 +66,10 @@ fn the_example_is_what_the_program_makes_today() {
 
 #[test]
 fn the_same_run_twice_gives_the_same_bytes() {
-    let (one, two) = (tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder"));
+    let (one, two) = (
+        tempfile::tempdir().expect("a folder"),
+        tempfile::tempdir().expect("a folder"),
+    );
     make(one.path());
     make(two.path());
     for file in FILES {

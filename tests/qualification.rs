@@ -16,12 +16,16 @@ fn library() -> Library {
 
 fn blemishes(outcome: &Qualification) -> String {
     let lines = outcome.blemishes.iter();
-    lines.map(|(decider, verdict)| format!("{verdict} {} {}\n", decider.requirement, decider.place)).collect()
+    lines
+        .map(|(decider, verdict)| format!("{verdict} {} {}\n", decider.requirement, decider.place))
+        .collect()
 }
 
 /// Lines of a table: the first column is the key, the last one a reason, which has to be there.
 fn table(text: &str) -> Vec<(String, String)> {
-    let rows = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let rows = text
+        .lines()
+        .filter(|line| !line.starts_with('#') && !line.trim().is_empty());
     rows.map(|line| {
         let (key, reason) = line.rsplit_once('\t').unwrap_or_else(|| panic!("no reason: {line}"));
         assert!(reason.len() > 15, "no reason: {line}");
@@ -38,19 +42,37 @@ fn every_check_passes_without_a_fault_and_is_failed_by_one() {
     assert_eq!(blemishes(&outcome), "", "not a pass on the faultless reference AGV");
 
     let excused = table(UNPROVEN);
-    let unproven: Vec<String> =
-        outcome.unproven().iter().map(|decider| format!("{} {}", decider.requirement, decider.place)).collect();
-    let new: Vec<_> = unproven.iter().filter(|one| !excused.iter().any(|(key, _)| key == *one)).collect();
+    let unproven: Vec<String> = outcome
+        .unproven()
+        .iter()
+        .map(|decider| format!("{} {}", decider.requirement, decider.place))
+        .collect();
+    let new: Vec<_> = unproven
+        .iter()
+        .filter(|one| !excused.iter().any(|(key, _)| key == *one))
+        .collect();
     assert!(new.is_empty(), "no fault can fail these:\n{new:#?}");
     let old: Vec<_> = excused.iter().filter(|(key, _)| !unproven.contains(key)).collect();
-    assert!(old.is_empty(), "these are proven by now; take them out of unproven.tsv:\n{old:#?}");
+    assert!(
+        old.is_empty(),
+        "these are proven by now; take them out of unproven.tsv:\n{old:#?}"
+    );
 
     let excused = table(UNFOUND);
     let unfound: Vec<String> = outcome.missed().iter().map(|kill| kill.fault.name.to_owned()).collect();
-    let new: Vec<_> = unfound.iter().filter(|one| !excused.iter().any(|(key, _)| key == *one)).collect();
-    assert!(new.is_empty(), "no requirement they name fails with these faults:\n{new:#?}");
+    let new: Vec<_> = unfound
+        .iter()
+        .filter(|one| !excused.iter().any(|(key, _)| key == *one))
+        .collect();
+    assert!(
+        new.is_empty(),
+        "no requirement they name fails with these faults:\n{new:#?}"
+    );
     let old: Vec<_> = excused.iter().filter(|(key, _)| !unfound.contains(key)).collect();
-    assert!(old.is_empty(), "these are found by now; take them out of unfound.tsv:\n{old:#?}");
+    assert!(
+        old.is_empty(),
+        "these are found by now; take them out of unfound.tsv:\n{old:#?}"
+    );
 
     insta::assert_snapshot!("kill_matrix", outcome.matrix());
 }
@@ -61,6 +83,11 @@ fn the_older_version_passes_without_a_fault_too() {
     for pack in library.rules.packs.all() {
         let outcome = qualify(&library, pack, &[]).expect("qualified");
         assert_eq!(blemishes(&outcome), "", "VDA 5050 {}", pack.version);
-        assert!(outcome.deciders.len() > 100, "VDA 5050 {}: only {} deciders", pack.version, outcome.deciders.len());
+        assert!(
+            outcome.deciders.len() > 100,
+            "VDA 5050 {}: only {} deciders",
+            pack.version,
+            outcome.deciders.len()
+        );
     }
 }

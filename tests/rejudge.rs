@@ -14,7 +14,12 @@ fn library() -> Library {
 fn a_saved_journal_gives_the_result_of_the_live_run_byte_for_byte() {
     let library = library();
     for pack in library.rules.packs.all() {
-        for faults in [vec![], vec!["outdated-update-taken-over"], vec!["never-reconnects"], vec!["cancel-never-finished"]] {
+        for faults in [
+            vec![],
+            vec!["outdated-update-taken-over"],
+            vec!["never-reconnects"],
+            vec!["cancel-never-finished"],
+        ] {
             let mut request = VirtualRun::of(&library, pack);
             request.faults = faults.iter().map(ToString::to_string).collect();
             let live = run_silently(&library, pack, request).expect("a run");
@@ -41,14 +46,20 @@ fn a_journal_that_breaks_off_anywhere_gives_a_partial_result_that_accuses_nobody
     let library = library();
     let pack = library.rules.packs.latest();
     let mut request = VirtualRun::of(&library, pack);
-    request.tests.retain(|test| test.id.starts_with("order-rejection/") || test.id.starts_with("connection/"));
+    request
+        .tests
+        .retain(|test| test.id.starts_with("order-rejection/") || test.id.starts_with("connection/"));
     let live = run_silently(&library, pack, request).expect("a run");
     let entries = live.recorder.journal().entries();
     let mut at = 1;
     while at < entries.len() {
         let result = judge(&library.rules, &entries[..at]).expect("judged");
         assert!(result.partial, "cut at {at}");
-        let failed: Vec<_> = result.tests.iter().filter(|test| test.verdict == Some(vda5050_tck::verdict::Verdict::Fail)).collect();
+        let failed: Vec<_> = result
+            .tests
+            .iter()
+            .filter(|test| test.verdict == Some(vda5050_tck::verdict::Verdict::Fail))
+            .collect();
         assert!(failed.is_empty(), "cut at {at}: {failed:#?}");
         at += 97;
     }
@@ -65,7 +76,10 @@ fn seeds_jitter_and_coalescing_do_not_change_a_verdict() {
         request.coalesce = std::time::Duration::from_millis(if seed.is_multiple_of(3) { 15 } else { 0 });
         let result = run_silently(&library, &pack, request).expect("a run").result;
         let tests = result.tests.iter().map(|test| (test.id.clone(), test.verdict));
-        let monitors = result.monitors.iter().map(|monitor| (monitor.id.clone(), monitor.verdict));
+        let monitors = result
+            .monitors
+            .iter()
+            .map(|monitor| (monitor.id.clone(), monitor.verdict));
         tests.chain(monitors).collect::<Vec<_>>()
     };
     let first = verdicts(1);

@@ -22,7 +22,9 @@ use crate::ui::{self, Output};
 pub fn list(arguments: &List) -> Result<Exit, Problem> {
     let library = Library::load(arguments.suites.suites.as_deref())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
-    let roles: Vec<Role> = arguments.role.map_or_else(|| vec![Role::Agv, Role::MasterControl], |role| vec![role]);
+    let roles: Vec<Role> = arguments
+        .role
+        .map_or_else(|| vec![Role::Agv, Role::MasterControl], |role| vec![role]);
     let text = match (arguments.what, arguments.format) {
         (Listing::Tests, Format::Text) => roles.iter().map(|role| tests(&library, &pack, *role)).collect(),
         (Listing::Tests, Format::Json) => {
@@ -101,19 +103,32 @@ fn tests(library: &Library, pack: &Pack, role: Role) -> String {
             }
         }
         notes.dedup();
-        let notes = if notes.is_empty() { String::new() } else { format!("  ({})", notes.join(", ")) };
+        let notes = if notes.is_empty() {
+            String::new()
+        } else {
+            format!("  ({})", notes.join(", "))
+        };
         let _ = writeln!(text, "  {}\n      {}{notes}", test.id, test.title);
     }
     let moving = all.iter().filter(|test| test.moves).count();
     if !all.is_empty() {
-        let _ = writeln!(text, "\n{} tests for role {role}, {moving} of them move the vehicle\n", all.len());
+        let _ = writeln!(
+            text,
+            "\n{} tests for role {role}, {moving} of them move the vehicle\n",
+            all.len()
+        );
     }
     text
 }
 
 fn of_roles<'a>(library: &'a Library, pack: &'a Pack, roles: &'a [Role]) -> impl Iterator<Item = &'a Requirement> {
     let concerns = |requirement: &&Requirement| roles.iter().any(|role| requirement.role.concerns(*role));
-    library.rules.catalogue.all().filter(concerns).filter(|requirement| requirement.in_version(pack).is_some())
+    library
+        .rules
+        .catalogue
+        .all()
+        .filter(concerns)
+        .filter(|requirement| requirement.in_version(pack).is_some())
 }
 
 fn requirements(library: &Library, pack: &Pack, roles: &[Role]) -> String {
@@ -131,14 +146,29 @@ fn requirements(library: &Library, pack: &Pack, roles: &[Role]) -> String {
 }
 
 fn of_version<'a>(library: &'a Library, pack: &'a Pack, roles: &'a [Role]) -> impl Iterator<Item = &'a Arc<Monitor>> {
-    let monitors = library.rules.suites.monitors.iter().filter(|monitor| monitor.spec.contains(pack.version));
+    let monitors = library
+        .rules
+        .suites
+        .monitors
+        .iter()
+        .filter(|monitor| monitor.spec.contains(pack.version));
     monitors.filter(|monitor| monitor.device.is_none_or(|device| roles.contains(&device)))
 }
 
 fn monitors(library: &Library, pack: &Pack, roles: &[Role]) -> String {
     of_version(library, pack, roles).fold(String::new(), |mut text, monitor| {
-        let decides: Vec<&str> = monitor.checks.iter().map(|binding| binding.requirement.as_str()).collect();
-        let _ = writeln!(text, "{}\n    {}\n    decides {}", monitor.id, monitor.title, decides.join(", "));
+        let decides: Vec<&str> = monitor
+            .checks
+            .iter()
+            .map(|binding| binding.requirement.as_str())
+            .collect();
+        let _ = writeln!(
+            text,
+            "{}\n    {}\n    decides {}",
+            monitor.id,
+            monitor.title,
+            decides.join(", ")
+        );
         text
     })
 }
@@ -162,7 +192,12 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
         text.push_str(&about_monitor(monitor));
     }
     if let Some(check) = checks::find(id) {
-        let _ = writeln!(text, "check {id}\n\n{}\n\ncan decide {}", check.doc, check.decides.join(", "));
+        let _ = writeln!(
+            text,
+            "check {id}\n\n{}\n\ncan decide {}",
+            check.doc,
+            check.decides.join(", ")
+        );
     }
     for hook in HOOKS.iter().filter(|hook| hook.name == id) {
         let _ = writeln!(text, "hook {id} (role {})\n\n{}", hook.role, hook.doc);
@@ -194,21 +229,34 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             Some(close) => format!("did you mean `{close}`?"),
             None => "`vda5050-tck list` shows what there is".to_owned(),
         };
-        return Err(Diagnostic::whole("unknown-id", format!("nothing is called `{id}`")).hint(hint).into());
+        return Err(Diagnostic::whole("unknown-id", format!("nothing is called `{id}`"))
+            .hint(hint)
+            .into());
     }
     super::print(&text)
 }
 
 fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) -> String {
-    let mut text = format!("{}  {}\n\n{}\n\n", requirement.id, requirement.chapter, requirement.text);
+    let mut text = format!(
+        "{}  {}\n\n{}\n\n",
+        requirement.id, requirement.chapter, requirement.text
+    );
     let _ = writeln!(text, "concerns       {}", requirement.role.word());
     for (version, note) in &requirement.versions {
-        let _ = writeln!(text, "VDA 5050 {version:<5} section {}, {}", note.section, note.mood.word());
+        let _ = writeln!(
+            text,
+            "VDA 5050 {version:<5} section {}, {}",
+            note.section,
+            note.mood.word()
+        );
     }
     if requirement.in_version(pack).is_none() {
         let _ = writeln!(text, "VDA 5050 {:<5} does not have it", pack.id);
     }
-    for (name, content) in [("stimulus", &requirement.stimulus), ("observation", &requirement.observe)] {
+    for (name, content) in [
+        ("stimulus", &requirement.stimulus),
+        ("observation", &requirement.observe),
+    ] {
         if !content.is_empty() {
             let _ = writeln!(text, "{name:<14} {content}");
         }
@@ -221,7 +269,12 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
     let mut deciders = Vec::new();
     for test in &library.rules.suites.tests {
         for step in &test.steps {
-            deciders.extend(step.clauses().into_iter().filter(|(other, _)| other.as_str() == id).map(|(_, clause)| format!("{} {clause}", test.id)));
+            deciders.extend(
+                step.clauses()
+                    .into_iter()
+                    .filter(|(other, _)| other.as_str() == id)
+                    .map(|(_, clause)| format!("{} {clause}", test.id)),
+            );
         }
     }
     for monitor in &library.rules.suites.monitors {
@@ -229,11 +282,23 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
             deciders.push(format!("monitor {}", monitor.id));
         }
     }
-    let _ = writeln!(text, "by             {}", if deciders.is_empty() { "nothing" } else { deciders[0].as_str() });
+    let _ = writeln!(
+        text,
+        "by             {}",
+        if deciders.is_empty() {
+            "nothing"
+        } else {
+            deciders[0].as_str()
+        }
+    );
     for decider in deciders.iter().skip(1) {
         let _ = writeln!(text, "               {decider}");
     }
-    let breaking: Vec<&str> = FAULTS.iter().filter(|fault| fault.breaks.contains(&id)).map(|fault| fault.name).collect();
+    let breaking: Vec<&str> = FAULTS
+        .iter()
+        .filter(|fault| fault.breaks.contains(&id))
+        .map(|fault| fault.name)
+        .collect();
     if !breaking.is_empty() {
         let _ = writeln!(text, "proved with    {}", breaking.join(", "));
     }
@@ -244,7 +309,11 @@ fn about_test(test: &Test, cases: usize) -> String {
     let mut text = format!("test {}\n\n{}\n\n{}\n\n", test.id, test.title, test.why.trim());
     let _ = writeln!(text, "file           {}", test.source.name);
     let _ = writeln!(text, "for            {}, VDA 5050 {}", test.device, test.spec);
-    let _ = writeln!(text, "vehicle        {}", if test.moves { "drives" } else { "stays where it is" });
+    let _ = writeln!(
+        text,
+        "vehicle        {}",
+        if test.moves { "drives" } else { "stays where it is" }
+    );
     if cases > 1 {
         let _ = writeln!(text, "cases          {cases}");
     }
@@ -258,8 +327,17 @@ fn about_test(test: &Test, cases: usize) -> String {
 }
 
 fn about_monitor(monitor: &Monitor) -> String {
-    let decides: Vec<&str> = monitor.checks.iter().map(|binding| binding.requirement.as_str()).collect();
-    let mut text = format!("monitor {}\n\n{}\n\n{}\n\n", monitor.id, monitor.title, monitor.why.trim());
+    let decides: Vec<&str> = monitor
+        .checks
+        .iter()
+        .map(|binding| binding.requirement.as_str())
+        .collect();
+    let mut text = format!(
+        "monitor {}\n\n{}\n\n{}\n\n",
+        monitor.id,
+        monitor.title,
+        monitor.why.trim()
+    );
     let _ = writeln!(text, "file           {}", monitor.source.name);
     let _ = writeln!(text, "decides        {}", decides.join(", "));
     if let Rule::Check(check) = &monitor.rule
@@ -274,6 +352,8 @@ fn about_monitor(monitor: &Monitor) -> String {
 pub(super) fn print(text: &str) -> Result<Exit, Problem> {
     match Output::stdout().text(text) {
         Ok(()) => Ok(Exit::Conforms),
-        Err(error) => Err(Problem::Environment(format!("cannot write to standard output: {error}"))),
+        Err(error) => Err(Problem::Environment(format!(
+            "cannot write to standard output: {error}"
+        ))),
     }
 }

@@ -57,13 +57,19 @@ pub fn main() -> ExitCode {
 /// Whether results on standard output are coloured.
 fn color() -> Color {
     let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    if console::colors_enabled() && !no_color { Color::Always } else { Color::Never }
+    if console::colors_enabled() && !no_color {
+        Color::Always
+    } else {
+        Color::Never
+    }
 }
 
 /// The pack of a version; the newest one unless said.
 fn pack(library: &Library, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
     let packs = &library.rules.packs;
-    let Some(wanted) = protocol else { return Ok(Arc::clone(packs.latest())) };
+    let Some(wanted) = protocol else {
+        return Ok(Arc::clone(packs.latest()));
+    };
     packs.get(wanted).cloned().ok_or_else(|| {
         let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
         let diagnostic = Diagnostic::whole("unknown-version", format!("there is no protocol version {wanted}"));

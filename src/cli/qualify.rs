@@ -19,7 +19,11 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         None => library.rules.packs.all().to_vec(),
     };
     let whole = arguments.tests.is_empty() && arguments.fault.is_empty();
-    let faults: Vec<_> = FAULTS.iter().filter(|fault| arguments.fault.is_empty() || arguments.fault.iter().any(|name| name == fault.name)).copied().collect();
+    let faults: Vec<_> = FAULTS
+        .iter()
+        .filter(|fault| arguments.fault.is_empty() || arguments.fault.iter().any(|name| name == fault.name))
+        .copied()
+        .collect();
     let mut exit = Exit::Conforms;
     for pack in packs {
         let all = library.tests(Role::Agv, &pack.id);
@@ -28,7 +32,8 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         let outcome = outcome.map_err(|error| Problem::Environment(error.to_string()))?;
         // Faults of what a version does not have cannot show there.
         let newest = pack.id == library.rules.packs.latest().id;
-        let proven = outcome.blemishes.is_empty() && (!whole || !newest || (outcome.unproven().is_empty() && outcome.missed().is_empty()));
+        let proven = outcome.blemishes.is_empty()
+            && (!whole || !newest || (outcome.unproven().is_empty() && outcome.missed().is_empty()));
         if !proven {
             exit = Exit::DoesNotConform;
         }
@@ -45,10 +50,19 @@ fn page(outcome: &Qualification) -> String {
     use std::fmt::Write as _;
     let mut text = outcome.matrix();
     for (decider, verdict) in &outcome.blemishes {
-        let _ = writeln!(text, "not a pass without a fault: {} {} ({verdict})", decider.requirement, decider.place);
+        let _ = writeln!(
+            text,
+            "not a pass without a fault: {} {} ({verdict})",
+            decider.requirement, decider.place
+        );
     }
     for kill in outcome.missed() {
-        let _ = writeln!(text, "not found by a requirement it names: fault {} ({})", kill.fault.name, kill.fault.breaks.join(", "));
+        let _ = writeln!(
+            text,
+            "not found by a requirement it names: fault {} ({})",
+            kill.fault.name,
+            kill.fault.breaks.join(", ")
+        );
     }
     text
 }
@@ -59,6 +73,8 @@ fn data(version: &str, outcome: &Qualification) -> serde_json::Value {
         json!({ "fault": kill.fault.name, "breaks": kill.fault.breaks, "named": kill.named(), "killed": deciders.collect::<Vec<_>>() })
     });
     let unproven = outcome.unproven();
-    let unproven = unproven.iter().map(|decider| json!({ "requirement": decider.requirement, "by": decider.place }));
+    let unproven = unproven
+        .iter()
+        .map(|decider| json!({ "requirement": decider.requirement, "by": decider.place }));
     json!({ "protocol": version, "deciders": outcome.deciders.len(), "faults": kills.collect::<Vec<_>>(), "unproven": unproven.collect::<Vec<_>>() })
 }

@@ -27,8 +27,9 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
         return verify(folder);
     }
     let library = Library::load(arguments.suites.suites.as_deref())?;
-    let Recording { journal, torn } = file::read(&folder.join("journal.jsonl"))
-        .map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run")))?;
+    let Recording { journal, torn } = file::read(&folder.join("journal.jsonl")).map_err(|error| {
+        Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
+    })?;
     if torn {
         eprintln!("the last line of the journal is cut off, as after a crash; everything before it is used");
     }
@@ -39,10 +40,13 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     }
     let pack = super::pack(&library, Some(&result.protocol))?;
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
-    let root = write_all(&Bundle::open(folder), &result, &quoted, &journal).map_err(|error| Problem::Environment(error.to_string()))?;
+    let root = write_all(&Bundle::open(folder), &result, &quoted, &journal)
+        .map_err(|error| Problem::Environment(error.to_string()))?;
     let shown = folder.join("report.html").display().to_string();
     match arguments.format {
-        Format::Json => super::print(&json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?)?,
+        Format::Json => {
+            super::print(&json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?)?
+        }
         Format::Text => {
             let bundle = text::Bundle {
                 report: Some(&shown),
@@ -56,13 +60,18 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
 
 fn rejudge(folder: &Path, result: &crate::report::result::RunResult) -> Result<Exit, Problem> {
     let path = folder.join("result.json");
-    let saved = std::fs::read_to_string(&path)
-        .map_err(|error| Problem::from(Diagnostic::whole("result", format!("cannot read {}: {error}", path.display()))))?;
+    let saved = std::fs::read_to_string(&path).map_err(|error| {
+        Problem::from(Diagnostic::whole(
+            "result",
+            format!("cannot read {}: {error}", path.display()),
+        ))
+    })?;
     let again = json::to_string(result).map_err(|error| Problem::Environment(error.to_string()))?;
     if saved == again {
         return super::print("the journal gives the same result, byte for byte\n");
     }
-    let before = json::from_str(&saved, &path.display().to_string()).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
+    let before = json::from_str(&saved, &path.display().to_string())
+        .map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
     let comparison = compare::compare(&before, result);
     let text = if comparison.is_empty() {
         "the journal gives the same verdicts, but not the same result; tool or suites differ\n".to_owned()
@@ -74,18 +83,31 @@ fn rejudge(folder: &Path, result: &crate::report::result::RunResult) -> Result<E
 }
 
 fn verify(folder: &Path) -> Result<Exit, Problem> {
-    let found = manifest::Manifest::verify(folder).map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
+    let found = manifest::Manifest::verify(folder)
+        .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
     super::print(&format!("{}\n", found.text().trim_end()))?;
-    Ok(if found.holds() { Exit::Conforms } else { Exit::DoesNotConform })
+    Ok(if found.holds() {
+        Exit::Conforms
+    } else {
+        Exit::DoesNotConform
+    })
 }
 
 fn compare_runs(before: &Path, after: &Path) -> Result<Exit, Problem> {
     let read = |folder: &Path| {
-        let path = if folder.is_dir() { folder.join("result.json") } else { folder.to_owned() };
+        let path = if folder.is_dir() {
+            folder.join("result.json")
+        } else {
+            folder.to_owned()
+        };
         json::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))
     };
     let comparison = compare::compare(&read(before)?, &read(after)?);
     super::print(&comparison.text())?;
-    let worse = comparison.requirements.iter().chain(&comparison.tests).any(|change| change.trend() == compare::Trend::Worse);
+    let worse = comparison
+        .requirements
+        .iter()
+        .chain(&comparison.tests)
+        .any(|change| change.trend() == compare::Trend::Worse);
     Ok(if worse { Exit::DoesNotConform } else { Exit::Conforms })
 }

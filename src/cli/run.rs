@@ -49,7 +49,11 @@ struct Job {
 /// `run`.
 pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
-    let effective = profile::load(arguments.device.profile.as_deref(), &arguments.device.settings(), &surroundings)?;
+    let effective = profile::load(
+        arguments.device.profile.as_deref(),
+        &arguments.device.settings(),
+        &surroundings,
+    )?;
     let library = Library::load(arguments.suites.suites.as_deref())?;
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
@@ -70,7 +74,8 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         None => uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
     };
     let device = &effective.profile.device;
-    let built_in = arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
+    let built_in =
+        arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
     if !built_in && !arguments.fault.is_empty() {
         let title = "`--fault` gives the built-in reference AGV a defect, and another device is tested here";
         return Err(Diagnostic::whole("usage", title).into());
@@ -87,7 +92,10 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         run,
         no_motion: arguments.device.no_motion,
     };
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let outcome = runtime.block_on(async {
         let interrupt = interrupts();
@@ -111,8 +119,13 @@ pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
         let effective = profile::load(Some(profile), &[], &surroundings)?;
         let contract = effective.profile.time.contract();
         if let Some(changed) = contract.first() {
-            let diagnostic = Diagnostic::whole("certify", format!("a certificate is given for default timings, and {changed}"));
-            return Err(diagnostic.hint("take the section [time] out of the profile, or use `run`").into());
+            let diagnostic = Diagnostic::whole(
+                "certify",
+                format!("a certificate is given for default timings, and {changed}"),
+            );
+            return Err(diagnostic
+                .hint("take the section [time] out of the profile, or use `run`")
+                .into());
         }
     }
     run_command(&args::Run {
@@ -147,7 +160,11 @@ pub(super) fn check_faults(faults: &[String]) -> Result<(), Problem> {
                 Some(close) => format!("did you mean `{close}`?"),
                 None => "`vda5050-tck list faults` shows them all".to_owned(),
             };
-            return Err(Diagnostic::whole("unknown-fault", format!("the reference AGV has no fault `{fault}`")).hint(hint).into());
+            return Err(
+                Diagnostic::whole("unknown-fault", format!("the reference AGV has no fault `{fault}`"))
+                    .hint(hint)
+                    .into(),
+            );
         }
     }
     Ok(())
@@ -173,7 +190,13 @@ fn interrupts() -> watch::Receiver<bool> {
 
 impl Job {
     fn bundle(&self, subject: &Subject, utc: jiff::Timestamp) -> Result<Bundle, Problem> {
-        let bundle = Bundle::create(&self.output.out, &subject.manufacturer, &subject.serial_number, utc, &self.run);
+        let bundle = Bundle::create(
+            &self.output.out,
+            &subject.manufacturer,
+            &subject.serial_number,
+            utc,
+            &self.run,
+        );
         bundle.map_err(|error| Problem::Environment(error.to_string()))
     }
 
@@ -181,7 +204,9 @@ impl Job {
         let device = ReferenceAgv::new(&self.pack);
         let utc = WallClock::start().now().utc;
         let bundle = self.bundle(&device.subject, utc)?;
-        let writer = bundle.journal().map_err(|error| Problem::Environment(error.to_string()))?;
+        let writer = bundle
+            .journal()
+            .map_err(|error| Problem::Environment(error.to_string()))?;
         let device_name = format!("{} {}", device.subject.manufacturer, device.subject.serial_number);
         let mut request = VirtualRun::of(&self.library, &self.pack);
         request.device = device;
@@ -220,7 +245,8 @@ impl Job {
         let bundle = self.bundle(&device.subject, clock.origin_stamp().utc)?;
         let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
         let faults: Vec<&str> = arguments.fault.iter().map(String::as_str).collect();
-        let agv = Agv::new(device.config.clone(), &faults).map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?;
+        let agv = Agv::new(device.config.clone(), &faults)
+            .map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?;
         let endpoint = Endpoint::parse(&info.device_address, None, None).map_err(link_problem)?;
         let operator = Commands(RunningDevice::start(agv, endpoint, clock, None));
         let capabilities = Capabilities {
@@ -230,7 +256,11 @@ impl Job {
             vantage: Vantage::Tap,
             hooks: operator.hooks(),
             maps: true,
-            motion: if self.no_motion { Err(NO_MOTION.to_owned()) } else { Ok(()) },
+            motion: if self.no_motion {
+                Err(NO_MOTION.to_owned())
+            } else {
+                Ok(())
+            },
         };
         let session = SessionParts {
             subject: device.subject.clone(),
@@ -244,7 +274,12 @@ impl Job {
         self.carry_out(session, &bundle, link, operator, clock, interrupt).await
     }
 
-    async fn device(self, arguments: &args::Run, interrupt: watch::Receiver<bool>, surroundings: &Surroundings) -> Result<Exit, Problem> {
+    async fn device(
+        self,
+        arguments: &args::Run,
+        interrupt: watch::Receiver<bool>,
+        surroundings: &Surroundings,
+    ) -> Result<Exit, Problem> {
         let profile = self.effective.profile.clone();
         let subject = self.subject(&profile)?;
         let layout = Layout::of_profile(&profile)?;
@@ -252,7 +287,9 @@ impl Job {
         let password = password.map_err(|error| Problem::from(Diagnostic::whole("password", error.to_string())))?;
         let credentials = profile.bench.username.clone().map(|username| Credentials {
             username,
-            password: password.map(|password| password.reveal().to_owned()).unwrap_or_default(),
+            password: password
+                .map(|password| password.reveal().to_owned())
+                .unwrap_or_default(),
         });
         let mut options = BenchOptions::loopback(subject.published(&self.pack));
         options.listen.clone_from(&profile.bench.listen);
@@ -270,7 +307,12 @@ impl Job {
         let tap = options.tap;
         let bundle = self.bundle(&subject, clock.origin_stamp().utc)?;
         let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
-        let folder = arguments.device.profile.as_deref().and_then(Path::parent).map_or_else(PathBuf::new, Path::to_path_buf);
+        let folder = arguments
+            .device
+            .profile
+            .as_deref()
+            .and_then(Path::parent)
+            .map_or_else(PathBuf::new, Path::to_path_buf);
         let operator = self.hooks(&profile, &info, &bundle, &folder)?;
         eprintln!("the device is expected at mqtt://{}", info.device_address);
         let motion = match (self.no_motion, profile.motion.allowed) {
@@ -326,14 +368,29 @@ impl Job {
         let device = &profile.device;
         Ok(Subject {
             role: device.role,
-            manufacturer: device.manufacturer.clone().ok_or_else(|| missing("device.manufacturer", "--manufacturer"))?,
-            serial_number: device.serial_number.clone().ok_or_else(|| missing("device.serial-number", "--serial"))?,
+            manufacturer: device
+                .manufacturer
+                .clone()
+                .ok_or_else(|| missing("device.manufacturer", "--manufacturer"))?,
+            serial_number: device
+                .serial_number
+                .clone()
+                .ok_or_else(|| missing("device.serial-number", "--serial"))?,
             topic_template: device.topic_template.clone(),
         })
     }
 
-    fn hooks(&self, profile: &Profile, info: &BenchInfo, bundle: &Bundle, folder: &Path) -> Result<ProfileHooks, Problem> {
-        let (host, port) = info.device_address.rsplit_once(':').unwrap_or((&info.device_address, "1883"));
+    fn hooks(
+        &self,
+        profile: &Profile,
+        info: &BenchInfo,
+        bundle: &Bundle,
+        folder: &Path,
+    ) -> Result<ProfileHooks, Problem> {
+        let (host, port) = info
+            .device_address
+            .rsplit_once(':')
+            .unwrap_or((&info.device_address, "1883"));
         let device = &profile.device;
         let common: BTreeMap<String, String> = [
             ("broker-host", host.to_owned()),
@@ -345,14 +402,25 @@ impl Job {
         .map(|(name, value)| (name.to_owned(), value))
         .collect();
         let mut process = device.command.as_ref().map(|command| {
-            let filled = command.iter().map(|word| profile::fill(word, &common, str::to_owned)).collect();
+            let filled = command
+                .iter()
+                .map(|word| profile::fill(word, &common, str::to_owned))
+                .collect();
             DeviceProcess::new(filled, folder.to_owned(), Some(bundle.folder().join("device.log")))
         });
         if let Some(process) = &mut process {
-            process.start().map_err(|error| Problem::Environment(error.to_string()))?;
+            process
+                .start()
+                .map_err(|error| Problem::Environment(error.to_string()))?;
         }
         let attended = console::user_attended();
-        Ok(ProfileHooks::new(profile.hooks.clone(), common, folder.to_owned(), process, attended))
+        Ok(ProfileHooks::new(
+            profile.hooks.clone(),
+            common,
+            folder.to_owned(),
+            process,
+            attended,
+        ))
     }
 
     async fn carry_out<O: Operator>(
@@ -383,7 +451,9 @@ impl Job {
                 header: Box::new(header.header()),
             },
         );
-        let writer = bundle.journal().map_err(|error| Problem::Environment(error.to_string()))?;
+        let writer = bundle
+            .journal()
+            .map_err(|error| Problem::Environment(error.to_string()))?;
         let recorder = Recorder::begin(&self.library.rules, Some(writer), first);
         let recorder = recorder.map_err(|error| Problem::Environment(error.to_string()))?;
         let mut engine = Engine::new(link, operator, recorder, Composer::new(&self.run), interrupt);
@@ -419,13 +489,18 @@ impl Job {
         let shown = bundle.folder().display().to_string();
         match self.output.format {
             args::Format::Json => {
-                let text = crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
+                let text =
+                    crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
                 super::print(&text)?;
             }
             args::Format::Text => {
                 let color = super::color();
                 let mut page = String::new();
-                for test in result.tests.iter().filter(|test| test.verdict.is_some_and(|verdict| verdict > Verdict::Pass)) {
+                for test in result
+                    .tests
+                    .iter()
+                    .filter(|test| test.verdict.is_some_and(|verdict| verdict > Verdict::Pass))
+                {
                     page.push_str(&text::test(test, &quoted, Some(recorder.journal()), color));
                     page.push('\n');
                 }
@@ -446,9 +521,9 @@ impl Job {
         }
         match end {
             End::Completed => match result.tests.iter().find_map(|test| test.not_applicable.as_deref()) {
-                Some(why) if result.verdict.is_none() => {
-                    Err(Problem::NothingToDo(format!("no selected test applies to the device: {why}")))
-                }
+                Some(why) if result.verdict.is_none() => Err(Problem::NothingToDo(format!(
+                    "no selected test applies to the device: {why}"
+                ))),
                 _ => Ok(Exit::of(result.verdict)),
             },
             End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
@@ -482,14 +557,20 @@ struct SessionParts {
 fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
     let mut all = device.statements.clone();
     all.insert("long-action".to_owned(), device.long_action.is_some());
-    all.insert("uninterruptible-action".to_owned(), device.uninterruptible_action.is_some());
+    all.insert(
+        "uninterruptible-action".to_owned(),
+        device.uninterruptible_action.is_some(),
+    );
     all
 }
 
 fn claims(device: &profile::Device) -> BTreeMap<String, bool> {
     let one = |claim: &Claim| match claim {
         Claim::Action { name, scope: None } => (format!("action {name}"), true),
-        Claim::Action { name, scope: Some(scope) } => (format!("action {name} {scope}"), true),
+        Claim::Action {
+            name,
+            scope: Some(scope),
+        } => (format!("action {name} {scope}"), true),
         Claim::NoAction(name) => (format!("action {name}"), false),
         Claim::Optional(path) => (format!("optional {path}"), true),
         Claim::NoOptional(path) => (format!("optional {path}"), false),
@@ -508,7 +589,11 @@ fn link_problem(error: LinkError) -> Problem {
     Problem::Environment(error.to_string())
 }
 
-fn broker_choice(url: Option<&str>, profile: &Profile, credentials: Option<Credentials>) -> Result<BrokerChoice, Problem> {
+fn broker_choice(
+    url: Option<&str>,
+    profile: &Profile,
+    credentials: Option<Credentials>,
+) -> Result<BrokerChoice, Problem> {
     Ok(match url {
         None => BrokerChoice::Embedded,
         Some(url) => BrokerChoice::External {

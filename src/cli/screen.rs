@@ -45,7 +45,9 @@ impl Screen {
 impl Watcher for Screen {
     fn waiting(&mut self, step: &Step) {
         let what = match &step.verb {
-            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_) => step.verb_span.text(),
+            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_) => {
+                step.verb_span.text()
+            }
             _ => return,
         };
         let what = step.title.as_deref().unwrap_or(what);
@@ -56,7 +58,11 @@ impl Watcher for Screen {
 impl run::Progress for Screen {
     fn planned(&mut self, plan: &Plan) {
         self.title.tests = plan.tests.iter().filter(|test| test.gate == Gate::Runs).count();
-        self.title.not_applicable = plan.tests.iter().filter(|test| matches!(test.gate, Gate::NotApplicable(_))).count();
+        self.title.not_applicable = plan
+            .tests
+            .iter()
+            .filter(|test| matches!(test.gate, Gate::NotApplicable(_)))
+            .count();
         self.terminal.run_begun(&self.title);
     }
 

@@ -21,26 +21,48 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         username,
         password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
-    let endpoint = Endpoint::parse(&device.connection.broker, None, credentials)
-        .map_err(|error| Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port")))?;
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
+    let endpoint = Endpoint::parse(&device.connection.broker, None, credentials).map_err(|error| {
+        Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
+    })?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let faults: Vec<&str> = device.fault.iter().map(String::as_str).collect();
     runtime.block_on(async {
         // Said at once when nobody is there; later losses are the device's own business.
         tokio::net::TcpStream::connect((endpoint.host.as_str(), endpoint.port))
             .await
-            .map_err(|error| Problem::Environment(format!("the broker at {} is not reachable: {error}", device.connection.broker)))?;
+            .map_err(|error| {
+                Problem::Environment(format!(
+                    "the broker at {} is not reachable: {error}",
+                    device.connection.broker
+                ))
+            })?;
         let clock = WallClock::start();
         let mut running = Vec::new();
         for number in 1..=device.count {
             let mut reference = ReferenceAgv::new(&pack);
-            let serial = if device.count == 1 { device.serial.clone() } else { format!("{}-{number}", device.serial) };
-            reference.rename(&device.manufacturer, &serial, device.connection.topic_template.as_deref(), &pack);
-            let agv = Agv::new(reference.config, &faults).map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?;
+            let serial = if device.count == 1 {
+                device.serial.clone()
+            } else {
+                format!("{}-{number}", device.serial)
+            };
+            reference.rename(
+                &device.manufacturer,
+                &serial,
+                device.connection.topic_template.as_deref(),
+                &pack,
+            );
+            let agv = Agv::new(reference.config, &faults)
+                .map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?;
             running.push(RunningDevice::start(agv, endpoint.clone(), clock, None));
         }
-        eprintln!("{} reference AGV(s) on {}; Ctrl-C signs off", device.count, device.connection.broker);
+        eprintln!(
+            "{} reference AGV(s) on {}; Ctrl-C signs off",
+            device.count, device.connection.broker
+        );
         let _ = tokio::signal::ctrl_c().await;
         for device in running {
             device.command("shutdown", serde_json::Value::Null);

@@ -33,7 +33,10 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
         let found = check(&name, &text, path, arguments, &library)?;
         match (found, arguments.format) {
             (Found::Good(what), Format::Text) => super::print(&format!("{name}: {what}\n"))?,
-            (Found::Good(what), Format::Json) => super::print(&format!("{}\n", serde_json::json!({ "file": name, "ok": true, "what": what })))?,
+            (Found::Good(what), Format::Json) => super::print(&format!(
+                "{}\n",
+                serde_json::json!({ "file": name, "ok": true, "what": what })
+            ))?,
             (Found::Bad(all), format) => {
                 wrong += 1;
                 for one in &all {
@@ -69,9 +72,15 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
         return json_file(name, value, bytes, &parsed, arguments, library);
     }
     let Ok(text) = std::str::from_utf8(bytes) else {
-        return Ok(Found::Bad(vec![Diagnostic::whole("not-text", format!("{name} is not UTF-8"))]));
+        return Ok(Found::Bad(vec![Diagnostic::whole(
+            "not-text",
+            format!("{name} is not UTF-8"),
+        )]));
     };
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let extension = path
+        .extension()
+        .and_then(|extension| extension.to_str())
+        .unwrap_or_default();
     if extension == "toml" || (extension != "json" && looks_like_toml(text)) {
         let folder = path.parent().unwrap_or(Path::new(""));
         return Ok(match profile::check(&Source::new(name, text), folder) {
@@ -80,8 +89,16 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
         });
     }
     if extension == "json" || text.trim_start().starts_with('{') {
-        let problems = parsed.problems().iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-        return Ok(Found::Bad(vec![Diagnostic::whole("not-json", format!("{name}: {problems}"))]));
+        let problems = parsed
+            .problems()
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("; ");
+        return Ok(Found::Bad(vec![Diagnostic::whole(
+            "not-json",
+            format!("{name}: {problems}"),
+        )]));
     }
     Ok(match library.check_suite(name, text) {
         Ok(what) => Found::Good(what),
@@ -90,10 +107,20 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
 }
 
 fn looks_like_toml(text: &str) -> bool {
-    text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#')).is_some_and(|line| line.starts_with('[') || line.contains(" = "))
+    text.lines()
+        .map(str::trim)
+        .find(|line| !line.is_empty() && !line.starts_with('#'))
+        .is_some_and(|line| line.starts_with('[') || line.contains(" = "))
 }
 
-fn json_file(name: &str, value: &Value, bytes: &[u8], parsed: &Parsed, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
+fn json_file(
+    name: &str,
+    value: &Value,
+    bytes: &[u8],
+    parsed: &Parsed,
+    arguments: &Validate,
+    library: &Library,
+) -> Result<Found, Problem> {
     if value.get("metaInformation").is_some() && value.get("layouts").is_some() {
         // The text itself, so that a mistake is shown where it stands.
         return Ok(match layout(&Source::new(name, String::from_utf8_lossy(bytes))) {
@@ -101,7 +128,11 @@ fn json_file(name: &str, value: &Value, bytes: &[u8], parsed: &Parsed, arguments
             Err(all) => Found::Bad(all),
         });
     }
-    if value.get("format").and_then(Value::as_str).is_some_and(|format| format.contains(".result/")) {
+    if value
+        .get("format")
+        .and_then(Value::as_str)
+        .is_some_and(|format| format.contains(".result/"))
+    {
         return Ok(match result_file::from_str(&value.to_string(), name) {
             Ok(result) => Found::Good(format!("a result of {} tests", result.tests.len())),
             Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
@@ -121,22 +152,39 @@ fn layout(source: &Arc<Source>) -> Result<String, Vec<Diagnostic>> {
     Ok(format!("a layout with {}", said.join(", ")))
 }
 
-fn message(name: &str, value: &Value, parsed: &Parsed, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
+fn message(
+    name: &str,
+    value: &Value,
+    parsed: &Parsed,
+    arguments: &Validate,
+    library: &Library,
+) -> Result<Found, Problem> {
     let said = value.get("version").and_then(Value::as_str);
     let pack = match arguments.protocol.as_deref().or(said) {
         Some(version) => super::pack(library, Some(version))?,
         None => super::pack(library, None)?,
     };
     let Some(topic) = arguments.topic.as_deref().or_else(|| topic_of(value)) else {
-        let diagnostic = Diagnostic::whole("unknown-message", format!("{name} is JSON, but not a message that can be told by its members"));
+        let diagnostic = Diagnostic::whole(
+            "unknown-message",
+            format!("{name} is JSON, but not a message that can be told by its members"),
+        );
         return Ok(Found::Bad(vec![diagnostic.hint("say which with --topic")]));
     };
     let Some(schema) = pack.schema(topic) else {
         return Err(unknown_topic(topic, &pack).into());
     };
-    let mut all: Vec<Diagnostic> = parsed.problems().iter().map(|problem| Diagnostic::whole("json", format!("{name}: {problem}"))).collect();
+    let mut all: Vec<Diagnostic> = parsed
+        .problems()
+        .iter()
+        .map(|problem| Diagnostic::whole("json", format!("{name}: {problem}")))
+        .collect();
     all.extend(schema.findings(value).into_iter().map(|finding| {
-        let place = if finding.path.is_empty() { "the message" } else { &finding.path };
+        let place = if finding.path.is_empty() {
+            "the message"
+        } else {
+            &finding.path
+        };
         Diagnostic::whole("schema", format!("{name}: {place}: {}", finding.message))
     }));
     Ok(if all.is_empty() {

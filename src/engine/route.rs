@@ -97,7 +97,17 @@ impl RouteBuilder<'_> {
             "released": released,
             "actions": actions,
         });
-        let position = members(place, &["x", "y", "mapId", "theta", "allowedDeviationXY", "allowedDeviationTheta"]);
+        let position = members(
+            place,
+            &[
+                "x",
+                "y",
+                "mapId",
+                "theta",
+                "allowedDeviationXY",
+                "allowedDeviationTheta",
+            ],
+        );
         if position.contains_key("x") {
             node["nodePosition"] = Value::Object(position);
         }
@@ -138,5 +148,8 @@ impl RouteBuilder<'_> {
 
 /// The members of these names that are there.
 fn members(value: &Value, names: &[&str]) -> Map<String, Value> {
-    names.iter().filter_map(|name| Some(((*name).to_owned(), value.get(name)?.clone()))).collect()
+    names
+        .iter()
+        .filter_map(|name| Some(((*name).to_owned(), value.get(name)?.clone())))
+        .collect()
 }

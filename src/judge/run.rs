@@ -212,7 +212,9 @@ impl RunJudge {
         let verdict: Accumulated = all.collect();
         // Monitors alone make no device conform when tests were planned and none of them applied.
         let none_applied = !tests.is_empty() && tests.iter().all(|test| test.verdict.is_none());
-        let verdict = verdict.get().filter(|verdict| !none_applied || *verdict > Verdict::Warning);
+        let verdict = verdict
+            .get()
+            .filter(|verdict| !none_applied || *verdict > Verdict::Warning);
         let (partial, reason) = match &self.end {
             Some((partial, reason)) => (*partial, reason.clone()),
             None => (true, Some("the run has not ended yet".to_owned())),

@@ -234,9 +234,9 @@ pub fn statement(result: &RunResult) -> String {
         Some(Verdict::Pass) => {
             format!("{who} conforms to {standard} as {role} in all it was tested for: {of_decided}, none broken{rest}.")
         }
-        None if result.tests.iter().any(|test| test.not_applicable.is_some()) => format!(
-            "No test applied to {who}, so nothing is said about whether it conforms to {standard} as {role}."
-        ),
+        None if result.tests.iter().any(|test| test.not_applicable.is_some()) => {
+            format!("No test applied to {who}, so nothing is said about whether it conforms to {standard} as {role}.")
+        }
         None => format!("Nothing was decided about {who} and {standard}."),
     };
     format!("{partial}{sentence}")

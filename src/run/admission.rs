@@ -92,17 +92,28 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// The map the vehicle stands on, if it says so: `device.activeMap`.
     fn active_map(&mut self) -> Result<(), EngineError> {
-        let state = self.engine.recorder.judge().timeline().of("state").last().and_then(|entry| entry.json().cloned());
+        let state = self
+            .engine
+            .recorder
+            .judge()
+            .timeline()
+            .of("state")
+            .last()
+            .and_then(|entry| entry.json().cloned());
         let found = state.as_ref().and_then(|state| {
             let id = state.pointer("/agvPosition/mapId")?;
             let enabled = self.engine.recorder.judge().ground().pack.word("mapStatus.enabled")?;
             let maps = state.get("maps")?.as_array()?;
             let active = maps.iter().find(|map| {
-                map.get("mapId") == Some(id) && map.get("mapStatus").and_then(serde_json::Value::as_str) == Some(enabled)
+                map.get("mapId") == Some(id)
+                    && map.get("mapStatus").and_then(serde_json::Value::as_str) == Some(enabled)
             })?;
             Some(json!({ "mapId": id, "mapVersion": active.get("mapVersion")? }))
         });
-        self.setup.capabilities.statements.insert("active-map".to_owned(), found.is_some());
+        self.setup
+            .capabilities
+            .statements
+            .insert("active-map".to_owned(), found.is_some());
         if let Some(value) = found {
             self.engine.note(Event::Bound {
                 name: "device.activeMap".to_owned(),

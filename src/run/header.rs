@@ -30,7 +30,11 @@ impl Subject {
     pub fn topics(&self, pack: &Pack) -> BTreeMap<String, String> {
         let template = self.topic_template.as_deref().unwrap_or_else(|| pack.topic_template());
         // A profile gives how the topics begin, a pack the whole of them.
-        let template = if template.contains("{topic}") { template.to_owned() } else { format!("{template}/{{topic}}") };
+        let template = if template.contains("{topic}") {
+            template.to_owned()
+        } else {
+            format!("{template}/{{topic}}")
+        };
         let full = |name: &str| pack.fill_topic(&template, &self.manufacturer, &self.serial_number, name);
         pack.topics()
             .iter()

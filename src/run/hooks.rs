@@ -47,7 +47,11 @@ impl DeviceProcess {
         };
         let child = Command::new(program)
             .args(arguments)
-            .current_dir(if self.folder.as_os_str().is_empty() { ".".into() } else { self.folder.clone() })
+            .current_dir(if self.folder.as_os_str().is_empty() {
+                ".".into()
+            } else {
+                self.folder.clone()
+            })
             .stdin(Stdio::null())
             .stdout(output(&self.log)?)
             .stderr(output(&self.log)?)
@@ -118,12 +122,20 @@ impl ProfileHooks {
             HookAction::Run(arguments) => tokio::time::timeout(hook.timeout, program(&arguments, &self.folder)).await,
             HookAction::Http { method, url, body } => {
                 let asked = tokio::task::spawn_blocking(move || request(&method, &url, body.as_deref()));
-                let answer = async { asked.await.unwrap_or_else(|error| HookOutcome::Failed(error.to_string())) };
+                let answer = async {
+                    asked
+                        .await
+                        .unwrap_or_else(|error| HookOutcome::Failed(error.to_string()))
+                };
                 tokio::time::timeout(hook.timeout, answer).await
             }
             HookAction::Prompt(text) if self.attended => {
                 let asked = tokio::task::spawn_blocking(move || ask(&text));
-                let answer = async { asked.await.unwrap_or_else(|error| HookOutcome::Failed(error.to_string())) };
+                let answer = async {
+                    asked
+                        .await
+                        .unwrap_or_else(|error| HookOutcome::Failed(error.to_string()))
+                };
                 tokio::time::timeout(hook.timeout, answer).await
             }
             HookAction::Prompt(_) => Ok(HookOutcome::Missing),
@@ -132,7 +144,9 @@ impl ProfileHooks {
                     Ok(()) => HookOutcome::Done("the device was started again".to_owned()),
                     Err(error) => HookOutcome::Failed(error.to_string()),
                 }),
-                None => Ok(HookOutcome::Failed("the profile has no `device.command` that could be started".to_owned())),
+                None => Ok(HookOutcome::Failed(
+                    "the profile has no `device.command` that could be started".to_owned(),
+                )),
             },
         };
         outcome.unwrap_or_else(|_| HookOutcome::Failed(format!("not done within {}", show_duration(hook.timeout))))
@@ -141,12 +155,17 @@ impl ProfileHooks {
 
 impl Operator for ProfileHooks {
     fn hooks(&self) -> Vec<String> {
-        let usable = self.hooks.values().filter(|hook| self.attended || hook.action.is_unattended());
+        let usable = self
+            .hooks
+            .values()
+            .filter(|hook| self.attended || hook.action.is_unattended());
         usable.map(|hook| hook.name.clone()).collect()
     }
 
     async fn run(&mut self, name: &str, parameters: Map<String, Value>) -> HookOutcome {
-        let Some(hook) = self.hooks.get(name).cloned() else { return HookOutcome::Missing };
+        let Some(hook) = self.hooks.get(name).cloned() else {
+            return HookOutcome::Missing;
+        };
         let mut values = self.common.clone();
         values.extend(parameters.into_iter().map(|(name, value)| match value {
             Value::String(text) => (name, text),
@@ -168,7 +187,11 @@ async fn program(arguments: &[String], folder: &std::path::Path) -> HookOutcome 
     match command.output().await {
         Err(error) => HookOutcome::Failed(format!("cannot start `{program}`: {error}")),
         Ok(output) => {
-            let said = shown(if output.status.success() { &output.stdout } else { &output.stderr });
+            let said = shown(if output.status.success() {
+                &output.stdout
+            } else {
+                &output.stderr
+            });
             if output.status.success() {
                 HookOutcome::Done(said)
             } else {

@@ -7,8 +7,8 @@ use crate::checks;
 use crate::diagnostic::Diagnostic;
 use crate::judge::Rules;
 use crate::pack::{Assets, Catalogue, Packs, Role};
-use crate::suite::model::Test;
 use crate::profile::HOOKS;
+use crate::suite::model::Test;
 use crate::suite::{CheckInfo, HookFacts, Suites};
 
 /// The loaded data.

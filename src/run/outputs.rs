@@ -50,7 +50,10 @@ pub fn sources(catalogue: &Catalogue, suites: &Suites, pack: &Pack) -> Sources {
         })
     });
     let tests = suites.tests.iter().filter(|test| test.spec.contains(pack.version));
-    let monitors = suites.monitors.iter().filter(|monitor| monitor.spec.contains(pack.version));
+    let monitors = suites
+        .monitors
+        .iter()
+        .filter(|monitor| monitor.spec.contains(pack.version));
     Sources {
         requirements: requirements.collect(),
         tests: tests.map(|test| TestSource::of(test)).collect(),
@@ -70,7 +73,12 @@ pub fn write_result(bundle: &Bundle, result: &RunResult) -> Result<(), OutputErr
 ///
 /// # Errors
 /// When something cannot be made or written.
-pub fn write_all(bundle: &Bundle, result: &RunResult, sources: &Sources, journal: &Journal) -> Result<String, OutputError> {
+pub fn write_all(
+    bundle: &Bundle,
+    result: &RunResult,
+    sources: &Sources,
+    journal: &Journal,
+) -> Result<String, OutputError> {
     write_result(bundle, result)?;
     bundle.write("junit.xml", junit::render(result)?.as_bytes())?;
     let page = html::render(result, sources, Some(journal)).map_err(|error| OutputError::Html(error.to_string()))?;

@@ -5,8 +5,8 @@
 //! unproven, and is said so by name.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use super::library::Library;
 use super::reference_agv::ReferenceAgv;
@@ -214,7 +214,10 @@ pub fn qualify_tests(
 
 /// What is not a pass.
 fn blemishes_of(result: &RunResult) -> Vec<(Decider, Verdict)> {
-    let mut all: Vec<_> = decided(result).into_iter().filter(|(_, verdict)| *verdict != Verdict::Pass).collect();
+    let mut all: Vec<_> = decided(result)
+        .into_iter()
+        .filter(|(_, verdict)| *verdict != Verdict::Pass)
+        .collect();
     let unjudged = result.tests.iter().filter(|test| test.decisions.is_empty());
     for test in unjudged.filter(|test| test.verdict.is_some_and(|verdict| verdict != Verdict::Pass)) {
         let decider = Decider {
