@@ -286,6 +286,7 @@ impl Agv {
             if self.faults.has(F::ChargingFailureFinished) {
                 return Ok(());
             }
+            self.charging = self.faults.has(F::ChargingShownAnyway);
             return Err(Problem::new(Area::Charging, action, "the vehicle is not at a charger"));
         }
         self.charging = !self.faults.has(F::ChargingUnreported);

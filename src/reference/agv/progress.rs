@@ -105,7 +105,10 @@ impl Agv {
 
     /// Goes on towards the next node.
     fn set_out(&mut self, stop: &Stop) -> bool {
-        let early_end = stop.node.sequence_id == self.book.base_end.1 && self.faults.has(F::StopsBeforeEndOfBase);
+        // Stranded between two nodes, it would be of no use for any further test.
+        let early_end = stop.node.sequence_id == self.book.base_end.1
+            && self.faults.has(F::StopsBeforeEndOfBase)
+            && self.config.node(&self.book.last_node).is_some();
         let alone = self.book.base_end.1 == 0 && self.config.node(&stop.node.id).is_none();
         let unreached = alone && self.faults.has(F::TemporaryNodeNotReached);
         let undriven = self.faults.has(F::ContinuationNotDriven) && self.book.continued;
