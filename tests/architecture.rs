@@ -1,4 +1,10 @@
 //! The shape of the program, held by a test: dependencies point one way, and what is named stays in its place.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test may fail by panicking"
+)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

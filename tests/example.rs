@@ -1,6 +1,12 @@
 //! The example of a report in `reports/example/` is what the program makes today.
 //!
 //! To make it anew: `INSTA_UPDATE=always cargo test --test example`.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test may fail by panicking"
+)]
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +37,7 @@ fn make(folder: &Path) {
     request.complete = false;
     request.faults = vec!["outdated-update-taken-over".to_owned()];
     request.begun = "2026-01-01T08:00:00Z".parse().expect("a time");
-    request.run = "example".to_owned();
+    "example".clone_into(&mut request.run);
     let finished = run_silently(&library, &pack, request).expect("a run");
     let bundle = Bundle::open(folder);
     let mut writer = bundle.journal().expect("a journal");

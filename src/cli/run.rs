@@ -240,7 +240,7 @@ impl Job {
         if arguments.device.listen.is_some() {
             options.listen.clone_from(&bench.listen);
         }
-        options.broker = broker_choice(bench.broker.as_deref(), &self.effective.profile, None)?;
+        options.broker = broker_choice(bench.broker.as_deref(), &self.effective.profile, None);
         let clock = options.clock;
         let bundle = self.bundle(&device.subject, clock.origin_stamp().utc)?;
         let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
@@ -281,7 +281,7 @@ impl Job {
         surroundings: &Surroundings,
     ) -> Result<Exit, Problem> {
         let profile = self.effective.profile.clone();
-        let subject = self.subject(&profile)?;
+        let subject = Self::subject(&profile)?;
         let layout = Layout::of_profile(&profile)?;
         let password = profile.bench.password.password(surroundings);
         let password = password.map_err(|error| Problem::from(Diagnostic::whole("password", error.to_string())))?;
@@ -302,7 +302,7 @@ impl Job {
             }),
             _ => None,
         };
-        options.broker = broker_choice(profile.bench.broker.as_deref(), &profile, credentials)?;
+        options.broker = broker_choice(profile.bench.broker.as_deref(), &profile, credentials);
         let clock = options.clock;
         let tap = options.tap;
         let bundle = self.bundle(&subject, clock.origin_stamp().utc)?;
@@ -313,7 +313,7 @@ impl Job {
             .as_deref()
             .and_then(Path::parent)
             .map_or_else(PathBuf::new, Path::to_path_buf);
-        let operator = self.hooks(&profile, &info, &bundle, &folder)?;
+        let operator = Self::hooks(&profile, &info, &bundle, &folder)?;
         eprintln!("the device is expected at mqtt://{}", info.device_address);
         let motion = match (self.no_motion, profile.motion.allowed) {
             (true, _) => Err(NO_MOTION.to_owned()),
@@ -359,7 +359,7 @@ impl Job {
         Screen::new(device.to_owned(), self.pack.version.to_string(), results)
     }
 
-    fn subject(&self, profile: &Profile) -> Result<Subject, Problem> {
+    fn subject(profile: &Profile) -> Result<Subject, Problem> {
         let missing = |setting: &str, flag: &str| -> Problem {
             let title = format!("the device is not named: `{setting}` is missing");
             let diagnostic = Diagnostic::whole("missing-setting", title);
@@ -380,13 +380,7 @@ impl Job {
         })
     }
 
-    fn hooks(
-        &self,
-        profile: &Profile,
-        info: &BenchInfo,
-        bundle: &Bundle,
-        folder: &Path,
-    ) -> Result<ProfileHooks, Problem> {
+    fn hooks(profile: &Profile, info: &BenchInfo, bundle: &Bundle, folder: &Path) -> Result<ProfileHooks, Problem> {
         let (host, port) = info
             .device_address
             .rsplit_once(':')
@@ -589,19 +583,15 @@ fn link_problem(error: LinkError) -> Problem {
     Problem::Environment(error.to_string())
 }
 
-fn broker_choice(
-    url: Option<&str>,
-    profile: &Profile,
-    credentials: Option<Credentials>,
-) -> Result<BrokerChoice, Problem> {
-    Ok(match url {
+fn broker_choice(url: Option<&str>, profile: &Profile, credentials: Option<Credentials>) -> BrokerChoice {
+    match url {
         None => BrokerChoice::Embedded,
         Some(url) => BrokerChoice::External {
             url: url.to_owned(),
             authority: profile.bench.tls_ca.clone(),
             credentials,
         },
-    })
+    }
 }
 
 /// Hooks of the built-in device: commands to its driver.

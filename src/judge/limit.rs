@@ -25,7 +25,7 @@ impl Limit {
         let millis = |name: &str| {
             bindings
                 .get(name)
-                .and_then(|value| value.as_u64())
+                .and_then(serde_json::Value::as_u64)
                 .map(Duration::from_millis)
         };
         match name_of(&time.term) {

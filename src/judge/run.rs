@@ -127,7 +127,7 @@ impl RunJudge {
             Event::Bound { name, value } if self.current.is_none() => {
                 let mut bindings = crate::pattern::Bindings::from(std::mem::take(&mut self.ground.bindings));
                 bindings.set(name, value.clone());
-                self.ground.bindings = bindings.as_map().clone();
+                self.ground.bindings.clone_from(bindings.as_map());
             }
             Event::TestBegun { test, bindings } => {
                 self.break_off("the run went on without ending this test");

@@ -193,7 +193,7 @@ impl Progress for Silent {
 pub fn run_silently(library: &Library, pack: &Pack, request: VirtualRun) -> Result<Finished, EngineError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
-        .map_err(|error| crate::engine::RecordError::Write(error))?;
+        .map_err(crate::engine::RecordError::Write)?;
     let (_keep, interrupt) = tokio::sync::watch::channel(false);
     runtime.block_on(run_virtually(
         library,

@@ -83,7 +83,9 @@ impl Walking {
         let text = |what: &str| scene.bindings.get(&format!("{name}.{what}"));
         let id = text("id").and_then(|value| value.as_str().map(str::to_owned));
         let id = id.ok_or_else(|| format!("no action was sent as `{name}`"))?;
-        let sent = text("sent").and_then(|value| value.as_u64()).unwrap_or(position.test);
+        let sent = text("sent")
+            .and_then(serde_json::Value::as_u64)
+            .unwrap_or(position.test);
         let limit = limit(&verb.within, scene)?;
         let mut this = Self {
             span: step.verb_span.clone(),
@@ -227,7 +229,9 @@ mod tests {
 
     fn track(text: &str, statuses: &[&str]) -> Track {
         let mut track = Track::new(&walk(text));
-        statuses.iter().for_each(|status| track.step(status));
+        for status in statuses {
+            track.step(status);
+        }
         track
     }
 

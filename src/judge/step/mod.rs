@@ -115,7 +115,8 @@ pub enum Progress {
     NeedsProbe(Moment),
 }
 
-/// A step being decided.
+/// A step being decided. There is one at a time, so its size does not matter.
+#[expect(clippy::large_enum_variant, reason = "one value at a time")]
 pub(super) enum Evaluator {
     /// Decides nothing; ends when the engine says so.
     Plain,

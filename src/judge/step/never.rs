@@ -28,7 +28,7 @@ impl Forbidding {
         let patience = scene
             .bindings
             .get("time.broker")
-            .and_then(|value| value.as_u64())
+            .and_then(serde_json::Value::as_u64)
             .unwrap_or(5_000);
         let mut selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
         let check = selector
