@@ -125,8 +125,18 @@ impl Running for RemainingRoute {
             .into_iter()
             .map(|sent| (self.held_against(sent, &nodes, &edges, seq), sent))
             .min_by_key(|(found, _)| found.len());
-        let Some((found, sent)) = best else { return false };
-        let progress = self.progress(sent);
+        let Some((mut found, sent)) = best else { return false };
+        let mut progress = self.progress(sent);
+        // The new order may name the very node and sequenceId the last one ended with: then an equal last node
+        // may be left over, or be progress already. What the lists say decides.
+        let reached = self
+            .reached(sent)
+            .filter(|_| self.shown.carried.is_some() && !found.is_empty());
+        let arrived = reached.is_some_and(|reached| self.held_at(sent, Some(reached), &nodes, &edges, seq).is_empty());
+        if arrived {
+            found.clear();
+            progress = reached;
+        }
         if let Some((next, said)) = self.early.take() {
             if progress.is_some_and(|progress| progress >= next) {
                 let text = "a node is removed in one state and becomes the last node in another";
@@ -147,6 +157,9 @@ impl Running for RemainingRoute {
                 self.early = Some((next, found));
             }
             _ => findings.extend(found),
+        }
+        if arrived {
+            self.shown.carried = None;
         }
         true
     }
@@ -180,6 +193,13 @@ impl RemainingRoute {
         if self.shown.carried.is_some() {
             return sent.nodes.first().filter(is_last).map(|first| first.sequence);
         }
+        self.reached(sent)
+    }
+
+    /// The sequenceId of the last node in the order, wherever it comes from.
+    fn reached(&self, sent: &SentOrder) -> Option<u64> {
+        let (node, sequence) = self.shown.last.as_ref()?;
+        let is_last = |element: &&Element| element.id == *node && element.sequence == *sequence;
         let mut known = self
             .shown
             .orders

@@ -1,6 +1,7 @@
 //! The command line: parse, call, map the outcome to an exit code. One file per command.
 
 pub mod args;
+mod device;
 pub mod exit;
 mod list;
 mod problem;

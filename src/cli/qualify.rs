@@ -3,9 +3,9 @@
 use serde_json::json;
 
 use super::args::{Format, Qualify};
+use super::device::check_faults;
 use super::exit::Exit;
 use super::problem::Problem;
-use super::run::check_faults;
 use crate::pack::Role;
 use crate::reference::agv::FAULTS;
 use crate::run::{Library, Qualification, qualify_tests};

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use tokio::sync::watch;
 
 use super::args;
+use super::device::{check_faults, claims, pack_of, statements};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::screen::Screen;
@@ -20,7 +21,7 @@ use crate::link::mqtt::endpoint::{Credentials, Endpoint};
 use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
 use crate::link::{LinkError, Vantage};
 use crate::pack::Pack;
-use crate::profile::{self, Claim, Effective, Profile, Surroundings, TimeLimits};
+use crate::profile::{self, Effective, Profile, Surroundings, TimeLimits};
 use crate::reference::agv::Agv;
 use crate::report::result::RunResult;
 use crate::report::text;
@@ -136,38 +137,6 @@ pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
         output: arguments.output.clone(),
         ..args::Run::default()
     })
-}
-
-fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Problem> {
-    let packs = &library.rules.packs;
-    let Some(wanted) = &effective.profile.device.protocol else {
-        return Ok(Arc::clone(packs.latest()));
-    };
-    packs.get(wanted).cloned().ok_or_else(|| {
-        let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
-        let title = format!("there is no protocol version {wanted}");
-        let diagnostic = effective.complain("device.protocol", "unknown-version", title, "this version");
-        diagnostic.hint(format!("known versions: {}", known.join(", "))).into()
-    })
-}
-
-pub(super) fn check_faults(faults: &[String]) -> Result<(), Problem> {
-    use crate::reference::agv::FAULTS;
-    for fault in faults {
-        if !FAULTS.iter().any(|known| known.name == fault) {
-            let names = FAULTS.iter().map(|known| known.name);
-            let hint = match crate::diagnostic::closest(fault, names) {
-                Some(close) => format!("did you mean `{close}`?"),
-                None => "`vda5050-tck list faults` shows them all".to_owned(),
-            };
-            return Err(
-                Diagnostic::whole("unknown-fault", format!("the reference AGV has no fault `{fault}`"))
-                    .hint(hint)
-                    .into(),
-            );
-        }
-    }
-    Ok(())
 }
 
 /// Ctrl-C once ends the run in good order, twice at once.
@@ -545,34 +514,6 @@ struct SessionParts {
     capabilities: Capabilities,
     limits: Vec<String>,
     deviations: BTreeMap<String, String>,
-}
-
-/// What the profile states, and what follows from the actions it names.
-fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
-    let mut all = device.statements.clone();
-    all.insert("long-action".to_owned(), device.long_action.is_some());
-    all.insert(
-        "uninterruptible-action".to_owned(),
-        device.uninterruptible_action.is_some(),
-    );
-    all
-}
-
-fn claims(device: &profile::Device) -> BTreeMap<String, bool> {
-    let one = |claim: &Claim| match claim {
-        Claim::Action { name, scope: None } => (format!("action {name}"), true),
-        Claim::Action {
-            name,
-            scope: Some(scope),
-        } => (format!("action {name} {scope}"), true),
-        Claim::NoAction(name) => (format!("action {name}"), false),
-        Claim::Optional(path) => (format!("optional {path}"), true),
-        Claim::NoOptional(path) => (format!("optional {path}"), false),
-        Claim::Limit { name, value } => (format!("limit {name}"), *value > 0),
-        Claim::Statement(name) => (name.clone(), true),
-        Claim::NoStatement(name) => (name.clone(), false),
-    };
-    device.claims.iter().map(one).collect()
 }
 
 fn settings(effective: &Effective) -> Vec<Setting> {

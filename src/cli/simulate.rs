@@ -1,9 +1,9 @@
 //! `simulate`: be a reference device on a broker.
 
 use super::args::{Simulate, Simulated};
+use super::device::check_faults;
 use super::exit::Exit;
 use super::problem::Problem;
-use super::run::check_faults;
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::link::mqtt::endpoint::{Credentials, Endpoint};

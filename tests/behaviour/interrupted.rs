@@ -3,15 +3,21 @@
 use std::time::{Duration, Instant};
 
 use crate::bench::{Bench, Profile, REFUSAL};
-use crate::broken::{LATER, WATCHING, step_begun};
+use crate::broken::{LATER, step_begun};
 use crate::tool::{Running, tool};
+
+/// Leaves the vehicle with an order until its postamble.
+const WAITING: &str = "order-acceptance/horizon-not-entered";
 
 #[test]
 fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_partial() {
     let bench = Bench::new();
-    let (mut run, port) = bench.start(&Profile::default().with(&[("quiet", "40 s")]), &[REFUSAL, LATER]);
+    let mut profile = Profile::default().with(&[("quiet", "40 s")]);
+    profile.motion = true;
+    let (mut run, port) = bench.start(&profile, &[WAITING, LATER]);
     let _agv = bench.agv(port, &[]);
-    step_begun(&bench, &mut run, WATCHING);
+    // The vehicle waits at the decision point, with a horizon left that only a cancelOrder can end.
+    step_begun(&bench, &mut run, "steps[1]");
     run.interrupt();
     let interrupted = Instant::now();
     run.end().code(130);
