@@ -302,7 +302,8 @@ impl Agv {
             return;
         };
         if self.faults.has(F::HorizonActionsBegun) {
-            self.actions.trigger(Origin::Node(planned.node.sequence_id), self.faults);
+            self.actions
+                .trigger(Origin::Node(planned.node.sequence_id), self.faults);
         }
         if self.faults.has(F::HorizonSlippedInto) {
             self.book.soon = Some(self.now.moment + super::cancel::MOMENT);

@@ -46,6 +46,7 @@ fn config() -> AgvConfig {
         topics: names
             .map(|name| (name.to_owned(), format!("uagv/v7/Reference/agv-1/{name}")))
             .into(),
+        chargers: ["n1".to_owned()].into(),
         ..AgvConfig::default()
     }
 }

@@ -322,6 +322,9 @@ fn asked_afterwards(bench: &mut Bench) {
     bench.wait(1.0);
     bench.send_raw("order", "{");
     bench.wait(1.0);
+    let here = json!({ "x": 3.0, "y": 0.0, "mapId": "hall" });
+    bench.order(with(order("o3", 0, 0, "spot"), "/nodes/0/nodePosition", here));
+    bench.wait(1.0);
 }
 
 fn broken_link(bench: &mut Bench) {
