@@ -205,6 +205,10 @@ mod tests {
     use crate::journal::event::{Direction, Event, Packet, Source};
 
     fn at_tap(topic: &str) -> Trace {
+        said_at_tap(topic, "{}")
+    }
+
+    fn said_at_tap(topic: &str, text: &str) -> Trace {
         let mut trace = Trace::tap();
         let packet = Packet::Publish {
             topic: topic.to_owned(),
@@ -212,7 +216,7 @@ mod tests {
             retain: false,
             dup: false,
             packet_id: None,
-            payload: crate::journal::Payload::keep(bytes::Bytes::from_static(b"{}")),
+            payload: crate::journal::Payload::keep(bytes::Bytes::from(text.to_owned())),
         };
         trace.packet(1, Direction::FromDevice, packet);
         trace
@@ -261,6 +265,36 @@ mod tests {
         assert_eq!(structure("site/hall/agv7"), ["TOPIC-02 warning"]);
         assert_eq!(structure("uagv/2/acme/7"), ["TOPIC-03 warning"]);
         assert_eq!(structure("uagv/v2/ac$me/7"), ["TOPIC-07 warning"]);
+    }
+
+    #[test]
+    fn a_serial_number_of_other_characters_is_found() {
+        let mut trace = Trace::subscriber();
+        trace.prefix.push_str(" b");
+        trace.serial.push_str(" b");
+        trace.state(&json!({}));
+        assert_eq!(trace.judge("topic/structure").summary(), ["TOPIC-05"]);
+    }
+
+    #[test]
+    fn a_level_that_contradicts_the_version_of_its_message_is_remarked_on() {
+        let said = |topic: &str, version: &str| {
+            let text = json!({ "version": version }).to_string();
+            said_at_tap(topic, &text).judge("topic/structure").summary()
+        };
+        assert_eq!(said("uagv/v7/acme/7/visualization", "8.1.0"), ["TOPIC-03 warning"]);
+        assert!(
+            said("uagv/v7/acme/7/visualization", "7.1.0").is_empty(),
+            "two versions side by side"
+        );
+        assert!(
+            said("uagv/v7/acme/7/diagnostics", "8.1.0").is_empty(),
+            "a topic of its own"
+        );
+        assert!(
+            said("uagv/v7/acme/9/visualization", "8.1.0").is_empty(),
+            "another vehicle"
+        );
     }
 
     #[test]

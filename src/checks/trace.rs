@@ -22,6 +22,8 @@ pub(super) struct Trace {
     pub with: Map<String, Value>,
     /// Name of the topic under which a name is configured otherwise than usual.
     pub prefix: String,
+    /// The serial number of the vehicle in its topics.
+    pub serial: String,
 }
 
 /// What came out: requirement, verdict and message of each finding, and whether anything was judged.
@@ -78,6 +80,7 @@ impl Trace {
             next_header: 0,
             with: Map::new(),
             prefix: format!("uagv/v{}/acme/7", pack().version.major),
+            serial: "7".to_owned(),
         };
         let header = RunHeader {
             vantage: vantage.to_owned(),
@@ -277,7 +280,7 @@ impl Trace {
         let context = CheckContext {
             pack: &pack,
             topics: &topics,
-            identity: ("acme", "7"),
+            identity: ("acme", &self.serial),
             with: &self.with,
             bindings: &bindings,
         };
