@@ -16,8 +16,8 @@ use serde_json::Value;
 const FOLDER: &str = "fixtures/devices/vda-5050-lib-agv";
 /// Name in the list, profile, and number of benches.
 const VEHICLES: [(&str, &str, usize); 2] = [
-    ("as-shipped", "device.toml", 6),
-    ("translated", "device-translated.toml", 3),
+    ("as-shipped", "device.toml", 10),
+    ("translated", "device-translated.toml", 6),
 ];
 
 /// Verdict by requirement.

@@ -115,14 +115,24 @@ async fn power_cycle<L: Link, O: Operator>(
         HookOutcome::Failed(failed) => return Ok(Err(format!("hook `power-cycle` failed: {failed}"))),
         HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),
     }
+    let after = session
+        .engine
+        .recorder
+        .journal()
+        .entries()
+        .last()
+        .map_or(0, |entry| entry.seq() + 1);
     let back = move |recorder: &Recorder| {
         let timeline = recorder.judge().timeline();
-        let connected = match vantage {
-            Vantage::Tap => !timeline.since("mqtt/connect", before).is_empty(),
-            Vantage::Subscriber => true,
+        // What the device still said before it was switched off is not what it says now that it is on again.
+        let on_again = match vantage {
+            Vantage::Tap => timeline.since("mqtt/connect", before).first().map(|entry| entry.seq()),
+            Vantage::Subscriber => Some(after),
         };
-        let said = timeline.since("state", before).iter().any(|entry| !is_stale(entry));
-        connected && said && Presence::of(recorder.judge(), vantage).is_there() && says_online(recorder.judge())
+        let said = |since| timeline.since("state", since).iter().any(|entry| !is_stale(entry));
+        on_again.is_some_and(said)
+            && Presence::of(recorder.judge(), vantage).is_there()
+            && says_online(recorder.judge())
     };
     let until = session.engine.link.now().moment + session.time("connect");
     if session.engine.watch(until, back).await? {
