@@ -158,8 +158,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     continue;
                 }
                 if section == Section::Finally
-                    && is_cancelling(step)
-                    && *spared.get_or_insert_with(|| self.spares_cancelling(begun))
+                    && ((is_cancelling(step) && *spared.get_or_insert_with(|| self.spares_cancelling(begun)))
+                        || (is_driving_on(step) && self.device_is_gone()))
                 {
                     continue;
                 }
@@ -192,14 +192,20 @@ impl<L: Link, O: Operator> Engine<L, O> {
     /// would otherwise cost a time limit after every test.
     fn spares_cancelling(&self, begun: u64) -> bool {
         let judge = self.recorder.judge();
-        let has_tap = !judge.timeline().of("mqtt/connect").is_empty();
         let entries = self.recorder.journal().entries();
         let sent = entries
             .iter()
             .rev()
             .find(|entry| matches!(entry.event(), Event::Sent { .. }));
         let since = sent.map_or(begun, |entry| entry.seq().max(begun));
-        !self.cancels || (has_tap && !vehicle::has_open_connection(judge)) || vehicle::is_idle_since(judge, since)
+        !self.cancels || self.device_is_gone() || vehicle::is_idle_since(judge, since)
+    }
+
+    /// Whether the tap has seen the device go.
+    fn device_is_gone(&self) -> bool {
+        let judge = self.recorder.judge();
+        let has_tap = !judge.timeline().of("mqtt/connect").is_empty();
+        has_tap && !vehicle::has_open_connection(judge)
     }
 
     async fn step(&mut self, step: &Step, section: Section) -> Result<(), EngineError> {
@@ -254,7 +260,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             Verb::Serve(serve) => self.serve(serve).await,
             Verb::Operator(operator) => {
                 self.mark(step)?;
-                self.operate(operator).await
+                self.operate(operator, section).await
             }
             Verb::Vehicle(_) => Ok(StepEnd::Broken(
                 "`vehicle` needs a master control under test".to_owned(),
@@ -369,7 +375,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
         Ok(StepEnd::Decided)
     }
 
-    async fn operate(&mut self, operator: &crate::suite::model::Operator) -> Result<StepEnd, EngineError> {
+    async fn operate(
+        &mut self,
+        operator: &crate::suite::model::Operator,
+        section: Section,
+    ) -> Result<StepEnd, EngineError> {
         let mut parameters = Map::new();
         if let Some(test) = self.recorder.judge().current() {
             for (name, term) in &operator.with {
@@ -379,7 +389,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 };
             }
         }
-        let outcome = self.hook(&operator.hook, parameters).await?;
+        // What a postamble undoes is undone even when the user has asked to stop.
+        let outcome = self.hook(&operator.hook, parameters, section != Section::Finally).await?;
+        if section != Section::Finally && self.interrupted() {
+            return Ok(StepEnd::Interrupted);
+        }
         Ok(match outcome {
             HookOutcome::Done(_) => StepEnd::Decided,
             HookOutcome::Failed(why) => StepEnd::Broken(format!("hook `{}` failed: {why}", operator.hook)),
@@ -387,8 +401,14 @@ impl<L: Link, O: Operator> Engine<L, O> {
         })
     }
 
-    /// Runs a hook of the profile while everything that happens goes on being recorded.
-    pub async fn hook(&mut self, name: &str, parameters: Map<String, Value>) -> Result<HookOutcome, EngineError> {
+    /// Runs a hook of the profile while everything that happens goes on being recorded. One that `abandons` is given
+    /// up when the user asks to stop.
+    pub async fn hook(
+        &mut self,
+        name: &str,
+        parameters: Map<String, Value>,
+        abandons: bool,
+    ) -> Result<HookOutcome, EngineError> {
         let far = Moment::from_micros(u64::MAX);
         let outcome = if self.operator.runs_on_the_link() {
             operator::on_link(&mut self.link, name, &parameters)
@@ -398,6 +418,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
             loop {
                 tokio::select! {
                     outcome = &mut running => break outcome,
+                    _ = self.interrupt.wait_for(|interrupted| *interrupted), if abandons => {
+                        break HookOutcome::Failed("given up: the user has interrupted the run".to_owned());
+                    }
                     happened = self.link.next(far) => {
                         if let Some(occurrence) = happened? {
                             self.recorder.record(occurrence)?;
@@ -429,6 +452,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
 /// Whether a step of a postamble comes from the state that cancels whatever is left.
 fn is_cancelling(step: &Step) -> bool {
     step.path.contains("/cancel-order[")
+}
+
+/// Whether a step of a postamble waits for the vehicle to drive what was released to it.
+fn is_driving_on(step: &Step) -> bool {
+    step.path.contains("/base-done[")
 }
 
 fn map_file(serve: &crate::suite::model::Serve, bindings: &Bindings) -> Result<bytes::Bytes, String> {

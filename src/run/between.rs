@@ -110,7 +110,7 @@ async fn power_cycle<L: Link, O: Operator>(
     let vantage = session.setup.capabilities.vantage;
     session.progress.note(&reason);
     let before = session.engine.note(Event::Note { text: reason })?;
-    match session.engine.hook("power-cycle", Map::new()).await? {
+    match session.engine.hook("power-cycle", Map::new(), true).await? {
         HookOutcome::Done(_) => {}
         HookOutcome::Failed(failed) => return Ok(Err(format!("hook `power-cycle` failed: {failed}"))),
         HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::bench::{Bench, QUICK, REFUSAL};
+use crate::bench::{Bench, Profile, QUICK, REFUSAL};
+use crate::broken::{WATCHING, step_begun};
 
 /// A finished run in virtual time that fails one requirement.
 fn failed_run() -> (Bench, String) {
@@ -155,4 +156,23 @@ fn the_format_for_programs_is_the_result_itself() {
         fs::read_to_string(bench.bundle().join("result.json")).unwrap()
     );
     assert!(ended.stdout.contains(REFUSAL));
+}
+
+#[test]
+fn a_harness_that_is_killed_leaves_a_journal_that_is_judged_as_far_as_it_goes() {
+    let bench = Bench::new();
+    let (mut run, port) = bench.start(&Profile::default().with(&[("quiet", "30 s")]), &[QUICK, REFUSAL]);
+    let _agv = bench.agv(port, &[]);
+    step_begun(&bench, &mut run, WATCHING);
+    run.kill();
+    let folder = bench.bundle().display().to_string();
+    bench.run(&["report", &folder]).code(3);
+    let result = bench.result();
+    assert_eq!(result["partial"], true, "{result}");
+    let verdict = |id: &str| {
+        let tests = result["tests"].as_array().unwrap();
+        tests.iter().find(|test| test["id"] == id).unwrap()["verdict"].clone()
+    };
+    assert_eq!(verdict(QUICK), "pass", "what was decided before stands");
+    assert_eq!(verdict(REFUSAL), "inconclusive");
 }
