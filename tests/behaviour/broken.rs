@@ -21,7 +21,7 @@ pub fn step_begun(bench: &Bench, run: &mut Running, path: &str) {
 /// A quick test that runs after [`REFUSAL`].
 pub const LATER: &str = "order-rejection/validation-error-stays";
 /// The step of [`REFUSAL`] that does nothing but watch.
-pub const WATCHING: &str = "steps[2]";
+pub const WATCHING: &str = "steps[1]";
 
 #[test]
 fn a_device_that_never_comes_is_5_and_leaves_a_partial_report() {
