@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde_json::Value;
 
+use super::orders::number;
 use super::traffic::{
     Traffic, actions, broken, elements, maybe_restarted, outside_influence, quote, remark, state, text, to_vehicle,
 };
@@ -172,7 +173,7 @@ impl Running for Kept {
         }
         let order = (
             text(state, "orderId").to_owned(),
-            state.get("orderUpdateId").and_then(Value::as_u64).unwrap_or_default(),
+            number(state, "orderUpdateId").unwrap_or_default(),
         );
         let now: HashMap<String, String> = self
             .graph
@@ -233,10 +234,7 @@ impl Kept {
         let message = self.traffic.delivered(entry, context)?;
         let value = (message.name == "factsheet").then(|| entry.json()).flatten()?;
         let limits = value.pointer("/protocolLimits/maxArrayLens")?;
-        let limit = limits
-            .get("state.actionStates")
-            .and_then(Value::as_u64)
-            .unwrap_or_default();
+        let limit = number(limits, "state.actionStates").unwrap_or_default();
         usize::try_from(limit).ok()
     }
 }

@@ -7,7 +7,8 @@ use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
 use crate::pack::Pack;
 use crate::profile::{self, Claim, Effective};
-use crate::run::Library;
+use crate::reference::agv::TOLERANCES;
+use crate::run::{Library, ReferenceAgv};
 
 /// The protocol version the device is judged by.
 pub(super) fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Problem> {
@@ -39,6 +40,21 @@ pub(super) fn check_faults(faults: &[String]) -> Result<(), Problem> {
                     .into(),
             );
         }
+    }
+    Ok(())
+}
+
+/// Gives the reference AGV its liberties, and refuses one it does not have.
+pub(super) fn tolerate(device: &mut ReferenceAgv, tolerances: &[String]) -> Result<(), Problem> {
+    for name in tolerances {
+        device.tolerate(name).map_err(|unknown| {
+            let names = TOLERANCES.iter().map(|known| known.name);
+            let hint = match crate::diagnostic::closest(name, names) {
+                Some(close) => format!("did you mean `{close}`?"),
+                None => "`vda5050-tck list tolerances` shows them all".to_owned(),
+            };
+            Diagnostic::whole("unknown-tolerance", unknown.to_string()).hint(hint)
+        })?;
     }
     Ok(())
 }

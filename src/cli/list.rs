@@ -12,7 +12,7 @@ use crate::checks;
 use crate::diagnostic::{self, Diagnostic};
 use crate::pack::{Pack, Requirement, Role};
 use crate::profile::HOOKS;
-use crate::reference::agv::FAULTS;
+use crate::reference::agv::{FAULTS, TOLERANCES};
 use crate::report::coverage;
 use crate::run::{Library, sources};
 use crate::suite::model::{Monitor, Rule, Test, Verb};
@@ -67,6 +67,10 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         (Listing::Faults, Format::Json) => {
             lines(FAULTS.iter().map(|fault| json!({ "name": fault.name, "breaks": fault.breaks, "wrong": fault.wrong })))
         }
+        (Listing::Tolerances, Format::Text) => ui::tolerances(TOLERANCES),
+        (Listing::Tolerances, Format::Json) => lines(
+            TOLERANCES.iter().map(|one| json!({ "name": one.name, "under": one.under, "does": one.does })),
+        ),
         (Listing::Hooks, Format::Text) => ui::hooks(HOOKS),
         (Listing::Hooks, Format::Json) => lines(HOOKS.iter().map(|hook| {
             json!({ "name": hook.name, "role": hook.role.word(), "parameters": hook.parameters, "doc": hook.doc })

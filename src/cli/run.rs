@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tokio::sync::watch;
 
 use super::args;
-use super::device::{check_faults, claims, pack_of, statements};
+use super::device::{check_faults, claims, pack_of, statements, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::screen::Screen;
@@ -79,6 +79,10 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
     if !built_in && !arguments.fault.is_empty() {
         let title = "`--fault` gives the built-in reference AGV a defect, and another device is tested here";
+        return Err(Diagnostic::whole("usage", title).into());
+    }
+    if !built_in && !arguments.tolerance.is_empty() {
+        let title = "`--tolerance` gives the built-in reference AGV a liberty, and another device is tested here";
         return Err(Diagnostic::whole("usage", title).into());
     }
     check_faults(&arguments.fault)?;
@@ -170,7 +174,8 @@ impl Job {
     }
 
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let device = ReferenceAgv::new(&self.pack);
+        let mut device = ReferenceAgv::new(&self.pack);
+        tolerate(&mut device, &arguments.tolerance)?;
         let utc = WallClock::start().now().utc;
         let bundle = self.bundle(&device.subject, utc)?;
         let writer = bundle
@@ -203,7 +208,8 @@ impl Job {
     }
 
     async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let device = ReferenceAgv::new(&self.pack);
+        let mut device = ReferenceAgv::new(&self.pack);
+        tolerate(&mut device, &arguments.tolerance)?;
         let mut options = BenchOptions::loopback(device.subject.published(&self.pack));
         let bench = &self.effective.profile.bench;
         if arguments.device.listen.is_some() {

@@ -1,7 +1,7 @@
 //! `simulate`: be a reference device on a broker.
 
 use super::args::{Simulate, Simulated};
-use super::device::check_faults;
+use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::clock::WallClock;
@@ -44,6 +44,7 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         let mut running = Vec::new();
         for number in 1..=device.count {
             let mut reference = ReferenceAgv::new(&pack);
+            tolerate(&mut reference, &device.tolerance)?;
             let serial = if device.count == 1 {
                 device.serial.clone()
             } else {

@@ -390,7 +390,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
             }
         }
         // What a postamble undoes is undone even when the user has asked to stop.
-        let outcome = self.hook(&operator.hook, parameters, section != Section::Finally).await?;
+        let outcome = self
+            .hook(&operator.hook, parameters, section != Section::Finally)
+            .await?;
         if section != Section::Finally && self.interrupted() {
             return Ok(StepEnd::Interrupted);
         }

@@ -9,6 +9,7 @@ use super::header::Subject;
 use crate::course::Layout;
 use crate::pack::{Pack, Role};
 use crate::profile::TimeLimits;
+use crate::reference::agv::tolerances::UnknownTolerance;
 use crate::reference::agv::{AgvConfig, LayoutNode, OnboardMap};
 
 /// The reference AGV and everything a run must know about it.
@@ -131,11 +132,24 @@ impl ReferenceAgv {
     /// `device.*` beside identity and factsheet: the actions tests may use for their own ends.
     #[must_use]
     pub fn device_bindings(&self) -> Map<String, Value> {
-        let action = |name: &str| json!({ "type": name, "parameters": { "duration": 0.5 } });
+        // Long enough for what a test does meanwhile.
+        let seconds = 0.5 + 3.0 * (self.config.answers_after + self.config.min_state_interval).as_secs_f64();
+        let action = |name: &str| json!({ "type": name, "parameters": { "duration": seconds } });
         let mut all = Map::new();
         all.insert("longAction".to_owned(), action("beep"));
         all.insert("uninterruptibleAction".to_owned(), action("calibrate"));
         all
+    }
+
+    /// Lets it take a liberty, and gives it the time it then needs.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    pub fn tolerate(&mut self, name: &str) -> Result<(), UnknownTolerance> {
+        let speed = self.config.speed;
+        self.config.tolerate(name)?;
+        self.time.drive = self.time.drive.mul_f64((speed / self.config.speed).max(1.0));
+        Ok(())
     }
 
     /// Gives it another name.

@@ -1,10 +1,11 @@
-//! Texts of `list hooks` and `list faults`.
+//! Texts of `list hooks`, `list faults` and `list tolerances`.
 
 use std::fmt::Write as _;
 
 use crate::pack::Role;
 use crate::profile::HookInfo;
 use crate::reference::Fault;
+use crate::reference::agv::Tolerance;
 
 /// Every hook with its parameters, by role.
 #[must_use]
@@ -42,6 +43,17 @@ pub fn faults(faults: &[Fault]) -> String {
     faults.iter().fold(String::new(), |mut text, fault| {
         let breaks = fault.breaks.join(", ");
         let _ = writeln!(text, "{:<width$}  {} ({breaks})", fault.name, fault.wrong);
+        text
+    })
+}
+
+/// Every tolerance with what the vehicle does and the requirements that leave it the liberty.
+#[must_use]
+pub fn tolerances(tolerances: &[Tolerance]) -> String {
+    let width = tolerances.iter().map(|one| one.name.len()).max().unwrap_or(0);
+    tolerances.iter().fold(String::new(), |mut text, one| {
+        let under = one.under.join(", ");
+        let _ = writeln!(text, "{:<width$}  {} ({under})", one.name, one.does);
         text
     })
 }

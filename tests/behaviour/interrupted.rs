@@ -61,7 +61,8 @@ fn in_virtual_time_it_ends_as_well() {
 fn a_hook_that_takes_for_ever_is_given_up() {
     let bench = Bench::new();
     let profile = Profile {
-        more: "[hooks.shutdown]\nrun = [\"sleep\", \"300\"]\ntimeout = \"5 min\"\n[hooks.start]\nrun = [\"true\"]".to_owned(),
+        more: "[hooks.shutdown]\nrun = [\"sleep\", \"300\"]\ntimeout = \"5 min\"\n[hooks.start]\nrun = [\"true\"]"
+            .to_owned(),
         ..Profile::default()
     };
     let (mut run, port) = bench.start(&profile, &["connection/graceful-goodbye"]);
@@ -70,7 +71,10 @@ fn a_hook_that_takes_for_ever_is_given_up() {
     run.interrupt();
     let interrupted = Instant::now();
     run.end().code(130);
-    assert!(interrupted.elapsed() < Duration::from_secs(20), "it waited for the hook");
+    assert!(
+        interrupted.elapsed() < Duration::from_secs(20),
+        "it waited for the hook"
+    );
     let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
     assert!(journal.contains("given up: the user has interrupted the run"));
     bench.is_partial();

@@ -47,6 +47,8 @@ pub enum Listing {
     Monitors,
     /// Defects the reference AGV can be given
     Faults,
+    /// Liberties the reference AGV can be given
+    Tolerances,
     /// What a profile can do to the device for a test
     Hooks,
 }

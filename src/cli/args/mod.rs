@@ -46,7 +46,7 @@ pub enum Command {
     Run(Run),
     /// Test a device with nothing left to choose: all applicable tests, default timings, built-in suites
     Certify(Certify),
-    /// Show what there is: tests, requirements, coverage, monitors, faults or hooks
+    /// Show what there is: tests, requirements, coverage, monitors, faults, tolerances or hooks
     List(List),
     /// Explain a requirement, test, monitor, check, hook or fault
     Explain(Explain),

@@ -43,6 +43,14 @@ pub struct Run {
         conflicts_with = "profile"
     )]
     pub fault: Vec<String>,
+    /// Give the reference AGV a liberty the standard leaves it; may be repeated (see `list tolerances`)
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = "Reference AGV",
+        conflicts_with = "profile"
+    )]
+    pub tolerance: Vec<String>,
     /// Run against the reference AGV in memory and in virtual time, without a network
     #[arg(long = "virtual", help_heading = "Reference AGV", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
     pub in_virtual_time: bool,

@@ -61,4 +61,7 @@ pub struct SimulatedAgv {
     /// Give it a defect; may be repeated (see `list faults`)
     #[arg(long, value_name = "NAME")]
     pub fault: Vec<String>,
+    /// Give it a liberty the standard leaves it; may be repeated (see `list tolerances`)
+    #[arg(long, value_name = "NAME")]
+    pub tolerance: Vec<String>,
 }

@@ -211,6 +211,7 @@ impl Agv {
         self.book.order_id.clone_from(&order.id);
         self.book.update_id = order.update_id;
         self.append(order.nodes, order.edges);
+        self.linger_on_first_node();
     }
 
     /// Rows 8 and 10: takes over an update.

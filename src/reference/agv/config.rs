@@ -6,6 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use super::tolerances::Tolerances;
+
 /// A node of the layout the vehicle knows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayoutNode {
@@ -156,6 +158,8 @@ pub struct AgvConfig {
     pub state_interval: Duration,
     /// No state is sent sooner after another than this (FACT-14).
     pub min_state_interval: Duration,
+    /// How long a message lies before it is looked at.
+    pub answers_after: Duration,
     /// Interval of the visualization topic; off if `None`.
     pub visualization_interval: Option<Duration>,
     /// MQTT keep-alive (CONN-04).
@@ -186,6 +190,8 @@ pub struct AgvConfig {
     pub max_actions: usize,
     /// Largest message in bytes.
     pub max_message: usize,
+    /// The liberties it takes; see [`AgvConfig::tolerate`].
+    pub tolerances: Tolerances,
 }
 
 impl Default for AgvConfig {
@@ -234,6 +240,7 @@ impl Default for AgvConfig {
             tolerance_theta: 0.05,
             state_interval: Duration::from_secs(10),
             min_state_interval: Duration::ZERO,
+            answers_after: Duration::ZERO,
             visualization_interval: None,
             keep_alive: Duration::from_secs(15),
             reconnect_delay: Duration::from_secs(1),
@@ -253,6 +260,7 @@ impl Default for AgvConfig {
             max_nodes: 200,
             max_actions: 20,
             max_message: 1 << 20,
+            tolerances: Tolerances::default(),
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::reference::{ConnectOptions, Output, Publication};
 
 use super::Agv;
 use super::faults::FaultName as F;
+use super::tolerances::{ToleranceName as T, manner};
 
 /// The state of the link, and what is counted over all connections.
 #[derive(Clone, Debug)]
@@ -62,6 +63,11 @@ impl Connection {
 }
 
 impl Agv {
+    /// Whether it takes a liberty.
+    pub(super) fn takes(&self, tolerance: T) -> bool {
+        self.config.tolerances.has(tolerance)
+    }
+
     /// How to connect: the will says CONNECTIONBROKEN (CONN-01 to CONN-04).
     pub(super) fn options(&mut self, now: Stamp) -> ConnectOptions {
         self.now = now.at(now.moment.max(self.now.moment));
@@ -109,12 +115,16 @@ impl Agv {
         let subscriptions = wanted
             .iter()
             .filter_map(|name| self.config.topic(name))
-            .map(|topic| (topic.to_owned(), 0));
+            .map(|topic| (topic.to_owned(), u8::from(self.takes(T::SubscribesWithQosOne))));
         ConnectOptions {
-            level: if self.faults.has(F::OldMqtt) { 3 } else { 4 },
+            level: match () {
+                () if self.faults.has(F::OldMqtt) => 3,
+                () if self.takes(T::NewestMqtt) => 5,
+                () => 4,
+            },
             client_id: format!("{}.{}", self.config.manufacturer, self.config.serial_number),
             keep_alive,
-            clean_session: true,
+            clean_session: !self.takes(T::SessionKept),
             will,
             subscriptions: subscriptions.collect(),
         }
@@ -123,6 +133,9 @@ impl Agv {
     /// The broker accepted: ONLINE, then the factsheet, then a state (CONN-05, CONN-11).
     pub(super) fn connected(&mut self) {
         let first = !self.connection.returning;
+        if self.takes(T::HeaderIdRestarts) {
+            self.connection.header_ids.clear();
+        }
         self.connection.online = true;
         self.connection.returning = true;
         self.connection.attempt_at = None;
@@ -135,7 +148,9 @@ impl Agv {
             } else {
                 "ONLINE"
             };
-            self.publish_connection(online);
+            for _ in 0..if self.takes(T::OnlineTwice) { 2 } else { 1 } {
+                self.publish_connection(online);
+            }
         }
         self.publish_factsheet();
         self.start_reporting(first);
@@ -226,7 +241,9 @@ impl Agv {
             message = Map::from_iter([("header".to_owned(), Value::Object(message))]);
         }
         message.extend(body);
-        let mut payload = Value::Object(message).to_string().into_bytes();
+        let states = self.connection.header_ids.get("state").copied().unwrap_or(0);
+        let message = manner::reworded(self.config.tolerances, name, message, states % 2 == 0);
+        let mut payload = manner::written(self.config.tolerances, message);
         for (text, bytes) in mangle {
             payload = replaced(&payload, text.as_bytes(), bytes);
         }
@@ -313,7 +330,11 @@ impl Agv {
 
     fn timestamp(&self) -> Value {
         let utc = self.now.utc;
-        let text = format!("{utc:.2}");
+        let text = match () {
+            () if self.takes(T::SecondsWhole) => format!("{utc:.0}"),
+            () if self.takes(T::SecondsFine) => format!("{utc:.6}"),
+            () => format!("{utc:.2}"),
+        };
         match () {
             () if self.faults.has(F::TimestampLocal) => {
                 let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);

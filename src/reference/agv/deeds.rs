@@ -8,6 +8,7 @@ use super::action_kinds::{Deed, LOAD_POSITIONS};
 use super::actions::{Action, Origin, Status};
 use super::faults::FaultName as F;
 use super::motion::Pose;
+use super::tolerances::ToleranceName as T;
 use super::{Agv, Load};
 
 /// Coordinates beyond this are no place on any map of the site, in metres.
@@ -96,7 +97,7 @@ impl Agv {
                 action.end(Status::Finished);
             }
             None => action.end(Status::Failed),
-            Some(kind) if kind.prepares => {
+            Some(kind) if kind.prepares || self.config.tolerances.has(T::PreparesEverything) => {
                 action.status = Status::Initializing;
                 action.due = Some(moment + duration / 3);
             }

@@ -3,8 +3,8 @@
 //! Written from the standard. The parts, by idea: `acceptance`, with `ability` and `rejection`, decides about orders
 //! (figure 8), `book` holds the order, `progress` drives it, `cancel` ends it (figure 9); `actions` knows when an
 //! action runs and `deeds` what it does; `instant` takes instant actions, `commands` what people do to the vehicle;
-//! `connection` and `report` speak to the broker. Every deviation from good behaviour is declared in `faults`, and
-//! found in the code by its [`FaultName`].
+//! `connection` and `report` speak to the broker. Every deviation from good behaviour is declared in `faults`, every
+//! liberty a good vehicle may take in `tolerances`; both are found in the code by name.
 
 mod ability;
 mod acceptance;
@@ -30,7 +30,9 @@ mod rejection;
 mod report;
 #[cfg(test)]
 mod tests;
+pub mod tolerances;
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::clock::{Moment, Stamp};
@@ -39,6 +41,7 @@ use crate::reference::{ConnectOptions, Device, Input, Output};
 pub use commands::COMMANDS;
 pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
 pub use faults::{FAULTS, FaultName, find};
+pub use tolerances::{TOLERANCES, Tolerance, ToleranceName};
 
 use actions::Actions;
 use book::Book;
@@ -124,6 +127,12 @@ pub struct Agv {
     claimed_map: Option<String>,
     connection: Connection,
     report: Report,
+    /// Messages that were not looked at yet, and when they will be.
+    inbox: VecDeque<(Moment, String, bytes::Bytes)>,
+    /// It stands still on a node until then (`stops-on-nodes`, `first-node-listed` only).
+    lingers_until: Option<Moment>,
+    /// Counts states.
+    states_sent: u64,
     /// Counts logs.
     logs: u32,
     /// What was decided and is still to be handed to the driver.
@@ -177,6 +186,9 @@ impl Agv {
             claimed_map: None,
             connection: Connection::new(),
             report: Report::default(),
+            inbox: VecDeque::new(),
+            lingers_until: None,
+            states_sent: 0,
             logs: 0,
             pending: Vec::new(),
             config,
@@ -209,6 +221,8 @@ impl Agv {
             self.connection.next_attempt(),
             self.connection.online_at,
             self.book.soon,
+            self.lingers_until,
+            self.inbox.front().map(|(due, ..)| *due),
             self.next_report(),
         ];
         events.into_iter().flatten().min()
@@ -237,6 +251,12 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
+        self.lingers_until = self.lingers_until.filter(|until| *until > moment);
+        while self.inbox.front().is_some_and(|(due, ..)| *due <= moment) {
+            if let Some((_, topic, payload)) = self.inbox.pop_front() {
+                self.message(&topic, &payload);
+            }
+        }
         self.a_moment_later();
         self.attempt_connection();
         self.settle();
@@ -254,7 +274,10 @@ impl Device for Agv {
         match input {
             Input::Connected => self.connected(),
             Input::ConnectionLost => self.connection_lost(),
-            Input::Message { topic, payload } => self.message(&topic, &payload),
+            Input::Message { topic, payload } => {
+                let due = now.moment + self.config.answers_after;
+                self.inbox.push_back((due, topic, payload));
+            }
             Input::Time => {}
             Input::Download { token, progress } => self.download_progress(token, progress),
             Input::Command(name, arguments) => self.command(&name, &arguments),

@@ -1,12 +1,14 @@
 //! Driving the order: setting out, arriving, traversing, and beginning actions (sections 6.10.2 and 6.12).
 
 use std::f64::consts::FRAC_PI_2;
+use std::time::Duration;
 
 use super::action_kinds::Deed;
 use super::actions::Origin;
 use super::book::Stop;
 use super::faults::FaultName as F;
 use super::order_message::{Blocking, Edge};
+use super::tolerances::ToleranceName as T;
 use super::{Agv, Mode, motion};
 
 /// An orientation is right within this, in radians.
@@ -18,10 +20,20 @@ const EXACT: f64 = 1e-6;
 /// How far onto an edge the vehicle rolls out before an action that stops it begins, in metres.
 const BRAKING: f64 = 0.3;
 
+/// How long a vehicle stands on a node that may do so.
+const LINGERING: Duration = Duration::from_millis(100);
+
 /// How fast the vehicle ends a way it has reported already, in metres per second.
 const CREEPING: f64 = 0.5;
 
 impl Agv {
+    /// Stands on the first node of a new order for a moment (`first-node-listed` only).
+    pub(super) fn linger_on_first_node(&mut self) {
+        if self.takes(T::FirstNodeListed) && self.motion.reached {
+            self.lingers_until = Some(self.moment() + LINGERING);
+        }
+    }
+
     /// Draws all consequences that need no time.
     pub(super) fn settle(&mut self) {
         for _ in 0..10_000 {
@@ -59,6 +71,7 @@ impl Agv {
         let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
         let warned = self.faults.has(F::WarningBlocks) && !self.errors.is_empty();
         self.mode.takes_orders()
+            && self.lingers_until.is_none()
             && !held
             && !cancelled
             && !offline
@@ -283,6 +296,9 @@ impl Agv {
             return;
         };
         let sequence_id = stop.node.sequence_id;
+        if self.takes(T::StopsOnNodes) {
+            self.lingers_until = Some(self.moment() + LINGERING);
+        }
         self.motion.reached = false;
         self.book.entered = false;
         let behind = |edge: &Edge| edge.sequence_id < sequence_id;

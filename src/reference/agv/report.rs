@@ -13,6 +13,7 @@ use crate::clock::Moment;
 
 use super::Agv;
 use super::faults::FaultName as F;
+use super::tolerances::ToleranceName as T;
 
 /// What has been reported.
 #[derive(Clone, Debug, Default)]
@@ -258,7 +259,11 @@ impl Agv {
             body.insert("end".into(), json!("@"));
             mangle.push((",\"end\":\"@\"}", b"}\0"));
         }
-        let times = if self.faults.has(F::StateBursts) { 5 } else { 1 };
+        let times = match () {
+            () if self.faults.has(F::StateBursts) => 5,
+            () if self.takes(T::EveryStateTwice) => 2,
+            () => 1,
+        };
         for _ in 0..times {
             self.publish("state", body.clone(), &mangle);
         }
@@ -268,6 +273,10 @@ impl Agv {
             next_visualization,
             ..Report::default()
         };
+        self.states_sent += 1;
+        if self.takes(T::FactsheetAgain) && self.states_sent % 10 == 0 {
+            self.publish_factsheet();
+        }
     }
 
     fn publish_visualization(&mut self) {

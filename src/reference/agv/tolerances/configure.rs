@@ -1,0 +1,40 @@
+//! Liberties that are a matter of what the vehicle is like.
+
+use std::time::Duration;
+
+use super::ToleranceName as T;
+use crate::reference::agv::config::AgvConfig;
+
+pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
+    match tolerance {
+        // Whoever is slow to answer is slow in all, else an order would be done before its cancellation is read.
+        T::AnswersSlowly => {
+            config.answers_after = Duration::from_millis(500);
+            slower(config, 6.0);
+        }
+        T::AnswersVerySlowly => {
+            config.answers_after = Duration::from_secs(4);
+            slower(config, 40.0);
+        }
+        T::StatesCoalesced => {
+            config.min_state_interval = Duration::from_millis(400);
+            slower(config, 6.0);
+        }
+        T::StatesSeldom => config.state_interval = Duration::from_secs(28),
+        T::StatesOften => config.state_interval = Duration::from_millis(100),
+        T::VisualizationOff => config.visualization_interval = None,
+        T::VisualizationOften => config.visualization_interval = Some(Duration::from_millis(50)),
+        T::DrivesSlowly => slower(config, 4.0),
+        T::ActionsLast => config.action_duration = Duration::from_secs(1),
+        T::ActionsAtOnce => config.action_duration = Duration::ZERO,
+        T::ReconnectsLate => config.reconnect_delay = Duration::from_secs(8),
+        T::KeepAliveTwenty => config.keep_alive = Duration::from_secs(20),
+        T::ErrorsStay => config.error_duration = Duration::from_secs(30),
+        _ => {}
+    }
+}
+
+fn slower(config: &mut AgvConfig, times: f64) {
+    config.speed /= times;
+    config.rotation_speed /= times;
+}
