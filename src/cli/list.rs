@@ -20,6 +20,9 @@ use crate::ui::{self, Output};
 
 /// `list`.
 pub fn list(arguments: &List) -> Result<Exit, Problem> {
+    if arguments.uncovered && arguments.what != Listing::Coverage {
+        return Err(Diagnostic::whole("usage", "`--uncovered` is about `list coverage`").into());
+    }
     let library = Library::load(arguments.suites.suites.as_deref())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
     let roles: Vec<Role> = arguments
@@ -49,6 +52,7 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
             for role in roles {
                 let all = coverage::coverage(&sources, role);
                 match format {
+                    Format::Text if arguments.uncovered => text += &all.uncovered_text(),
                     Format::Text => {
                         let _ = writeln!(text, "{role}, VDA 5050 {}\n\n{}", pack.version, all.text());
                     }

@@ -190,6 +190,13 @@ impl Coverage {
             return text;
         }
         text.push_str("\nDecided by nothing\n");
+        text + &self.uncovered_text()
+    }
+
+    /// What nothing decides, one line each; nothing when there is nothing.
+    #[must_use]
+    pub fn uncovered_text(&self) -> String {
+        let mut text = String::new();
         let width = self
             .uncovered
             .iter()

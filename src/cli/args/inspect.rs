@@ -11,6 +11,7 @@ const LIST_HELP: &str = "\
 Examples:
   vda5050-tck list tests                   every test, what it needs, whether the vehicle drives
   vda5050-tck list coverage --role agv     which requirement is decided by what, or by nothing
+  vda5050-tck list coverage --uncovered    what nothing decides
   vda5050-tck list hooks                   what a profile can do for a test";
 
 /// `list`.
@@ -26,6 +27,9 @@ pub struct List {
     /// For this protocol version; the newest one unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,
+    /// Of the coverage, only what nothing decides
+    #[arg(long)]
+    pub uncovered: bool,
     /// How it is written
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
