@@ -10,6 +10,7 @@ mod bundle;
 pub mod capabilities;
 pub mod device_driver;
 pub mod device_peer;
+mod estimate;
 mod header;
 pub mod hooks;
 mod library;

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use super::between::{Presence, recover, revive, says_online, settle_link};
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
+use super::estimate::{self, Pace};
 use crate::course::Layout;
 use crate::engine::vehicle::is_idle;
 use crate::engine::{Engine, EngineError, Operator, Watcher};
@@ -127,6 +128,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let mut plan = self.plan(gates.collect());
         self.record_plan(&plan)?;
         self.progress.planned(&plan);
+        self.tell_estimate(&plan);
         let tests = self.setup.tests.clone();
         let runs = plan.tests.iter().filter(|planned| planned.gate == Gate::Runs).count();
         let mut number = 0;
@@ -169,6 +171,26 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             end = End::Interrupted;
         }
         Ok(end)
+    }
+
+    /// Says how long the run will take; in virtual time it is over before that is read.
+    fn tell_estimate(&mut self, plan: &Plan) {
+        if self.engine.operator.runs_on_the_link() {
+            return;
+        }
+        let times = self.engine.recorder.judge().ground().bindings.get("time");
+        let pace = Pace::of(
+            times,
+            self.setup.capabilities.factsheet.as_ref(),
+            self.setup.layout.as_ref(),
+        );
+        let planned = self.setup.tests.iter().zip(&plan.tests);
+        let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);
+        let estimate = pace.estimate(running.map(|(test, _)| &**test));
+        self.progress.note(&format!(
+            "this takes {}, if the device keeps nobody waiting",
+            estimate::in_words(estimate)
+        ));
     }
 
     fn plan(&self, tests: Vec<PlannedTest>) -> Plan {

@@ -7,21 +7,23 @@ use crate::mosquitto::Mosquitto;
 use crate::scripted::Scripted;
 use crate::tool::Running;
 
-/// Waits until the journal of the run shows this step begun.
-pub fn step_begun(bench: &Bench, run: &mut Running, path: &str) {
-    let wanted = format!("\"kind\":\"step-begun\",\"path\":\"{path}\"");
-    run.until(&wanted, |_| {
+/// Waits until the journal of the run shows this step of this test begun.
+pub fn step_begun(bench: &Bench, run: &mut Running, (test, path): (&str, &str)) {
+    let test = format!("\"kind\":\"test-begun\",\"test\":\"{test}\"");
+    let step = format!("\"kind\":\"step-begun\",\"path\":\"{path}\"");
+    run.until(&step, |_| {
         let journal = crate::bench::bundles(&bench.path().join("reports"))
             .pop()?
             .join("journal.jsonl");
-        std::fs::read_to_string(journal).ok()?.contains(&wanted).then_some(())
+        let text = std::fs::read_to_string(journal).ok()?;
+        text[text.find(&test)?..].contains(&step).then_some(())
     });
 }
 
-/// A quick test that runs after [`REFUSAL`].
-pub const LATER: &str = "order-rejection/validation-error-stays";
-/// The step of [`REFUSAL`] that does nothing but watch.
-pub const WATCHING: &str = "steps[1]";
+/// A quick test that runs after [`WATCHING`].
+pub const LATER: &str = "state/requested";
+/// A test that does not move the vehicle, and its step that does nothing but watch for `time.quiet`.
+pub const WATCHING: (&str, &str) = ("order-rejection/validation-error-stays", "steps[2]");
 
 #[test]
 fn a_device_that_never_comes_is_5_and_leaves_a_partial_report() {
@@ -49,7 +51,7 @@ fn a_device_killed_in_the_middle_of_a_test_leaves_the_rest_undecided() {
     let bench = Bench::new();
     let (mut run, port) = bench.start(
         &Profile::default().with(&[("quiet", "2 s"), ("drive", "1 s")]),
-        &[REFUSAL, LATER],
+        &[WATCHING.0, LATER],
     );
     let mut agv = bench.agv(port, &[]);
     step_begun(&bench, &mut run, WATCHING);
@@ -96,7 +98,7 @@ fn a_broker_killed_in_the_middle_of_a_test_is_5_and_the_journal_is_kept() {
         bench: format!("broker = \"{}\"", mosquitto.url()),
         ..Profile::default().with(&[("quiet", "30 s")])
     };
-    let (mut run, port) = bench.start(&profile, &[REFUSAL, LATER]);
+    let (mut run, port) = bench.start(&profile, &[WATCHING.0, LATER]);
     let _agv = bench.agv(port, &[]);
     step_begun(&bench, &mut run, WATCHING);
     mosquitto.kill();

@@ -9,6 +9,9 @@ use crate::tool::{Running, tool};
 /// Leaves the vehicle with an order until its postamble.
 const WAITING: &str = "order-acceptance/horizon-not-entered";
 
+/// Begins with a hook.
+const GOODBYE: &str = "connection/graceful-goodbye";
+
 #[test]
 fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_partial() {
     let bench = Bench::new();
@@ -17,7 +20,7 @@ fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_p
     let (mut run, port) = bench.start(&profile, &[WAITING, LATER]);
     let _agv = bench.agv(port, &[]);
     // The vehicle waits at the decision point, with a horizon left that only a cancelOrder can end.
-    step_begun(&bench, &mut run, "steps[1]");
+    step_begun(&bench, &mut run, (WAITING, "steps[1]"));
     run.interrupt();
     let interrupted = Instant::now();
     run.end().code(130);
@@ -65,9 +68,9 @@ fn a_hook_that_takes_for_ever_is_given_up() {
             .to_owned(),
         ..Profile::default()
     };
-    let (mut run, port) = bench.start(&profile, &["connection/graceful-goodbye"]);
+    let (mut run, port) = bench.start(&profile, &[GOODBYE]);
     let _agv = bench.agv(port, &[]);
-    step_begun(&bench, &mut run, "steps[0]");
+    step_begun(&bench, &mut run, (GOODBYE, "steps[0]"));
     run.interrupt();
     let interrupted = Instant::now();
     run.end().code(130);

@@ -158,10 +158,13 @@ fn the_format_for_programs_is_the_result_itself() {
     assert!(ended.stdout.contains(REFUSAL));
 }
 
+/// A quick test that runs before [`WATCHING`].
+const BEFORE: &str = REFUSAL;
+
 #[test]
 fn a_harness_that_is_killed_leaves_a_journal_that_is_judged_as_far_as_it_goes() {
     let bench = Bench::new();
-    let (mut run, port) = bench.start(&Profile::default().with(&[("quiet", "30 s")]), &[QUICK, REFUSAL]);
+    let (mut run, port) = bench.start(&Profile::default().with(&[("quiet", "30 s")]), &[BEFORE, WATCHING.0]);
     let _agv = bench.agv(port, &[]);
     step_begun(&bench, &mut run, WATCHING);
     run.kill();
@@ -173,6 +176,6 @@ fn a_harness_that_is_killed_leaves_a_journal_that_is_judged_as_far_as_it_goes() 
         let tests = result["tests"].as_array().unwrap();
         tests.iter().find(|test| test["id"] == id).unwrap()["verdict"].clone()
     };
-    assert_eq!(verdict(QUICK), "pass", "what was decided before stands");
-    assert_eq!(verdict(REFUSAL), "inconclusive");
+    assert_eq!(verdict(BEFORE), "pass", "what was decided before stands");
+    assert_eq!(verdict(WATCHING.0), "inconclusive");
 }
