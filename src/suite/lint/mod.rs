@@ -22,6 +22,7 @@ use super::model::{Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection,
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
 use crate::pack::{RequirementId, Role, VersionRange};
 use crate::pattern::Pattern;
+use crate::profile::{SAMPLE_ACTIONS, STATEMENTS};
 
 /// Where the header keys of a file are written.
 pub(super) struct HeaderPlaces {
@@ -215,7 +216,14 @@ impl Linter<'_> {
                 names.extend(path.splitn(2, '.'));
                 self.exists_somewhere("factsheet", &names, path, at);
             }
-            Need::Tap | Need::MapServer | Need::Profile(_) => {}
+            Need::Profile(name) => {
+                let known = || STATEMENTS.iter().chain(SAMPLE_ACTIONS).map(|statement| statement.name);
+                if !known().any(|other| other == name) {
+                    self.problems
+                        .unknown("unknown-statement", at, "statement of a profile", name, known());
+                }
+            }
+            Need::Tap | Need::MapServer => {}
         }
     }
 
