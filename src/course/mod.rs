@@ -151,8 +151,8 @@ impl Course {
         self.nodes.iter().map(|(name, node)| (name.as_str(), node))
     }
 
-    /// What is known of an edge, with `heading`, the direction of the straight line from node to node, and `back`,
-    /// the direction back, both in radians against the map.
+    /// What is known of an edge, with `length` of the straight line from node to node in metres, `heading`, its
+    /// direction, and `back`, the direction back, both in radians against the map.
     fn edge_value(&self, from: &str, to: &str, edge: &Edge) -> Value {
         let mut value = edge.value();
         let ends = self.nodes.get(from).zip(self.nodes.get(to));
@@ -161,6 +161,7 @@ impl Course {
         {
             let heading = (end.y - start.y).atan2(end.x - start.x);
             let back = (start.y - end.y).atan2(start.x - end.x);
+            members.insert("length".into(), start.distance(end.x, end.y).into());
             members.insert("heading".into(), heading.into());
             members.insert("back".into(), back.into());
         }

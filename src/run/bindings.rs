@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
+use super::pace::{Pace, between_looks};
 use crate::course::{Layout, Standing};
 use crate::journal::event::{Event, Packet};
 use crate::judge::RunJudge;
@@ -46,7 +47,10 @@ pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) 
     let course = layout
         .assign(&test.course, &standing)
         .map_err(|error| error.to_string())?;
-    Ok(Some(flat(course.bindings())))
+    let mut course = course.bindings();
+    let factsheet = judge.ground().bindings.get("device").and_then(|device| device.get("factsheet"));
+    Pace::of(factsheet).set(&mut course);
+    Ok(Some(flat(course)))
 }
 
 /// The variables only this test has.
@@ -58,14 +62,17 @@ pub(super) fn own_bindings(
     number: usize,
 ) -> Map<String, Value> {
     let mut own = Map::new();
+    let mut time = Map::new();
+    time.extend(course.as_ref().and_then(between_looks).map(|millis| ("look".to_owned(), millis.into())));
     own.extend(course.map(|course| ("course".to_owned(), course)));
     let ids = fresh_names(test).into_iter().map(|name| {
         let id = format!("{run}-{number}-{name}");
         (name, Value::from(id))
     });
     own.insert("run".to_owned(), Value::Object(ids.collect()));
-    if let Some(will) = will(judge) {
-        own.insert("time".to_owned(), json!({ "will": will }));
+    time.extend(will(judge).map(|millis| ("will".to_owned(), millis.into())));
+    if !time.is_empty() {
+        own.insert("time".to_owned(), time.into());
     }
     own
 }

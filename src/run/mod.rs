@@ -14,6 +14,7 @@ mod header;
 pub mod hooks;
 mod library;
 mod outputs;
+mod pace;
 mod qualify;
 mod reference_agv;
 mod session;

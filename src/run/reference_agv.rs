@@ -80,7 +80,7 @@ impl ReferenceAgv {
             ..AgvConfig::default()
         };
         let time = TimeLimits {
-            drive: Duration::from_secs(10),
+            drive: Duration::from_secs(4),
             quiet: Duration::from_millis(200),
             settle: Duration::from_millis(300),
             reconnect: Duration::from_secs(20),
