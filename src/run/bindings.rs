@@ -44,9 +44,16 @@ pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) 
     }
     let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
     let standing = standing(judge, layout).ok_or("the vehicle does not say where it stands")?;
-    let course = layout
-        .assign(&test.course, &standing)
-        .map_err(|error| error.to_string())?;
+    let course = if test.course.directed {
+        let layout = layout.clone().directed();
+        if layout.edges().next().is_none() {
+            return Err("no edge of the layout says its direction at a junction".to_owned());
+        }
+        layout.assign(&test.course, &standing)
+    } else {
+        layout.assign(&test.course, &standing)
+    };
+    let course = course.map_err(|error| error.to_string())?;
     let mut course = course.bindings();
     let factsheet = judge.ground().bindings.get("device").and_then(|device| device.get("factsheet"));
     Pace::of(factsheet).set(&mut course);

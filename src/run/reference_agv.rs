@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 
 use super::header::Subject;
-use crate::course::Layout;
+use crate::course::{Edge, Layout};
 use crate::pack::{Pack, Role};
 use crate::profile::TimeLimits;
 use crate::reference::agv::{AgvConfig, LayoutNode, OnboardMap};
@@ -73,7 +73,7 @@ impl ReferenceAgv {
             rotation_speed: 8.0 * std::f64::consts::PI,
             keep_alive: Duration::from_secs(10),
             reconnect_delay: Duration::from_millis(300),
-            state_interval: Duration::from_secs(5),
+            state_interval: Duration::from_secs(3),
             visualization_interval: Some(Duration::from_secs(1)),
             // Few, so that an order with too many of them can be written down.
             max_nodes: 12,
@@ -95,14 +95,20 @@ impl ReferenceAgv {
         }
     }
 
-    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well: one that can
-    /// stop on nodes only.
+    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well: one that follows a
+    /// line and can stop on nodes only, and one that plans its own way, follows trajectories and keeps to corridors.
     #[must_use]
     pub fn variants(pack: &Pack) -> Vec<Self> {
         let usual = Self::new(pack);
-        let mut node_bound = usual.clone();
-        node_bound.config.stops_between_nodes = false;
-        vec![usual, node_bound]
+        let mut line_guided = usual.clone();
+        line_guided.layout = usual.layout.clone().with_directions();
+        line_guided.config.stops_between_nodes = false;
+        let branch = |edge: &Edge| Some((edge.start.clone(), edge.direction.clone()?, edge.end.clone()));
+        line_guided.config.branches = Some(line_guided.layout.edges().filter_map(branch).collect());
+        let mut free = usual.clone();
+        free.config.trajectories = true;
+        free.config.plans = true;
+        vec![usual, line_guided, free]
     }
 
     /// What a profile would state about it.
@@ -120,8 +126,9 @@ impl ReferenceAgv {
             ("no-charger-on-course", true),
             ("carries-load", true),
             ("map-hash", true),
-            ("line-guided", false),
-            ("free-navigation", true),
+            ("line-guided", self.config.branches.is_some()),
+            ("free-navigation", self.config.plans),
+            ("room-beside-edges", true),
         ]
         .into_iter()
         .map(|(name, said)| (name.to_owned(), said))
@@ -149,7 +156,7 @@ impl ReferenceAgv {
     }
 
     /// The hooks it understands as commands.
-    pub const HOOKS: [&'static str; 14] = [
+    pub const HOOKS: [&'static str; 18] = [
         "power-cycle",
         "shutdown",
         "start",
@@ -164,5 +171,9 @@ impl ReferenceAgv {
         "enable-map",
         "enter-field",
         "leave-field",
+        "move-to",
+        "push-out",
+        "place-obstacle",
+        "remove-obstacle",
     ];
 }

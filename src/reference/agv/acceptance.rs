@@ -273,7 +273,8 @@ impl Agv {
                 self.book.base_end = (node.id.clone(), node.sequence_id);
             }
             self.push_actions(node.actions.clone(), Origin::Node(node.sequence_id));
-            if let Some(place) = self.place(&node) {
+            let edge = self.book.edges.back().filter(|edge| edge.sequence_id + 1 == node.sequence_id);
+            if let Some(place) = self.arrives_at(edge, &node) {
                 self.book.nodes.push_back(Stop { node, place });
             }
         }

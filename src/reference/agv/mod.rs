@@ -24,6 +24,7 @@ mod instant;
 mod maps;
 mod motion;
 mod order_message;
+mod path;
 mod progress;
 mod read;
 mod rejection;
@@ -31,6 +32,7 @@ mod report;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use crate::clock::{Moment, Stamp};
@@ -83,13 +85,15 @@ struct Holds {
     emergency: bool,
     /// Something stands in the protective field.
     field: bool,
+    /// It is outside its corridor.
+    outside: bool,
     /// Nothing at all (`pause-not-lifted` only).
     stuck: bool,
 }
 
 impl Holds {
     fn any(self) -> bool {
-        self.pause || self.button || self.emergency || self.field || self.stuck
+        self.pause || self.button || self.emergency || self.field || self.outside || self.stuck
     }
 }
 
@@ -117,6 +121,10 @@ pub struct Agv {
     holds: Holds,
     mode: Mode,
     loads: Vec<Load>,
+    /// Edges on which something stands.
+    obstacles: BTreeSet<String>,
+    /// It has left its corridor and was not put back yet.
+    strayed: bool,
     charging: bool,
     /// It has not found its pose (`init-position-uninitialized` only).
     lost: bool,
@@ -172,6 +180,8 @@ impl Agv {
             holds: Holds::default(),
             mode: Mode::Automatic,
             loads: Vec::new(),
+            obstacles: BTreeSet::new(),
+            strayed: false,
             charging: false,
             lost: false,
             claimed_map: None,
