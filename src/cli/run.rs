@@ -77,8 +77,9 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let device = &effective.profile.device;
     let built_in =
         arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
-    if !built_in && !arguments.fault.is_empty() {
-        let title = "`--fault` gives the built-in reference AGV a defect, and another device is tested here";
+    let altered = !arguments.fault.is_empty() || arguments.vehicle != crate::run::Vehicle::default();
+    if !built_in && altered {
+        let title = "`--fault` and `--vehicle` are for the built-in reference AGV, and another device is tested here";
         return Err(Diagnostic::whole("usage", title).into());
     }
     check_faults(&arguments.fault)?;
@@ -170,7 +171,7 @@ impl Job {
     }
 
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let device = ReferenceAgv::new(&self.pack);
+        let device = ReferenceAgv::of(arguments.vehicle, &self.pack);
         let utc = WallClock::start().now().utc;
         let bundle = self.bundle(&device.subject, utc)?;
         let writer = bundle
@@ -203,7 +204,7 @@ impl Job {
     }
 
     async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let device = ReferenceAgv::new(&self.pack);
+        let device = ReferenceAgv::of(arguments.vehicle, &self.pack);
         let mut options = BenchOptions::loopback(device.subject.published(&self.pack));
         let bench = &self.effective.profile.bench;
         if arguments.device.listen.is_some() {

@@ -26,6 +26,6 @@ pub use header::{HeaderParts, Subject, tool};
 pub use library::Library;
 pub use outputs::{OutputError, sources, write_all, write_result};
 pub use qualify::{Decider, Kill, Qualification, decided, qualify, qualify_tests};
-pub use reference_agv::ReferenceAgv;
+pub use reference_agv::{ReferenceAgv, Vehicle};
 pub use session::{End, Progress, Setup, run};
 pub use virtual_run::{Finished, Silent, VirtualRun, run_silently, run_virtually};

@@ -24,6 +24,23 @@ pub struct ReferenceAgv {
     pub time: TimeLimits,
 }
 
+/// Kinds of reference AGVs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Vehicle {
+    /// On virtual lines, as most vehicles are
+    #[default]
+    Usual,
+    /// Follows a line on the floor, knows no coordinates, and stops on nodes only
+    LineGuided,
+    /// Plans its own way, follows trajectories, and keeps to corridors
+    Free,
+}
+
+impl Vehicle {
+    /// Every kind; the usual one first.
+    pub const ALL: [Self; 3] = [Self::Usual, Self::LineGuided, Self::Free];
+}
+
 impl ReferenceAgv {
     /// A reference AGV for a protocol version.
     #[must_use]
@@ -99,16 +116,32 @@ impl ReferenceAgv {
     /// line and can stop on nodes only, and one that plans its own way, follows trajectories and keeps to corridors.
     #[must_use]
     pub fn variants(pack: &Pack) -> Vec<Self> {
-        let usual = Self::new(pack);
-        let mut line_guided = usual.clone();
-        line_guided.layout = usual.layout.clone().with_directions();
-        line_guided.config.stops_between_nodes = false;
+        Vehicle::ALL.into_iter().map(|vehicle| Self::of(vehicle, pack)).collect()
+    }
+
+    /// One of them.
+    #[must_use]
+    pub fn of(vehicle: Vehicle, pack: &Pack) -> Self {
+        let mut this = Self::new(pack);
+        match vehicle {
+            Vehicle::Usual => {}
+            Vehicle::LineGuided => this.follow_a_line(),
+            Vehicle::Free => {
+                this.config.trajectories = true;
+                this.config.plans = true;
+            }
+        }
+        this
+    }
+
+    fn follow_a_line(&mut self) {
+        self.layout = self.layout.clone().with_directions();
+        self.config.stops_between_nodes = false;
+        // It knows no coordinates, so it has no use for a pose or a map.
+        let without = ["initPosition", "downloadMap", "enableMap", "deleteMap"];
+        self.config.without_actions = without.map(str::to_owned).into();
         let branch = |edge: &Edge| Some((edge.start.clone(), edge.direction.clone()?, edge.end.clone()));
-        line_guided.config.branches = Some(line_guided.layout.edges().filter_map(branch).collect());
-        let mut free = usual.clone();
-        free.config.trajectories = true;
-        free.config.plans = true;
-        vec![usual, line_guided, free]
+        self.config.branches = Some(self.layout.edges().filter_map(branch).collect());
     }
 
     /// What a profile would state about it.

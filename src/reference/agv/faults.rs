@@ -197,7 +197,8 @@ faults! {
     MaxHeightIgnored "max-height-ignored" ["ORD-MSG-21", "OPT-02"] "Accepts edges too low for it.";
     TrajectoryCut "trajectory-cut" ["ORD-MSG-26"] "Drives straight to the end of an edge that has a trajectory.";
     TangentIgnored "tangent-ignored" ["ORD-MSG-23"] "Looks the same way all along a curve.";
-    DirectionIgnored "direction-ignored" ["ORD-MSG-27", "NODE-03"] "Takes the same branch at a junction whatever direction it is given.";
+    DirectionIgnored "direction-ignored" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the same branch at a junction whatever direction it is given.";
+    DirectionMistaken "direction-mistaken" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the branch beside the one it is told.";
     CorridorOverrun "corridor-overrun" ["CORR-01", "CORR-03"] "Drives round an obstacle as if its corridor were twice as wide.";
     CorridorContourIgnored "corridor-contour-ignored" ["CORR-03", "CORR-01"] "Keeps only its centre inside a corridor that is meant for its contour.";
     CorridorExitDrivenOn "corridor-exit-driven-on" ["CORR-06"] "Drives on when it finds itself outside its corridor.";

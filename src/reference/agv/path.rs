@@ -165,11 +165,12 @@ impl Agv {
     /// Where a branch of the line leads.
     fn branch(&self, start: &str, direction: &str) -> Option<&str> {
         let branches = self.config.branches.as_ref()?;
-        let mut from_here = branches.iter().filter(|(from, ..)| from == start);
-        let found = if self.faults.has(F::DirectionIgnored) {
-            from_here.next()
-        } else {
-            from_here.find(|(_, other, _)| other == direction)
+        let mut from_here = branches.iter().filter(|(from, ..)| from == start).cycle().take(branches.len());
+        let told = |(_, other, _): &&(String, String, String)| other == direction;
+        let found = match () {
+            () if self.faults.has(F::DirectionIgnored) => from_here.next(),
+            () if self.faults.has(F::DirectionMistaken) => from_here.find(told).and_then(|_| from_here.next()),
+            () => from_here.find(told),
         };
         found.map(|(.., end)| end.as_str())
     }
@@ -216,7 +217,8 @@ impl Agv {
         let from = stop(edge.sequence_id.checked_sub(1)?).or_else(|| known(&edge.start))?;
         let to = stop(edge.sequence_id + 1)?;
         let mut points = vec![from, to];
-        if self.faults.has(F::PlannedPathChanges) && self.book.entered {
+        let entered = self.book.entered && self.book.edge_ahead() == Some(edge);
+        if entered && self.faults.has(F::PlannedPathChanges) {
             points.insert(1, ((from.0 + to.0) / 2.0 + 1.0, (from.1 + to.1) / 2.0 + 1.0));
         }
         if self.faults.has(F::PlannedPathWithoutEnds) {
