@@ -96,7 +96,9 @@ fn read_points(trajectory: &Value, flaws: &mut Vec<Flaw>) -> Vec<ControlPoint> {
         match (number(point, "x"), number(point, "y"), weight) {
             (Some(x), Some(y), Some(weight)) => points.push(ControlPoint { x, y, weight }),
             (Some(_), Some(_), None) => {
-                flaws.push(Flaw::Member(format!("controlPoints[{at}].weight is no number of at least 0")));
+                flaws.push(Flaw::Member(format!(
+                    "controlPoints[{at}].weight is no number of at least 0"
+                )));
             }
             _ => flaws.push(Flaw::Member(format!("controlPoints[{at}] has no x and y"))),
         }
@@ -173,7 +175,11 @@ impl Curve {
             for at in (round..=self.degree).rev() {
                 let low = self.knots[at + span - self.degree];
                 let high = self.knots[at + 1 + span - round];
-                let part = if high > low { (parameter - low) / (high - low) } else { 0.0 };
+                let part = if high > low {
+                    (parameter - low) / (high - low)
+                } else {
+                    0.0
+                };
                 let before = work[at - 1];
                 for (value, before) in work[at].iter_mut().zip(before) {
                     *value = (1.0 - part) * before + part * *value;
@@ -272,7 +278,11 @@ impl Path {
     #[must_use]
     pub fn at(&self, made: f64) -> Option<Spot> {
         let last = self.points.len().checked_sub(2)?;
-        let at = self.made.partition_point(|there| *there <= made).saturating_sub(1).min(last);
+        let at = self
+            .made
+            .partition_point(|there| *there <= made)
+            .saturating_sub(1)
+            .min(last);
         let ((ax, ay), (bx, by)) = (self.points[at], self.points[at + 1]);
         let part = ((made - self.made[at]) / (self.made[at + 1] - self.made[at])).clamp(0.0, 1.0);
         Some(Spot {
@@ -348,9 +358,11 @@ mod tests {
 
     #[test]
     fn a_polygon_is_a_curve_of_degree_one() {
-        let path = path(&json!({ "degree": 1, "knotVector": [0, 0, 0.5, 1, 1], "controlPoints": [
+        let path = path(
+            &json!({ "degree": 1, "knotVector": [0, 0, 0.5, 1, 1], "controlPoints": [
             { "x": 0, "y": 0 }, { "x": 2, "y": 0 }, { "x": 2, "y": 1 },
-        ] }));
+        ] }),
+        );
         assert_eq!(path.points().collect::<Vec<_>>(), [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]);
         let beside = path.beside(1.0, 0.5).expect("a place");
         assert!(beside.left && (beside.distance - 0.5).abs() < 1e-9 && (beside.made - 1.0).abs() < 1e-9);
@@ -373,13 +385,19 @@ mod tests {
             (json!({ "controlPoints": [{ "x": 0 }] }), "has no x and y"),
             (json!({ "controlPoints": null }), "controlPoints is not"),
             (json!({ "knotVector": [0, "1"] }), "knotVector is not"),
-            (json!({ "knotVector": [0, 0, 1, 1] }), "3 control points of degree 2 need 6"),
+            (
+                json!({ "knotVector": [0, 0, 1, 1] }),
+                "3 control points of degree 2 need 6",
+            ),
             (json!({ "knotVector": [0, 0, 0, 2, 2, 2] }), "not within 0 to 1"),
             (json!({ "knotVector": [0, 0, 1, 0.5, 1, 1] }), "smaller than"),
         ] {
             let (curve, flaws) = broken(patch.clone());
             assert!(curve.is_none(), "{patch}");
-            assert!(flaws.iter().any(|flaw| flaw.to_string().contains(wanted)), "{patch}: {flaws:?}");
+            assert!(
+                flaws.iter().any(|flaw| flaw.to_string().contains(wanted)),
+                "{patch}: {flaws:?}"
+            );
         }
         let (curve, flaws) = broken(json!({ "degree": null, "knotVector": [0, 0, 0.5, 1, 1] }));
         assert!(curve.is_some());
@@ -391,8 +409,16 @@ mod tests {
         for (degree, knots, points) in [
             (1, json!([0, 0, 0]), json!([{ "x": 1, "y": 1 }])),
             (1, json!([1, 1, 1, 1]), json!([{ "x": 1, "y": 1 }, { "x": 2, "y": 1 }])),
-            (1, json!([0, 0, 1, 1]), json!([{ "x": 1, "y": 1, "weight": 0 }, { "x": 2, "y": 1, "weight": 0 }])),
-            (1, json!([0, 0, 1, 1]), json!([{ "x": 1e300, "y": 1 }, { "x": 2, "y": 1 }])),
+            (
+                1,
+                json!([0, 0, 1, 1]),
+                json!([{ "x": 1, "y": 1, "weight": 0 }, { "x": 2, "y": 1, "weight": 0 }]),
+            ),
+            (
+                1,
+                json!([0, 0, 1, 1]),
+                json!([{ "x": 1e300, "y": 1 }, { "x": 2, "y": 1 }]),
+            ),
         ] {
             let trajectory = json!({ "degree": degree, "knotVector": knots, "controlPoints": points });
             assert_eq!(Curve::read(&trajectory).0, None, "{trajectory}");

@@ -113,16 +113,22 @@ struct Places {
 impl Places {
     fn note(&mut self, order: &Value) {
         let id = order_of(order);
-        let at = self.orders.iter().position(|(other, _)| *other == id).unwrap_or_else(|| {
-            if self.orders.len() == ORDERS {
-                self.orders.pop_front();
-            }
-            self.orders.push_back((id, BTreeMap::new()));
-            self.orders.len() - 1
-        });
+        let at = self
+            .orders
+            .iter()
+            .position(|(other, _)| *other == id)
+            .unwrap_or_else(|| {
+                if self.orders.len() == ORDERS {
+                    self.orders.pop_front();
+                }
+                self.orders.push_back((id, BTreeMap::new()));
+                self.orders.len() - 1
+            });
         let places = &mut self.orders[at].1;
         for node in elements(order, "nodes").take(EDGES) {
-            let Some(sequence) = number(node, "sequenceId") else { continue };
+            let Some(sequence) = number(node, "sequenceId") else {
+                continue;
+            };
             let member = |name: &str| node.get("nodePosition")?.get(name)?.as_f64();
             let allowed = member("allowedDeviationXY").unwrap_or_default();
             let place = member("x").zip(member("y")).map(|(x, y)| (x, y, allowed));
@@ -163,7 +169,12 @@ impl Running for Ends {
                 continue;
             };
             let ends = [
-                (sequence.checked_sub(1).filter(|from| Some(*from) != last), start, START, "begins"),
+                (
+                    sequence.checked_sub(1).filter(|from| Some(*from) != last),
+                    start,
+                    START,
+                    "begins",
+                ),
                 (Some(sequence + 1), end, END, "ends"),
             ];
             for (node, point, reach, verb) in ends {
@@ -172,7 +183,8 @@ impl Running for Ends {
                 };
                 judged = true;
                 let distance = (x - point.0).hypot(y - point.1);
-                if distance > reach + allowed && self.said.len() < EDGES && self.said.insert((order.clone(), sequence)) {
+                if distance > reach + allowed && self.said.len() < EDGES && self.said.insert((order.clone(), sequence))
+                {
                     let message = format!("the trajectory of edge {sequence} {verb} {distance:.2} m from its node");
                     findings.push(broken("ORD-MSG-30", entry.seq(), message));
                 }
@@ -232,7 +244,8 @@ impl Running for Planned {
             let off = |(x, y)| first.beside(x, y).map_or(0.0, |beside| beside.distance);
             let farthest = path.points().map(off).fold(0.0, f64::max);
             if farthest > SAME && self.said.insert(sequence) {
-                let message = format!("the trajectory of edge {sequence} is {farthest:.2} m beside the one reported first");
+                let message =
+                    format!("the trajectory of edge {sequence} is {farthest:.2} m beside the one reported first");
                 findings.push(broken("STATE-15", entry.seq(), message));
             }
         }
@@ -257,21 +270,28 @@ mod tests {
     /// From n1 (0, 0) to n2 (4, 0) and n3 (4, 4), of which the last is planned; states with these trajectories.
     fn run(check: &str, corridor: bool, trajectories: &[(Value, Value)]) -> Vec<String> {
         let mut trace = Trace::subscriber();
-        let node = |number: u64, x: f64, y: f64| json!({
-            "nodeId": format!("n{number}"), "sequenceId": 2 * (number - 1), "released": number < 3, "actions": [],
-            "nodePosition": { "x": x, "y": y, "mapId": "hall" },
-        });
+        let node = |number: u64, x: f64, y: f64| {
+            json!({
+                "nodeId": format!("n{number}"), "sequenceId": 2 * (number - 1), "released": number < 3, "actions": [],
+                "nodePosition": { "x": x, "y": y, "mapId": "hall" },
+            })
+        };
         let mut edges = json!([{ "edgeId": "e1", "sequenceId": 1 }, { "edgeId": "e2", "sequenceId": 3 }]);
         if corridor {
             edges[0]["corridor"] = json!({ "leftWidth": 1.0, "rightWidth": 1.0 });
         }
         let nodes = [node(1, 0.0, 0.0), node(2, 4.0, 0.0), node(3, 4.0, 4.0)];
-        trace.sent("order", &json!({ "orderId": "o", "orderUpdateId": 0, "nodes": nodes, "edges": edges }));
+        trace.sent(
+            "order",
+            &json!({ "orderId": "o", "orderUpdateId": 0, "nodes": nodes, "edges": edges }),
+        );
         for (first, second) in trajectories {
-            trace.wait(1.0).state(&json!({ "orderId": "o", "lastNodeId": "n1", "lastNodeSequenceId": 0, "edgeStates": [
+            trace.wait(1.0).state(
+                &json!({ "orderId": "o", "lastNodeId": "n1", "lastNodeSequenceId": 0, "edgeStates": [
                 { "edgeId": "e1", "sequenceId": 1, "released": true, "trajectory": first },
                 { "edgeId": "e2", "sequenceId": 3, "released": false, "trajectory": second },
-            ] }));
+            ] }),
+            );
         }
         let outcome = trace.judge(check);
         let judged = if outcome.judged > 0 { "judged" } else { "nothing" };
@@ -297,12 +317,19 @@ mod tests {
         let with = |patch: Value| {
             let (mut first, second) = good();
             json_patch::merge(&mut first, &patch);
-            run("state/trajectory", false, &[(first.clone(), second.clone()), (first, second)])
+            run(
+                "state/trajectory",
+                false,
+                &[(first.clone(), second.clone()), (first, second)],
+            )
         };
         assert_eq!(with(json!({ "controlPoints": null })), ["ORD-MSG-28", "judged"]);
         assert_eq!(with(json!({ "degree": null })), ["ORD-MSG-28 warning", "judged"]);
         assert_eq!(with(json!({ "knotVector": [0, 0, 1] })), ["ORD-MSG-29", "judged"]);
-        assert_eq!(with(json!({ "knotVector": [0, 0.5, 0.2, 1] })), ["ORD-MSG-29 warning", "judged"]);
+        assert_eq!(
+            with(json!({ "knotVector": [0, 0.5, 0.2, 1] })),
+            ["ORD-MSG-29 warning", "judged"]
+        );
     }
 
     #[test]
@@ -310,18 +337,26 @@ mod tests {
         let ends = |first: &[(f64, f64)], second: &[(f64, f64)]| {
             run("state/trajectory-ends", false, &[(line(first), line(second))])
         };
-        assert_eq!(ends(&[(0.0, 0.0), (3.0, 0.0)], &[(4.0, 0.0), (4.0, 4.0)]), ["ORD-MSG-30", "judged"]);
-        assert_eq!(ends(&[(0.0, 0.0), (4.0, 0.0)], &[(4.0, 1.5), (4.0, 4.0)]), ["ORD-MSG-30", "judged"]);
+        assert_eq!(
+            ends(&[(0.0, 0.0), (3.0, 0.0)], &[(4.0, 0.0), (4.0, 4.0)]),
+            ["ORD-MSG-30", "judged"]
+        );
+        assert_eq!(
+            ends(&[(0.0, 0.0), (4.0, 0.0)], &[(4.0, 1.5), (4.0, 4.0)]),
+            ["ORD-MSG-30", "judged"]
+        );
         assert_eq!(ends(&[(2.0, 0.0), (4.0, 0.2)], &[(4.0, 0.5), (4.0, 4.0)]), ["judged"]);
     }
 
     #[test]
     fn a_path_may_be_cut_off_and_written_anew_but_not_lead_elsewhere() {
-        let then = |again: &[(f64, f64)], corridor| {
-            run("state/planned-path", corridor, &[good(), (line(again), good().1)])
-        };
+        let then =
+            |again: &[(f64, f64)], corridor| run("state/planned-path", corridor, &[good(), (line(again), good().1)]);
         assert_eq!(then(&[(1.0, 0.0), (2.0, 0.1), (4.0, 0.0)], false), ["judged"]);
-        assert_eq!(then(&[(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)], false), ["STATE-15", "judged"]);
+        assert_eq!(
+            then(&[(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)], false),
+            ["STATE-15", "judged"]
+        );
         assert_eq!(then(&[(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)], true), ["nothing"]);
         // The horizon may be planned anew.
         let other = (good().0, line(&[(4.0, 0.0), (6.0, 2.0), (4.0, 4.0)]));

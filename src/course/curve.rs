@@ -20,7 +20,11 @@ pub(super) fn waves(from: (f64, f64), to: (f64, f64)) -> Option<Value> {
     if length < 0.1 {
         return None;
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few bows, clamped")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few bows, clamped"
+    )]
     let bows = (length / BOW).round().clamp(1.0, 500.0) as u32;
     let count = f64::from(bows);
     let aside = ASIDE.min(SHARE * length / count);
@@ -61,12 +65,20 @@ mod tests {
 
     #[test]
     fn the_curve_is_sound_joins_the_nodes_smoothly_and_stays_within_half_a_metre() {
-        for (to, aside) in [((2.0, 0.0), 0.5), ((0.0, 1.0), 0.25), ((9.0, 0.0), 0.5), ((-3.0, 4.0), 0.5)] {
+        for (to, aside) in [
+            ((2.0, 0.0), 0.5),
+            ((0.0, 1.0), 0.25),
+            ((9.0, 0.0), 0.5),
+            ((-3.0, 4.0), 0.5),
+        ] {
             let (curve, flaws) = Curve::read(&waves((0.0, 0.0), to).expect("a curve"));
             assert_eq!(flaws, []);
             let path = curve.expect("a curve").path();
             let straight = crate::nurbs::Path::through([(0.0, 0.0), to]);
-            let off = path.points().filter_map(|(x, y)| straight.beside(x, y)).map(|beside| beside.distance);
+            let off = path
+                .points()
+                .filter_map(|(x, y)| straight.beside(x, y))
+                .map(|beside| beside.distance);
             assert!((off.fold(0.0, f64::max) - aside).abs() < 0.01, "{to:?}");
             let end = path.at(path.length()).expect("an end");
             assert!((end.x - to.0).hypot(end.y - to.1) < 1e-9);
@@ -74,7 +86,12 @@ mod tests {
             let headings: Vec<f64> = (0..=200)
                 .filter_map(|at| Some(path.at(step * f64::from(at))?.heading))
                 .collect();
-            assert!(headings.windows(2).all(|pair| ((pair[1] - pair[0] + PI).rem_euclid(2.0 * PI) - PI).abs() < 0.3), "{to:?}");
+            assert!(
+                headings
+                    .windows(2)
+                    .all(|pair| ((pair[1] - pair[0] + PI).rem_euclid(2.0 * PI) - PI).abs() < 0.3),
+                "{to:?}"
+            );
         }
         assert_eq!(waves((1.0, 1.0), (1.0, 1.0)), None);
         assert_eq!(Curve::read(&line((0.0, 0.0), (2.0, 1.0))).1, []);

@@ -55,7 +55,11 @@ pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) 
     };
     let course = course.map_err(|error| error.to_string())?;
     let mut course = course.bindings();
-    let factsheet = judge.ground().bindings.get("device").and_then(|device| device.get("factsheet"));
+    let factsheet = judge
+        .ground()
+        .bindings
+        .get("device")
+        .and_then(|device| device.get("factsheet"));
     Pace::of(factsheet).set(&mut course);
     Ok(Some(flat(course)))
 }
@@ -70,7 +74,12 @@ pub(super) fn own_bindings(
 ) -> Map<String, Value> {
     let mut own = Map::new();
     let mut time = Map::new();
-    time.extend(course.as_ref().and_then(between_looks).map(|millis| ("look".to_owned(), millis.into())));
+    time.extend(
+        course
+            .as_ref()
+            .and_then(between_looks)
+            .map(|millis| ("look".to_owned(), millis.into())),
+    );
     own.extend(course.map(|course| ("course".to_owned(), course)));
     let ids = fresh_names(test).into_iter().map(|name| {
         let id = format!("{run}-{number}-{name}");

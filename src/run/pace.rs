@@ -57,7 +57,11 @@ impl Pace {
     /// Adds `slowSpeed` and `slowRotation` to every edge of the course.
     pub(super) fn set(self, course: &mut Value) {
         let edges = course.get_mut("edges").and_then(Value::as_object_mut);
-        for members in edges.into_iter().flat_map(Map::values_mut).filter_map(Value::as_object_mut) {
+        for members in edges
+            .into_iter()
+            .flat_map(Map::values_mut)
+            .filter_map(Value::as_object_mut)
+        {
             let cap = members.get("maxSpeed").and_then(Value::as_f64);
             members.insert("slowSpeed".to_owned(), self.speed(cap).into());
             members.insert("slowRotation".to_owned(), share(self.turning.0, self.turning.1).into());

@@ -116,7 +116,10 @@ impl ReferenceAgv {
     /// line and can stop on nodes only, and one that plans its own way, follows trajectories and keeps to corridors.
     #[must_use]
     pub fn variants(pack: &Pack) -> Vec<Self> {
-        Vehicle::ALL.into_iter().map(|vehicle| Self::of(vehicle, pack)).collect()
+        Vehicle::ALL
+            .into_iter()
+            .map(|vehicle| Self::of(vehicle, pack))
+            .collect()
     }
 
     /// One of them.

@@ -80,7 +80,10 @@ fn half_width(context: &CheckContext<'_>) -> Option<f64> {
 fn lateral(lane: &Lane, pose: &Pose) -> Option<(f64, f64)> {
     let corridor = lane.demands.corridor?;
     let beside = lane.bend(pose)?.beside;
-    Some((beside.distance, if beside.left { corridor.left } else { corridor.right }))
+    Some((
+        beside.distance,
+        if beside.left { corridor.left } else { corridor.right },
+    ))
 }
 
 impl Running for Boundaries {
@@ -99,7 +102,11 @@ impl Running for Boundaries {
         let taken = if contour { half_width(context) } else { Some(0.0) };
         let Some(taken) = taken else { return false };
         if distance + taken > width + SLACK {
-            let what = if contour { "the contour of the vehicle" } else { "the vehicle" };
+            let what = if contour {
+                "the contour of the vehicle"
+            } else {
+                "the vehicle"
+            };
             let reach = distance + taken;
             findings.push(found(
                 now.seq,
@@ -129,7 +136,11 @@ impl Running for NextCorridor {
         else {
             return false;
         };
-        let lateral = now.ahead.as_ref().zip(now.pose.as_ref()).and_then(|(lane, pose)| lateral(lane, pose));
+        let lateral = now
+            .ahead
+            .as_ref()
+            .zip(now.pose.as_ref())
+            .and_then(|(lane, pose)| lateral(lane, pose));
         let Some((distance, width)) = lateral else {
             return false;
         };

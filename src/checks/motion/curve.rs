@@ -50,13 +50,19 @@ impl Running for Trajectory {
         let Some((lane, pose)) = now.lane.as_ref().zip(now.pose.as_ref()) else {
             return false;
         };
-        let Some(bend) = lane.bend(pose).filter(|bend| bend.is_mid_edge && lane.demands.corridor.is_none()) else {
+        let Some(bend) = lane
+            .bend(pose)
+            .filter(|bend| bend.is_mid_edge && lane.demands.corridor.is_none())
+        else {
             return false;
         };
         if bend.beside.distance <= NEAR {
             return bend.aside > ASIDE;
         }
-        let text = format!("the vehicle is {:.2} m away from the trajectory of its edge", bend.beside.distance);
+        let text = format!(
+            "the vehicle is {:.2} m away from the trajectory of its edge",
+            bend.beside.distance
+        );
         findings.push(found(now.seq, text));
         true
     }
@@ -80,7 +86,10 @@ impl Running for CurveOrientation {
         let Some((orientation, straight)) = orientation.zip(lane.heading()) else {
             return false;
         };
-        let Some(bend) = lane.bend(pose).filter(|bend| bend.is_mid_edge && bend.beside.distance <= NEAR) else {
+        let Some(bend) = lane
+            .bend(pose)
+            .filter(|bend| bend.is_mid_edge && bend.beside.distance <= NEAR)
+        else {
             return false;
         };
         let turns_for_node = lane.to.place.as_ref().is_none_or(|place| place.theta.is_some());

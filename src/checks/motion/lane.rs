@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use serde_json::Value;
 
 use crate::checks::orders::number;
-use crate::nurbs::{Beside, Curve, Path};
 use crate::checks::traffic::{elements, text};
+use crate::nurbs::{Beside, Curve, Path};
 
 /// An angle brought into -π … π.
 pub(super) fn wrapped(angle: f64) -> f64 {
@@ -207,7 +207,11 @@ impl Lane {
     /// Where a position is beside the trajectory.
     pub fn bend(&self, pose: &super::way::Pose) -> Option<Bend> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
-        let path = self.demands.path.as_ref().filter(|_| pose.map == from.map && pose.map == to.map)?;
+        let path = self
+            .demands
+            .path
+            .as_ref()
+            .filter(|_| pose.map == from.map && pose.map == to.map)?;
         let beside = path.beside(pose.x, pose.y)?;
         let spot = path.at(beside.made)?;
         let straight = Path::through([(from.x, from.y), (to.x, to.y)]);

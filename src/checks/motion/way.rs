@@ -216,7 +216,9 @@ impl Way {
             found.map(|element| element.released)
         };
         let behind = on(&edges, sequence.wrapping_sub(1)) == Some(true);
-        let listed = on(&nodes, sequence + 2).zip(on(&edges, sequence + 1)).filter(|_| !behind);
+        let listed = on(&nodes, sequence + 2)
+            .zip(on(&edges, sequence + 1))
+            .filter(|_| !behind);
         let ahead = listed.and_then(|_| self.lane(order, update, node));
         let lane = ahead.clone().filter(|_| listed == Some((true, true)));
         let is_ahead = |element: &crate::checks::orders::Element| element.released && element.sequence > *sequence;

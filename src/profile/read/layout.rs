@@ -49,7 +49,12 @@ impl Reader<'_> {
     }
 
     pub(super) fn edge(&mut self, item: &Spanned<DeValue<'_>>) -> Option<LayoutEdge> {
-        let members = self.members("an edge", item, &["id", "from", "to", "direction"], &["id", "from", "to"])?;
+        let members = self.members(
+            "an edge",
+            item,
+            &["id", "from", "to", "direction"],
+            &["id", "from", "to"],
+        )?;
         let id = self.text("the id of an edge", members.get("id")?);
         let start = self.text("the start of an edge", members.get("from")?);
         let end = self.text("the end of an edge", members.get("to")?);

@@ -94,6 +94,7 @@ impl Agv {
         self.downloads.clear();
         self.holds = super::Holds::default();
         self.strayed = false;
+        self.locked = false;
         self.mode = Mode::Automatic;
         self.charging = false;
         self.report = super::Report::default();

@@ -172,7 +172,10 @@ impl Agv {
             ("corridor", "order.edges.corridor"),
             ("direction", "order.edges.direction"),
         ];
-        let special = special.iter().filter(|(field, _)| self.config.uses(field)).map(|(_, name)| name);
+        let special = special
+            .iter()
+            .filter(|(field, _)| self.config.uses(field))
+            .map(|(_, name)| name);
         let parameters: Vec<Value> = usual
             .iter()
             .chain(special)

@@ -171,6 +171,7 @@ faults! {
     OrderErrorAsValidation "order-error-as-validation" ["ORD-REJ-06"] "Reports orders it cannot perform as malformed.";
     OrderErrorFatal "order-error-fatal" ["ORD-REJ-06"] "Reports orders it cannot perform as FATAL.";
     OrderErrorUnreferenced "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform.";
+    OrderErrorLocks "order-error-locks" ["ORD-13", "ORD-REJ-08"] "Refuses the order that follows one it could not perform.";
     OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a moment.";
     OutdatedUpdateTakenOver "outdated-update-taken-over" ["ORD-REJ-10"] "Goes back to an outdated order update.";
     OutdatedUpdateDropsOrder "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives.";
@@ -189,7 +190,7 @@ faults! {
     EdgeOrientationIgnored "edge-orientation-ignored" ["ORD-MSG-22", "OPT-01"] "Drives forwards whatever orientation the edge asks for.";
     MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
     TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there.";
-    AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
+    AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with x the wrong way round.";
     DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05"] "Reports its orientation in degrees.";
     VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 

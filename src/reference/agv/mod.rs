@@ -123,6 +123,8 @@ pub struct Agv {
     loads: Vec<Load>,
     /// Edges on which something stands.
     obstacles: BTreeSet<String>,
+    /// It takes no order now (`order-error-locks` only).
+    locked: bool,
     /// It has left its corridor and was not put back yet.
     strayed: bool,
     charging: bool,
@@ -181,6 +183,7 @@ impl Agv {
             mode: Mode::Automatic,
             loads: Vec::new(),
             obstacles: BTreeSet::new(),
+            locked: false,
             strayed: false,
             charging: false,
             lost: false,

@@ -275,7 +275,11 @@ mod tests {
     #[test]
     fn a_path_is_followed_looking_along_it_or_always_the_same_way() {
         let path = Path::through([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)]);
-        for (facing, theta) in [(Facing::Along(0.0), PI / 2.0), (Facing::Along(PI), -PI / 2.0), (Facing::Fixed(0.3), 0.3)] {
+        for (facing, theta) in [
+            (Facing::Along(0.0), PI / 2.0),
+            (Facing::Along(PI), -PI / 2.0),
+            (Facing::Fixed(0.3), 0.3),
+        ] {
             let mut motion = standing();
             motion.follow(Moment::START, path.clone(), 2.0, facing, true);
             let pose = motion.pose(after(1500));

@@ -41,17 +41,29 @@ const POINTS: u32 = 48;
 impl Agv {
     /// The path over the rest of an edge with a trajectory, from where the vehicle is; `None` on a straight edge.
     pub(super) fn curve_ahead(&self, edge: &Edge, stop: &Stop) -> Option<Path> {
-        let trajectory = edge.trajectory.as_ref().filter(|_| !self.faults.has(F::TrajectoryCut))?;
+        let trajectory = edge
+            .trajectory
+            .as_ref()
+            .filter(|_| !self.faults.has(F::TrajectoryCut))?;
         let path = match self.detour(edge) {
             Some(lateral) => beside(&trajectory.path, lateral),
             None => trajectory.path.clone(),
         };
         let pose = self.motion.pose(self.moment());
         let beside = path.beside(pose.x, pose.y)?;
-        let rest = if self.book.entered { path.rest(beside.made) } else { path };
-        let off = rest.at(0.0).is_none_or(|begin| pose.distance(begin.x, begin.y) > ON_PATH);
+        let rest = if self.book.entered {
+            path.rest(beside.made)
+        } else {
+            path
+        };
+        let off = rest
+            .at(0.0)
+            .is_none_or(|begin| pose.distance(begin.x, begin.y) > ON_PATH);
         let begin = off.then_some((pose.x, pose.y));
-        let way = begin.into_iter().chain(rest.points()).chain([(stop.place.x, stop.place.y)]);
+        let way = begin
+            .into_iter()
+            .chain(rest.points())
+            .chain([(stop.place.x, stop.place.y)]);
         Some(Path::through(way))
     }
 
@@ -165,7 +177,11 @@ impl Agv {
     /// Where a branch of the line leads.
     fn branch(&self, start: &str, direction: &str) -> Option<&str> {
         let branches = self.config.branches.as_ref()?;
-        let mut from_here = branches.iter().filter(|(from, ..)| from == start).cycle().take(branches.len());
+        let mut from_here = branches
+            .iter()
+            .filter(|(from, ..)| from == start)
+            .cycle()
+            .take(branches.len());
         let told = |(_, other, _): &&(String, String, String)| other == direction;
         let found = match () {
             () if self.faults.has(F::DirectionIgnored) => from_here.next(),
@@ -233,7 +249,10 @@ impl Agv {
         if !self.faults.has(F::KnotsTooFew) {
             knots.push(1.0);
         }
-        let points: Vec<Value> = points.iter().map(|(x, y)| json!({ "x": x, "y": y, "weight": 1.0 })).collect();
+        let points: Vec<Value> = points
+            .iter()
+            .map(|(x, y)| json!({ "x": x, "y": y, "weight": 1.0 }))
+            .collect();
         Some(json!({ "degree": 1, "knotVector": knots, "controlPoints": points }))
     }
 }

@@ -233,7 +233,9 @@ impl Agv {
     fn course(&self, edge: Option<&Edge>, stop: &Stop, curve: Option<&Path>) -> (f64, bool) {
         let pose = self.motion.pose(self.moment());
         let straight = (stop.place.y - pose.y).atan2(stop.place.x - pose.x);
-        let begin = curve.filter(|_| !self.faults.has(F::TangentIgnored)).and_then(|curve| curve.at(0.0));
+        let begin = curve
+            .filter(|_| !self.faults.has(F::TangentIgnored))
+            .and_then(|curve| curve.at(0.0));
         let heading = begin.map_or(straight, |begin| begin.heading);
         let wanted = edge.filter(|_| !self.faults.has(F::EdgeOrientationIgnored));
         let relative = wanted.and_then(|edge| {
@@ -246,11 +248,7 @@ impl Agv {
             })
         });
         let backwards = relative.is_some_and(|relative| motion::wrapped(relative).abs() > FRAC_PI_2);
-        let theta = if backwards {
-            heading + PI
-        } else {
-            heading
-        };
+        let theta = if backwards { heading + PI } else { heading };
         (motion::wrapped(theta), backwards)
     }
 

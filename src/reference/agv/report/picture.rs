@@ -210,10 +210,10 @@ impl Agv {
         } else {
             pose.theta
         };
-        let y = if self.faults.has(F::AxesMirrored) {
-            -pose.y
+        let x = if self.faults.has(F::AxesMirrored) {
+            -pose.x
         } else {
-            pose.y
+            pose.x
         };
         let map_id = match () {
             () if self.faults.has(F::PositionMapStale) => "factory-default".to_owned(),
@@ -230,8 +230,8 @@ impl Agv {
         json!({
             "positionInitialized": !self.lost,
             "localizationScore": 0.98,
-            "x": number(pose.x),
-            "y": number(y),
+            "x": number(x),
+            "y": number(pose.y),
             "theta": theta,
             "mapId": map_id,
         })
