@@ -17,6 +17,7 @@ pub mod journal;
 pub mod judge;
 pub mod link;
 pub mod maps;
+pub mod nurbs;
 pub mod pack;
 pub mod pattern;
 pub mod profile;

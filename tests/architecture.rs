@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Modules by layer; an arrow may point to the same layer or down, never up.
-const LAYERS: [(&str, u8); 24] = [
+const LAYERS: [(&str, u8); 25] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -34,6 +34,7 @@ const LAYERS: [(&str, u8); 24] = [
     ("diagnostic", 0),
     ("clock", 0),
     ("yaml", 0),
+    ("nurbs", 0),
     ("lib", 7),
 ];
 

@@ -37,7 +37,6 @@ pub(super) const SCHEMA: Check = Check {
         "ERR-05",
         "INFO-01",
         "MAP-12",
-        "ORD-MSG-28",
         "FACT-02",
         "FACT-03",
         "FACT-04",
@@ -184,7 +183,8 @@ fn of_field(topic: &str, path: &[&str], kind: FindingKind) -> Option<&'static st
         ("state", "maps") => Some("MAP-12"),
         ("state", "batteryState") => Some("STATE-MSG-15"),
         ("state", "agvPosition" | "velocity") => Some("STATE-MSG-05"),
-        ("state", "edgeStates") if path.contains(&"trajectory") => Some("ORD-MSG-28"),
+        // A check of its own tells apart what is wrong with a trajectory.
+        ("state", "edgeStates") if path.contains(&"trajectory") => None,
         ("state", "nodeStates" | "edgeStates") => Some("STATE-MSG-13"),
         ("factsheet", _) if path.len() == 1 && missing => Some("FACT-02"),
         ("factsheet", "typeSpecification") => Some("FACT-03"),

@@ -26,6 +26,7 @@ mod topic;
 #[cfg(test)]
 mod trace;
 mod traffic;
+mod trajectory;
 
 use std::time::Duration;
 
@@ -118,7 +119,7 @@ pub fn find(name: &str) -> Option<&'static Check> {
     REGISTRY.iter().find(|check| check.name == name)
 }
 
-static REGISTRY: [Check; 35] = [
+static REGISTRY: [Check; 43] = [
     message::SCHEMA,
     message::ENCODING,
     header_id::ID_RISES,
@@ -144,12 +145,20 @@ static REGISTRY: [Check; 35] = [
     state_values::POSITION_RANGE,
     state_values::IDENTIFIERS,
     state_values::DRIVING,
+    trajectory::TRAJECTORY,
+    trajectory::TRAJECTORY_ENDS,
+    trajectory::PLANNED_PATH,
     errors::PERSIST,
     factsheet::CONSISTENCY,
     motion::EDGE_SPEED,
     motion::EDGE_ROTATION_SPEED,
     motion::EDGE_ORIENTATION,
     motion::ROTATION_PLACE,
+    motion::TRAJECTORY,
+    motion::CURVE_ORIENTATION,
+    motion::CORRIDOR,
+    motion::CORRIDOR_POINT,
+    motion::NEXT_CORRIDOR,
     motion::NODE_TOLERANCE,
     motion::NODE_THETA,
     motion::AXES,

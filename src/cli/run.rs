@@ -77,12 +77,12 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let device = &effective.profile.device;
     let built_in =
         arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
-    if !built_in && !arguments.fault.is_empty() {
-        let title = "`--fault` gives the built-in reference AGV a defect, and another device is tested here";
-        return Err(Diagnostic::whole("usage", title).into());
-    }
-    if !built_in && !arguments.tolerance.is_empty() {
-        let title = "`--tolerance` gives the built-in reference AGV a liberty, and another device is tested here";
+    let altered = !arguments.fault.is_empty()
+        || !arguments.tolerance.is_empty()
+        || arguments.vehicle != crate::run::Vehicle::default();
+    if !built_in && altered {
+        let title = "`--fault`, `--tolerance` and `--vehicle` are for the built-in reference AGV, and another device is \
+                     tested here";
         return Err(Diagnostic::whole("usage", title).into());
     }
     check_faults(&arguments.fault)?;
@@ -174,7 +174,7 @@ impl Job {
     }
 
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let mut device = ReferenceAgv::new(&self.pack);
+        let mut device = ReferenceAgv::of(arguments.vehicle, &self.pack);
         tolerate(&mut device, &arguments.tolerance)?;
         let utc = WallClock::start().now().utc;
         let bundle = self.bundle(&device.subject, utc)?;
@@ -208,7 +208,7 @@ impl Job {
     }
 
     async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let mut device = ReferenceAgv::new(&self.pack);
+        let mut device = ReferenceAgv::of(arguments.vehicle, &self.pack);
         tolerate(&mut device, &arguments.tolerance)?;
         let mut options = BenchOptions::loopback(device.subject.published(&self.pack));
         let bench = &self.effective.profile.bench;

@@ -83,6 +83,8 @@ pub struct Edge {
     pub max_height: Option<f64>,
     /// Metres.
     pub min_height: Option<f64>,
+    /// What a line-guided vehicle is told at the junction where the edge begins.
+    pub direction: Option<String>,
     /// NURBS, as the layout has it.
     pub trajectory: Option<Value>,
 }
@@ -105,6 +107,9 @@ impl Edge {
         }
         if let Some(allowed) = self.rotation_allowed {
             value.insert("rotationAllowed".into(), allowed.into());
+        }
+        if let Some(direction) = &self.direction {
+            value.insert("direction".into(), direction.as_str().into());
         }
         if let Some(trajectory) = &self.trajectory {
             value.insert("trajectory".into(), trajectory.clone());
@@ -171,6 +176,7 @@ impl Layout {
             id: edge.id.clone(),
             start: edge.start.clone(),
             end: edge.end.clone(),
+            direction: edge.direction.clone(),
             ..Edge::default()
         });
         Self::assemble(nodes.collect(), edges.collect(), Vec::new())
@@ -251,6 +257,29 @@ impl Layout {
         for edge in self.edges.values_mut() {
             edge.max_speed = Some(edge.max_speed.map_or(cap, |speed| speed.min(cap)));
         }
+        self
+    }
+
+    /// The same layout for a line-guided vehicle: every edge says by the points of the compass where it leaves.
+    #[must_use]
+    pub fn with_directions(mut self) -> Self {
+        const COMPASS: [&str; 8] = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"];
+        for edge in self.edges.values_mut() {
+            let ends = self.nodes.get(&edge.start).zip(self.nodes.get(&edge.end));
+            edge.direction = ends.map(|(start, end)| {
+                let eighth = ((end.y - start.y).atan2(end.x - start.x) / std::f64::consts::FRAC_PI_4).rem_euclid(8.0);
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 8")]
+                let at = eighth.round() as usize;
+                COMPASS[at % COMPASS.len()].to_owned()
+            });
+        }
+        self
+    }
+
+    /// The same layout without edges that do not say their direction.
+    #[must_use]
+    pub fn directed(mut self) -> Self {
+        self.edges.retain(|_, edge| edge.direction.is_some());
         self
     }
 

@@ -395,6 +395,7 @@ impl Reader<'_> {
             rotation_allowed: properties.rotation_allowed,
             max_height: properties.max_height,
             min_height: properties.min_height,
+            direction: None,
             trajectory: properties.trajectory.clone(),
         });
     }

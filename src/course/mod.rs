@@ -5,6 +5,7 @@
 //! beginning where the vehicle stands. Building orders from a [`Course`] is left to the engine.
 
 mod assign;
+mod curve;
 mod layout;
 mod lif;
 #[cfg(test)]
@@ -26,6 +27,8 @@ pub struct CourseNeed {
     pub nodes: Vec<String>,
     /// Pairs of names that must be joined by an edge.
     pub edges: Vec<(String, String)>,
+    /// Whether every edge must say in which direction it leaves a junction.
+    pub directed: bool,
 }
 
 impl Layout {
@@ -151,8 +154,8 @@ impl Course {
         self.nodes.iter().map(|(name, node)| (name.as_str(), node))
     }
 
-    /// What is known of an edge, with `heading`, the direction of the straight line from node to node, and `back`,
-    /// the direction back, both in radians against the map.
+    /// What is known of an edge, with `length` of the straight line from node to node in metres, `heading`, its
+    /// direction, and `back`, the direction back, both in radians against the map; `line` and `curve` are trajectories.
     fn edge_value(&self, from: &str, to: &str, edge: &Edge) -> Value {
         let mut value = edge.value();
         let ends = self.nodes.get(from).zip(self.nodes.get(to));
@@ -161,8 +164,12 @@ impl Course {
         {
             let heading = (end.y - start.y).atan2(end.x - start.x);
             let back = (start.y - end.y).atan2(start.x - end.x);
+            members.insert("length".into(), start.distance(end.x, end.y).into());
             members.insert("heading".into(), heading.into());
             members.insert("back".into(), back.into());
+            let (from, to) = ((start.x, start.y), (end.x, end.y));
+            members.insert("line".into(), curve::line(from, to));
+            members.extend(curve::waves(from, to).map(|curve| ("curve".to_owned(), curve)));
         }
         value
     }

@@ -139,8 +139,9 @@ impl RouteBuilder<'_> {
             "actions": actions,
         });
         if let Value::Object(built) = &mut built {
-            // What else the layout knows of an edge is optional in an order: only a speed cap is worth sending.
-            built.extend(members(edge, &["maxSpeed"]));
+            // What else the layout knows of an edge is optional in an order: only a speed cap is worth sending, and
+            // what a line-guided vehicle cannot do without.
+            built.extend(members(edge, &["maxSpeed", "direction"]));
         }
         Ok(built)
     }

@@ -106,6 +106,11 @@ pub const STATEMENTS: &[Statement] = &[
         name: "charges",
         doc: "The vehicle can charge on the course.",
     },
+    Statement {
+        name: "room-beside-edges",
+        doc: "A metre of free floor lies on both sides of every edge of the course, so that curves may be ordered and \
+              obstacles driven round.",
+    },
 ];
 
 /// Actions of the vehicle that tests may use; `needs: profile NAME` of a test asks for one, and
@@ -143,6 +148,7 @@ pub const KEYS: &[Key] = &[
     key("device.no-charger-on-course", Kind::Flag),
     key("device.map-hash", Kind::Flag),
     key("device.charges", Kind::Flag),
+    key("device.room-beside-edges", Kind::Flag),
     key("device.long-action", Kind::Action),
     key("device.uninterruptible-action", Kind::Action),
     key("device.claims", Kind::Claims),

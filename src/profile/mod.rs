@@ -315,6 +315,8 @@ pub struct LayoutEdge {
     pub start: String,
     /// Id of the node it ends at.
     pub end: String,
+    /// What a line-guided vehicle is told at the junction where it begins.
+    pub direction: Option<String>,
     /// Where it is written.
     pub span: Span,
 }

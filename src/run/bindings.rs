@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
+use super::pace::{Pace, between_looks};
 use crate::course::{Layout, Standing};
 use crate::journal::event::{Event, Packet};
 use crate::judge::RunJudge;
@@ -43,10 +44,24 @@ pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) 
     }
     let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
     let standing = standing(judge, layout).ok_or("the vehicle does not say where it stands")?;
-    let course = layout
-        .assign(&test.course, &standing)
-        .map_err(|error| error.to_string())?;
-    Ok(Some(flat(course.bindings())))
+    let course = if test.course.directed {
+        let layout = layout.clone().directed();
+        if layout.edges().next().is_none() {
+            return Err("no edge of the layout says its direction at a junction".to_owned());
+        }
+        layout.assign(&test.course, &standing)
+    } else {
+        layout.assign(&test.course, &standing)
+    };
+    let course = course.map_err(|error| error.to_string())?;
+    let mut course = course.bindings();
+    let factsheet = judge
+        .ground()
+        .bindings
+        .get("device")
+        .and_then(|device| device.get("factsheet"));
+    Pace::of(factsheet).set(&mut course);
+    Ok(Some(flat(course)))
 }
 
 /// The variables only this test has.
@@ -58,14 +73,22 @@ pub(super) fn own_bindings(
     number: usize,
 ) -> Map<String, Value> {
     let mut own = Map::new();
+    let mut time = Map::new();
+    time.extend(
+        course
+            .as_ref()
+            .and_then(between_looks)
+            .map(|millis| ("look".to_owned(), millis.into())),
+    );
     own.extend(course.map(|course| ("course".to_owned(), course)));
     let ids = fresh_names(test).into_iter().map(|name| {
         let id = format!("{run}-{number}-{name}");
         (name, Value::from(id))
     });
     own.insert("run".to_owned(), Value::Object(ids.collect()));
-    if let Some(will) = will(judge) {
-        own.insert("time".to_owned(), json!({ "will": will }));
+    time.extend(will(judge).map(|millis| ("will".to_owned(), millis.into())));
+    if !time.is_empty() {
+        own.insert("time".to_owned(), time.into());
     }
     own
 }

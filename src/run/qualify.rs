@@ -181,10 +181,23 @@ pub fn qualify_tests(
         .collect();
     let mut blemishes = Vec::new();
     let mut deciders = BTreeSet::new();
-    for request in &requests {
+    let mut vehicles = Vec::new();
+    for mut request in requests {
         let Finished { result, .. } = run_silently(library, pack, request.clone())?;
         blemishes.extend(blemishes_of(&result));
-        deciders.extend(decided(&result).into_iter().map(|(decider, _)| decider));
+        let all = decided(&result).into_iter().map(|(decider, _)| decider);
+        let own: BTreeSet<Decider> = all.filter(|decider| !deciders.contains(decider)).collect();
+        if !vehicles.is_empty() {
+            // What also runs on the usual vehicle is proven there.
+            let is_own = |id: &str| own.iter().any(|decider| decider.place.split(' ').next() == Some(id));
+            request.tests.retain(|test| is_own(&test.id));
+            request.complete = false;
+        }
+        vehicles.push(Vehicle {
+            request,
+            requirements: own.iter().map(|decider| decider.requirement.clone()).collect(),
+        });
+        deciders.extend(own);
     }
     let next = AtomicUsize::new(0);
     let kills: Mutex<Vec<(usize, Result<Kill, EngineError>)>> = Mutex::new(Vec::new());
@@ -195,7 +208,7 @@ pub fn qualify_tests(
                 while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
                     told(fault.name);
                     let at = faults.iter().position(|other| other == fault).unwrap_or_default();
-                    let kill = kill(library, pack, &requests, *fault);
+                    let kill = kill(library, pack, &vehicles, *fault);
                     if let Ok(mut all) = kills.lock() {
                         all.push((at, kill));
                     }
@@ -229,16 +242,28 @@ fn blemishes_of(result: &RunResult) -> Vec<(Decider, Verdict)> {
     all
 }
 
-/// Runs with a fault: on the usual vehicle, and only if it is not found there on the others.
-fn kill(library: &Library, pack: &Pack, requests: &[VirtualRun], fault: Fault) -> Result<Kill, EngineError> {
+/// A vehicle that faults are tried on.
+struct Vehicle {
+    /// Everything on the usual one; on another one only the tests that do not run on those before it.
+    request: VirtualRun,
+    /// What is decided on none before it.
+    requirements: BTreeSet<String>,
+}
+
+/// Runs with a fault: on the usual vehicle, and on the others where they alone decide what the fault breaks.
+fn kill(library: &Library, pack: &Pack, vehicles: &[Vehicle], fault: Fault) -> Result<Kill, EngineError> {
     let mut kill = Kill {
         fault,
         deciders: BTreeSet::new(),
         requirements: Vec::new(),
         verdict: None,
     };
-    for request in requests {
-        let mut request = request.clone();
+    for (at, vehicle) in vehicles.iter().enumerate() {
+        let concerned = fault.breaks.iter().any(|id| vehicle.requirements.contains(*id));
+        if vehicle.request.tests.is_empty() || (at > 0 && !concerned) {
+            continue;
+        }
+        let mut request = vehicle.request.clone();
         request.faults = vec![fault.name.to_owned()];
         let finished = run_silently(library, pack, request)?;
         for (decider, verdict) in decided(&finished.result) {
@@ -250,9 +275,6 @@ fn kill(library: &Library, pack: &Pack, requests: &[VirtualRun], fault: Fault) -
             }
         }
         kill.verdict = kill.verdict.max(finished.result.verdict);
-        if kill.named() {
-            break;
-        }
     }
     Ok(kill)
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 
 use super::header::Subject;
-use crate::course::Layout;
+use crate::course::{Edge, Layout};
 use crate::pack::{Pack, Role};
 use crate::profile::TimeLimits;
 use crate::reference::agv::tolerances::UnknownTolerance;
@@ -23,6 +23,23 @@ pub struct ReferenceAgv {
     pub config: AgvConfig,
     /// Its part of the timing contract.
     pub time: TimeLimits,
+}
+
+/// Kinds of reference AGVs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Vehicle {
+    /// On virtual lines, as most vehicles are
+    #[default]
+    Usual,
+    /// Follows a line on the floor, knows no coordinates, and stops on nodes only
+    LineGuided,
+    /// Plans its own way, follows trajectories, and keeps to corridors
+    Free,
+}
+
+impl Vehicle {
+    /// Every kind; the usual one first.
+    pub const ALL: [Self; 3] = [Self::Usual, Self::LineGuided, Self::Free];
 }
 
 impl ReferenceAgv {
@@ -74,14 +91,14 @@ impl ReferenceAgv {
             rotation_speed: 8.0 * std::f64::consts::PI,
             keep_alive: Duration::from_secs(10),
             reconnect_delay: Duration::from_millis(300),
-            state_interval: Duration::from_secs(5),
+            state_interval: Duration::from_secs(3),
             visualization_interval: Some(Duration::from_secs(1)),
             // Few, so that an order with too many of them can be written down.
             max_nodes: 12,
             ..AgvConfig::default()
         };
         let time = TimeLimits {
-            drive: Duration::from_secs(10),
+            drive: Duration::from_secs(4),
             quiet: Duration::from_millis(200),
             settle: Duration::from_millis(300),
             reconnect: Duration::from_secs(20),
@@ -96,14 +113,39 @@ impl ReferenceAgv {
         }
     }
 
-    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well: one that can
-    /// stop on nodes only.
+    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well: one that follows a
+    /// line and can stop on nodes only, and one that plans its own way, follows trajectories and keeps to corridors.
     #[must_use]
     pub fn variants(pack: &Pack) -> Vec<Self> {
-        let usual = Self::new(pack);
-        let mut node_bound = usual.clone();
-        node_bound.config.stops_between_nodes = false;
-        vec![usual, node_bound]
+        Vehicle::ALL
+            .into_iter()
+            .map(|vehicle| Self::of(vehicle, pack))
+            .collect()
+    }
+
+    /// One of them.
+    #[must_use]
+    pub fn of(vehicle: Vehicle, pack: &Pack) -> Self {
+        let mut this = Self::new(pack);
+        match vehicle {
+            Vehicle::Usual => {}
+            Vehicle::LineGuided => this.follow_a_line(),
+            Vehicle::Free => {
+                this.config.trajectories = true;
+                this.config.plans = true;
+            }
+        }
+        this
+    }
+
+    fn follow_a_line(&mut self) {
+        self.layout = self.layout.clone().with_directions();
+        self.config.stops_between_nodes = false;
+        // It knows no coordinates, so it has no use for a pose or a map.
+        let without = ["initPosition", "downloadMap", "enableMap", "deleteMap"];
+        self.config.without_actions = without.map(str::to_owned).into();
+        let branch = |edge: &Edge| Some((edge.start.clone(), edge.direction.clone()?, edge.end.clone()));
+        self.config.branches = Some(self.layout.edges().filter_map(branch).collect());
     }
 
     /// What a profile would state about it.
@@ -121,8 +163,9 @@ impl ReferenceAgv {
             ("no-charger-on-course", true),
             ("carries-load", true),
             ("map-hash", true),
-            ("line-guided", false),
-            ("free-navigation", true),
+            ("line-guided", self.config.branches.is_some()),
+            ("free-navigation", self.config.plans),
+            ("room-beside-edges", true),
         ]
         .into_iter()
         .map(|(name, said)| (name.to_owned(), said))
@@ -163,7 +206,7 @@ impl ReferenceAgv {
     }
 
     /// The hooks it understands as commands.
-    pub const HOOKS: [&'static str; 14] = [
+    pub const HOOKS: [&'static str; 18] = [
         "power-cycle",
         "shutdown",
         "start",
@@ -178,5 +221,9 @@ impl ReferenceAgv {
         "enable-map",
         "enter-field",
         "leave-field",
+        "move-to",
+        "push-out",
+        "place-obstacle",
+        "remove-obstacle",
     ];
 }

@@ -31,6 +31,7 @@ fn of_step(step: &Step, need: &mut CourseNeed) {
             let Some(name) = name.strip_prefix("course.") else {
                 continue;
             };
+            need.directed |= name.ends_with(".direction");
             let name = name.split(['.', '[']).next().unwrap_or(name);
             match name.split_once('-') {
                 Some((from, to)) if is_course_name(from) && is_course_name(to) => {

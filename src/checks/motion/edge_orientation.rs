@@ -9,7 +9,7 @@ use crate::journal::Entry;
 /// `motion/edge-orientation`.
 pub(in crate::checks) const EDGE_ORIENTATION: Check = Check {
     name: "motion/edge-orientation",
-    decides: &["ORD-MSG-22", "OPT-01"],
+    decides: &["ORD-MSG-22", "ORD-MSG-23", "OPT-01"],
     doc: "On a straight edge with an orientation, theta is that orientation (GLOBAL), or that orientation against the \
           line between the nodes (TANGENTIAL, and without a type). More than 0.2 rad beside it is a warning, more \
           than 0.35 rad is another orientation. Judged on the line and away from the nodes only; where the edge \

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::checks::orders::number;
 use crate::checks::traffic::{elements, text};
+use crate::nurbs::{Beside, Curve, Path};
 
 /// An angle brought into -π … π.
 pub(super) fn wrapped(angle: f64) -> f64 {
@@ -97,8 +98,33 @@ pub(super) struct Demands {
     pub orientation: Option<f64>,
     pub global: bool,
     pub rotation_allowed: Option<bool>,
-    /// Whether the way is no straight line.
+    /// Whether the way may be no straight line.
     pub curved: bool,
+    /// Its trajectory, if it has one that can be calculated with.
+    pub path: Option<Path>,
+    pub corridor: Option<Corridor>,
+}
+
+/// How far the vehicle may leave the trajectory of an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Corridor {
+    /// Metres.
+    pub left: f64,
+    /// Metres.
+    pub right: f64,
+    /// Whether the contour is meant, not the kinematic centre.
+    pub contour: bool,
+}
+
+impl Corridor {
+    fn read(corridor: &Value) -> Option<Self> {
+        let width = |name| finite(corridor, name).filter(|width| *width >= 0.0);
+        Some(Self {
+            left: width("leftWidth")?,
+            right: width("rightWidth")?,
+            contour: text(corridor, "corridorRefPoint") == "CONTOUR",
+        })
+    }
 }
 
 impl Demands {
@@ -114,6 +140,11 @@ impl Demands {
             global: kind == "GLOBAL",
             rotation_allowed: edge.get("rotationAllowed").and_then(Value::as_bool),
             curved: edge.get("trajectory").is_some_and(|curve| !curve.is_null()),
+            path: edge
+                .get("trajectory")
+                .and_then(|curve| Curve::read(curve).0)
+                .map(|curve| curve.path()),
+            corridor: edge.get("corridor").and_then(Corridor::read),
         })
     }
 }
@@ -159,7 +190,40 @@ impl Along {
     }
 }
 
+/// Where a position is beside the trajectory of an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bend {
+    /// The nearest place of the trajectory.
+    pub beside: Beside,
+    /// Length of the trajectory in metres.
+    pub length: f64,
+    /// How far that place is from the straight line between the nodes, in metres.
+    pub aside: f64,
+    /// Whether that place is on the edge and on neither node.
+    pub is_mid_edge: bool,
+}
+
 impl Lane {
+    /// Where a position is beside the trajectory.
+    pub fn bend(&self, pose: &super::way::Pose) -> Option<Bend> {
+        let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
+        let path = self
+            .demands
+            .path
+            .as_ref()
+            .filter(|_| pose.map == from.map && pose.map == to.map)?;
+        let beside = path.beside(pose.x, pose.y)?;
+        let spot = path.at(beside.made)?;
+        let straight = Path::through([(from.x, from.y), (to.x, to.y)]);
+        let length = path.length();
+        Some(Bend {
+            beside,
+            length,
+            aside: straight.beside(spot.x, spot.y).map_or(0.0, |line| line.distance),
+            is_mid_edge: beside.made > from.reach() && length - beside.made > to.reach(),
+        })
+    }
+
     /// The direction of the straight line from node to node, in radians.
     pub fn heading(&self) -> Option<f64> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);

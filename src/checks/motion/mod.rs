@@ -4,6 +4,8 @@
 //! may have done between measuring and reporting. What the tests must demand is left to them.
 
 mod axes;
+mod corridor;
+mod curve;
 mod edge_orientation;
 mod edge_rotation_speed;
 mod edge_speed;
@@ -15,6 +17,8 @@ mod velocity_sign;
 mod way;
 
 pub(super) use axes::AXES;
+pub(super) use corridor::{CORRIDOR, CORRIDOR_POINT, NEXT_CORRIDOR};
+pub(super) use curve::{CURVE_ORIENTATION, TRAJECTORY};
 pub(super) use edge_orientation::EDGE_ORIENTATION;
 pub(super) use edge_rotation_speed::EDGE_ROTATION_SPEED;
 pub(super) use edge_speed::EDGE_SPEED;

@@ -81,6 +81,8 @@ pub(super) struct View {
     pub fresh: bool,
     /// The released edge behind the last node, while the state lists it with its end node.
     pub lane: Option<Lane>,
+    /// The same, released or only planned.
+    pub ahead: Option<Lane>,
     pub pose: Option<Pose>,
     pub velocity: Velocity,
     pub driving: Option<bool>,
@@ -210,12 +212,16 @@ impl Way {
         let nodes = read_elements(state, "nodeStates", "nodeId")?;
         let edges = read_elements(state, "edgeStates", "edgeId")?;
         let on = |list: &[crate::checks::orders::Element], sequence: u64| {
-            list.iter()
-                .any(|element| element.sequence == sequence && element.released)
+            let found = list.iter().find(|element| element.sequence == sequence);
+            found.map(|element| element.released)
         };
-        let listed = on(&nodes, sequence + 2) && on(&edges, sequence + 1) && !on(&edges, sequence.wrapping_sub(1));
-        let lane = listed.then(|| self.lane(order, update, node)).flatten();
-        let ahead = |element: &crate::checks::orders::Element| element.released && element.sequence > *sequence;
+        let behind = on(&edges, sequence.wrapping_sub(1)) == Some(true);
+        let listed = on(&nodes, sequence + 2)
+            .zip(on(&edges, sequence + 1))
+            .filter(|_| !behind);
+        let ahead = listed.and_then(|_| self.lane(order, update, node));
+        let lane = ahead.clone().filter(|_| listed == Some((true, true)));
+        let is_ahead = |element: &crate::checks::orders::Element| element.released && element.sequence > *sequence;
         Some(View {
             seq: entry.seq(),
             moment: entry.at().moment,
@@ -224,10 +230,11 @@ impl Way {
             node: node.clone(),
             fresh: true,
             lane,
+            ahead,
             pose: Pose::read(state),
             velocity: Velocity::read(state),
             driving: state.get("driving").and_then(Value::as_bool),
-            base_done: !nodes.iter().any(ahead),
+            base_done: !nodes.iter().any(is_ahead),
         })
     }
 

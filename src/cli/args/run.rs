@@ -51,6 +51,16 @@ pub struct Run {
         conflicts_with = "profile"
     )]
     pub tolerance: Vec<String>,
+    /// Which kind of reference AGV it is
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_enum,
+        default_value_t,
+        help_heading = "Reference AGV",
+        conflicts_with = "profile"
+    )]
+    pub vehicle: crate::run::Vehicle,
     /// Run against the reference AGV in memory and in virtual time, without a network
     #[arg(long = "virtual", help_heading = "Reference AGV", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
     pub in_virtual_time: bool,

@@ -49,14 +49,24 @@ impl Reader<'_> {
     }
 
     pub(super) fn edge(&mut self, item: &Spanned<DeValue<'_>>) -> Option<LayoutEdge> {
-        let members = self.members("an edge", item, &["id", "from", "to"], &["id", "from", "to"])?;
+        let members = self.members(
+            "an edge",
+            item,
+            &["id", "from", "to", "direction"],
+            &["id", "from", "to"],
+        )?;
         let id = self.text("the id of an edge", members.get("id")?);
         let start = self.text("the start of an edge", members.get("from")?);
         let end = self.text("the end of an edge", members.get("to")?);
+        let direction = match members.get("direction") {
+            Some(value) => self.text("the direction of an edge", value).map(Some),
+            None => Some(None),
+        };
         Some(LayoutEdge {
             id: id?,
             start: start?,
             end: end?,
+            direction: direction?,
             span: self.span(item.span()),
         })
     }

@@ -15,9 +15,9 @@ const SIDEWAYS: f64 = 0.1;
 pub(super) const SLOWEST: f64 = 0.01;
 
 impl Agv {
-    /// Where a node is: as the order says, else as the layout knows.
+    /// Where a node is: as the order says, else as the layout knows. A line-guided vehicle only knows its layout.
     pub(super) fn place(&self, node: &Node) -> Option<Place> {
-        if let Some(position) = &node.position {
+        if let Some(position) = node.position.as_ref().filter(|_| !self.config.line_guided()) {
             return Some(Place {
                 x: position.x,
                 y: position.y,
@@ -34,9 +34,11 @@ impl Agv {
     /// Whether the vehicle can do all this; the first `known` nodes are only the joint.
     pub(super) fn check_ability(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
         self.check_memory(order, known)?;
+        let usable = |path: &&String| path.rsplit('.').next().is_some_and(|field| self.config.uses(field));
         if let Some(path) = order
             .unsupported
-            .first()
+            .iter()
+            .find(|path| !usable(path))
             .filter(|_| !self.faults.has(F::UnsupportedFieldIgnored))
         {
             return Err(Refusal::at_field(
@@ -121,6 +123,7 @@ impl Agv {
         if edge.max_height.is_some_and(|height| height < self.config.height) && !self.faults.has(F::MaxHeightIgnored) {
             return unable("maxHeight", "the vehicle is higher");
         }
+        self.check_way(edge, ends)?;
         let Some(orientation) = edge.orientation else {
             return Ok(());
         };

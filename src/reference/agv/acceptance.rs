@@ -45,6 +45,9 @@ impl Agv {
 
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
         let mut order = Order::read(message)?;
+        if std::mem::take(&mut self.locked) {
+            return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
+        }
         let tolerated = |_: &Defect| self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty();
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
@@ -274,7 +277,12 @@ impl Agv {
                 self.book.base_end = (node.id.clone(), node.sequence_id);
             }
             self.push_actions(node.actions.clone(), Origin::Node(node.sequence_id));
-            if let Some(place) = self.place(&node) {
+            let edge = self
+                .book
+                .edges
+                .back()
+                .filter(|edge| edge.sequence_id + 1 == node.sequence_id);
+            if let Some(place) = self.arrives_at(edge, &node) {
                 self.book.nodes.push_back(Stop { node, place });
             }
         }

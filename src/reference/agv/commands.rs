@@ -14,9 +14,9 @@ use super::{Agv, Mode};
 
 /// The commands of [`crate::reference::Input::Command`]; unknown ones are ignored.
 ///
-/// `place-on {nodeId}`, `move-to {x, y, theta}`, `set-mode {mode}`, `enable-map {mapId, mapVersion}`,
+/// `place-on {nodeId}`, `move-to {nodeId}` or `{x, y, theta}`, `place-obstacle {edgeId}`, `remove-obstacle {edgeId}`, `set-mode {mode}`, `enable-map {mapId, mapVersion}`,
 /// `place-load {loadId, loadType}`, `trigger {actionId?}`; the others take nothing.
-pub const COMMANDS: [&str; 16] = [
+pub const COMMANDS: [&str; 19] = [
     "power-cycle",
     "shutdown",
     "start",
@@ -24,6 +24,9 @@ pub const COMMANDS: [&str; 16] = [
     "set-mode",
     "place-on",
     "move-to",
+    "push-out",
+    "place-obstacle",
+    "remove-obstacle",
     "emergency-stop",
     "release-emergency-stop",
     "press-pause",
@@ -35,6 +38,9 @@ pub const COMMANDS: [&str; 16] = [
     "remove-load",
 ];
 
+/// More things than this do not stand about.
+const MAX_OBSTACLES: usize = 100;
+
 impl Agv {
     pub(super) fn command(&mut self, name: &str, arguments: &Value) {
         let text = |key: &str| arguments.get(key).and_then(Value::as_str).unwrap_or_default();
@@ -45,7 +51,15 @@ impl Agv {
             "trigger" => self.trigger(text("actionId")),
             "set-mode" => self.set_mode(text("mode")),
             "place-on" => self.place_on(text("nodeId")),
+            "move-to" if arguments.get("nodeId").is_some() => self.place_on(text("nodeId")),
             "move-to" => self.move_to(arguments),
+            "push-out" => self.push_out(),
+            "place-obstacle" if self.obstacles.len() < MAX_OBSTACLES => {
+                self.obstacles.insert(text("edgeId").to_owned());
+            }
+            "remove-obstacle" => {
+                self.obstacles.remove(text("edgeId"));
+            }
             "emergency-stop" => self.emergency_stop(),
             "release-emergency-stop" => {
                 self.errors.released();
@@ -79,6 +93,8 @@ impl Agv {
         self.errors.clear();
         self.downloads.clear();
         self.holds = super::Holds::default();
+        self.strayed = false;
+        self.locked = false;
         self.mode = Mode::Automatic;
         self.charging = false;
         self.report = super::Report::default();
@@ -143,6 +159,7 @@ impl Agv {
         });
         self.book.last_node = node.id;
         self.book.last_sequence = 0;
+        self.is_back();
     }
 
     /// Pushed or steered by hand, which is only possible outside the automatic modes (MODE-06).

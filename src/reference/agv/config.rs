@@ -69,6 +69,8 @@ pub struct ErrorNames {
     pub load: String,
     /// The emergency stop is active.
     pub emergency_stop: String,
+    /// The vehicle is outside its corridor (CORR-07).
+    pub outside_of_corridor: String,
 }
 
 impl Default for ErrorNames {
@@ -90,6 +92,7 @@ impl Default for ErrorNames {
             charging: name("chargingError"),
             load: name("loadError"),
             emergency_stop: name("emergencyStop"),
+            outside_of_corridor: name("outsideOfCorridor"),
         }
     }
 }
@@ -174,6 +177,13 @@ pub struct AgvConfig {
     pub interruptible: bool,
     /// Whether the vehicle can stop between nodes when its order is cancelled.
     pub stops_between_nodes: bool,
+    /// Whether it follows trajectories of orders, and keeps to corridors where the version has them.
+    pub trajectories: bool,
+    /// Whether it plans its path itself, and reports it (STATE-14).
+    pub plans: bool,
+    /// Whether it follows a line on the floor, knows places by their names only, and takes the branch it is told
+    /// (ORD-MSG-27): start node, direction and end node of every branch.
+    pub branches: Option<Vec<(String, String, String)>>,
     /// Nodes with a charger.
     pub chargers: BTreeSet<String>,
     /// Number of maps the vehicle can store.
@@ -248,6 +258,9 @@ impl Default for AgvConfig {
             action_durations: BTreeMap::new(),
             interruptible: true,
             stops_between_nodes: true,
+            trajectories: false,
+            plans: false,
+            branches: None,
             chargers,
             map_capacity: 8,
             maps: vec![OnboardMap {
@@ -274,6 +287,21 @@ impl AgvConfig {
     /// Whether the protocol version has a feature.
     pub(super) fn has(&self, feature: &str) -> bool {
         self.features.contains(feature)
+    }
+
+    /// Whether it follows a line and knows no coordinates.
+    pub(super) fn line_guided(&self) -> bool {
+        self.branches.is_some()
+    }
+
+    /// Whether it can use an optional field of an edge.
+    pub(super) fn uses(&self, field: &str) -> bool {
+        match field {
+            "trajectory" => self.trajectories,
+            "corridor" => self.trajectories && self.has("corridors"),
+            "direction" => self.line_guided(),
+            _ => false,
+        }
     }
 
     /// The node of that id in the layout.

@@ -18,6 +18,8 @@ pub(super) enum Life {
     Until(Moment),
     /// While the emergency stop is active.
     WhileStopped,
+    /// While the vehicle is outside its corridor.
+    WhileOutside,
 }
 
 /// One active error.
@@ -51,12 +53,18 @@ impl Errors {
 
     /// A new order was accepted.
     pub(super) fn new_order(&mut self) {
-        self.active.retain(|error| error.life == Life::WhileStopped);
+        self.active
+            .retain(|error| matches!(error.life, Life::WhileStopped | Life::WhileOutside));
     }
 
     /// The emergency stop was released.
     pub(super) fn released(&mut self) {
         self.active.retain(|error| error.life != Life::WhileStopped);
+    }
+
+    /// The vehicle is where it belongs again.
+    pub(super) fn back_inside(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileOutside);
     }
 
     /// Drops what has run out.

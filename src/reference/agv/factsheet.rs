@@ -7,6 +7,7 @@ use super::action_kinds::{self, ActionKind, Deed, LOAD_POSITIONS, MAX_HEIGHT};
 use super::errors::MAX_ERRORS;
 use super::faults::FaultName as F;
 use super::instant::MAX_INSTANT_ACTIONS;
+use super::path::{HALF_LENGTH, HALF_WIDTH};
 use super::read::MAX_STRING;
 use super::{Agv, AgvConfig};
 
@@ -25,6 +26,14 @@ const OPTIONAL_PARAMETERS: [&str; 14] = [
     "order.edges.orientationType",
     "order.edges.rotationAllowed",
     "order.edges.maxRotationSpeed",
+    "order.edges.length",
+];
+
+/// The same for a vehicle that knows places by their names only.
+const ON_A_LINE: [&str; 4] = [
+    "order.nodes.nodeDescription",
+    "order.edges.edgeDescription",
+    "order.edges.maxHeight",
     "order.edges.length",
 ];
 
@@ -68,14 +77,19 @@ impl Agv {
     }
 
     fn type_specification(&self) -> Value {
+        let navigation = match () {
+            () if self.config.line_guided() => "PHYSICAL_LINE_GUIDED",
+            () if self.config.plans => "AUTONOMOUS",
+            () => "VIRTUAL_LINE_GUIDED",
+        };
         json!({
             "seriesName": "Reference AGV",
             "seriesDescription": "A simulated vehicle with two driven wheels and a lift",
             "agvKinematic": if self.faults.has(F::FactsheetKinematicsUnknown) { "DIFFERENTIAL" } else { "DIFF" },
             "agvClass": "CARRIER",
             "maxLoadMass": 500.0,
-            "localizationTypes": ["NATURAL"],
-            "navigationTypes": ["VIRTUAL_LINE_GUIDED"],
+            "localizationTypes": [if self.config.line_guided() { "RFID" } else { "NATURAL" }],
+            "navigationTypes": [navigation],
         })
     }
 
@@ -91,8 +105,8 @@ impl Agv {
             "heightMax": self.config.height,
         });
         if !self.faults.has(F::FactsheetWithoutSize) {
-            parameters["width"] = json!(0.8);
-            parameters["length"] = json!(1.2);
+            parameters["width"] = json!(2.0 * HALF_WIDTH);
+            parameters["length"] = json!(2.0 * HALF_LENGTH);
         }
         if self.faults.has(F::SpeedMinAboveMax) {
             parameters["speedMin"] = json!(self.config.speed + 1.0);
@@ -148,8 +162,23 @@ impl Agv {
         } else {
             "SUPPORTED"
         };
-        let parameters: Vec<Value> = OPTIONAL_PARAMETERS
+        let usual = if self.config.line_guided() {
+            ON_A_LINE.as_slice()
+        } else {
+            OPTIONAL_PARAMETERS.as_slice()
+        };
+        let special = [
+            ("trajectory", "order.edges.trajectory"),
+            ("corridor", "order.edges.corridor"),
+            ("direction", "order.edges.direction"),
+        ];
+        let special = special
             .iter()
+            .filter(|(field, _)| self.config.uses(field))
+            .map(|(_, name)| name);
+        let parameters: Vec<Value> = usual
+            .iter()
+            .chain(special)
             .map(|name| json!({ "parameter": name, "support": support }))
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
@@ -226,7 +255,12 @@ impl Agv {
             wheel
         };
         let point = |x: f64, y: f64| json!({ "x": x, "y": y });
-        let mut contour = vec![point(0.6, 0.4), point(-0.6, 0.4), point(-0.6, -0.4), point(0.6, -0.4)];
+        let mut contour = vec![
+            point(HALF_LENGTH, HALF_WIDTH),
+            point(-HALF_LENGTH, HALF_WIDTH),
+            point(-HALF_LENGTH, -HALF_WIDTH),
+            point(HALF_LENGTH, -HALF_WIDTH),
+        ];
         if self.faults.has(F::PolygonCrossed) {
             contour.swap(1, 2);
         }

@@ -171,6 +171,7 @@ faults! {
     OrderErrorAsValidation "order-error-as-validation" ["ORD-REJ-06"] "Reports orders it cannot perform as malformed.";
     OrderErrorFatal "order-error-fatal" ["ORD-REJ-06"] "Reports orders it cannot perform as FATAL.";
     OrderErrorUnreferenced "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform.";
+    OrderErrorLocks "order-error-locks" ["ORD-13", "ORD-REJ-08"] "Refuses the order that follows one it could not perform.";
     OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a moment.";
     OutdatedUpdateTakenOver "outdated-update-taken-over" ["ORD-REJ-10"] "Goes back to an outdated order update.";
     OutdatedUpdateDropsOrder "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives.";
@@ -188,13 +189,26 @@ faults! {
     MaxSpeedIgnored "max-speed-ignored" ["ORD-MSG-20", "OPT-01"] "Drives with its own speed whatever the edge permits.";
     EdgeOrientationIgnored "edge-orientation-ignored" ["ORD-MSG-22", "OPT-01"] "Drives forwards whatever orientation the edge asks for.";
     MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
-    TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01"] "Reports a node traversed half a metre before it is there.";
-    AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
+    TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there.";
+    AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with x the wrong way round.";
     DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05"] "Reports its orientation in degrees.";
     VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 
     TurnsOnEdge "turns-on-edge" ["ORD-MSG-24", "ORD-MSG-12"] "Turns to the orientation of an edge when it is on it already.";
     MaxHeightIgnored "max-height-ignored" ["ORD-MSG-21", "OPT-02"] "Accepts edges too low for it.";
+    TrajectoryCut "trajectory-cut" ["ORD-MSG-26"] "Drives straight to the end of an edge that has a trajectory.";
+    TangentIgnored "tangent-ignored" ["ORD-MSG-23"] "Looks the same way all along a curve.";
+    DirectionIgnored "direction-ignored" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the same branch at a junction whatever direction it is given.";
+    DirectionMistaken "direction-mistaken" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the branch beside the one it is told.";
+    CorridorOverrun "corridor-overrun" ["CORR-01", "CORR-03"] "Drives round an obstacle as if its corridor were twice as wide.";
+    CorridorContourIgnored "corridor-contour-ignored" ["CORR-03", "CORR-01"] "Keeps only its centre inside a corridor that is meant for its contour.";
+    CorridorExitDrivenOn "corridor-exit-driven-on" ["CORR-06"] "Drives on when it finds itself outside its corridor.";
+    CorridorExitSilent "corridor-exit-silent" ["CORR-07"] "Stops outside its corridor and does not say why.";
+    PlannedPathMissing "planned-path-missing" ["STATE-14"] "Plans its path and does not report it.";
+    PlannedPathOfBaseOnly "planned-path-of-base-only" ["STATE-14"] "Reports the path it planned for the base only.";
+    PlannedPathChanges "planned-path-changes" ["STATE-15"] "Plans anew when it enters an edge.";
+    PlannedPathWithoutEnds "planned-path-without-ends" ["ORD-MSG-30"] "Reports control points that are not those of its own curve.";
+    KnotsTooFew "knots-too-few" ["ORD-MSG-29"] "Leaves the last knot out of the trajectory it reports.";
     TrajectoryWithoutPoints "trajectory-without-points" ["ORD-MSG-28"] "Reports the trajectory it planned without control points.";
     ZoneSetInvented "zone-set-invented" ["STATE-MSG-03"] "Reports a zone set no order named.";
 

@@ -24,6 +24,7 @@ mod instant;
 mod maps;
 mod motion;
 mod order_message;
+mod path;
 mod progress;
 mod read;
 mod rejection;
@@ -32,7 +33,7 @@ mod report;
 mod tests;
 pub mod tolerances;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 use crate::clock::{Moment, Stamp};
@@ -86,13 +87,15 @@ struct Holds {
     emergency: bool,
     /// Something stands in the protective field.
     field: bool,
+    /// It is outside its corridor.
+    outside: bool,
     /// Nothing at all (`pause-not-lifted` only).
     stuck: bool,
 }
 
 impl Holds {
     fn any(self) -> bool {
-        self.pause || self.button || self.emergency || self.field || self.stuck
+        self.pause || self.button || self.emergency || self.field || self.outside || self.stuck
     }
 }
 
@@ -120,6 +123,12 @@ pub struct Agv {
     holds: Holds,
     mode: Mode,
     loads: Vec<Load>,
+    /// Edges on which something stands.
+    obstacles: BTreeSet<String>,
+    /// It takes no order now (`order-error-locks` only).
+    locked: bool,
+    /// It has left its corridor and was not put back yet.
+    strayed: bool,
     charging: bool,
     /// It has not found its pose (`init-position-uninitialized` only).
     lost: bool,
@@ -181,6 +190,9 @@ impl Agv {
             holds: Holds::default(),
             mode: Mode::Automatic,
             loads: Vec::new(),
+            obstacles: BTreeSet::new(),
+            locked: false,
+            strayed: false,
             charging: false,
             lost: false,
             claimed_map: None,

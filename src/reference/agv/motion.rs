@@ -2,10 +2,11 @@
 //!
 //! Legs have constant speed; acceleration is ignored. Knows nothing of orders.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Duration;
 
 use crate::clock::Moment;
+use crate::nurbs::Path;
 
 /// A position and orientation on a map.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +40,30 @@ enum Leg {
         backwards: bool,
         to_node: bool,
     },
+    Follow {
+        path: Path,
+        facing: Facing,
+        to_node: bool,
+    },
+}
+
+/// Where a vehicle looks while it follows a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Facing {
+    /// So much beside the direction of the path, in radians.
+    Along(f64),
+    /// Always there, in radians.
+    Fixed(f64),
+}
+
+impl Facing {
+    /// The orientation where the path has this direction.
+    pub(super) fn at(self, heading: f64) -> f64 {
+        wrapped(match self {
+            Self::Along(turned) => heading + turned,
+            Self::Fixed(theta) => theta,
+        })
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -101,12 +126,17 @@ impl Motion {
         } else {
             1.0
         };
-        match underway.leg {
+        match &underway.leg {
             Leg::Turn { by } => pose.theta = wrapped(pose.theta + by * part),
-            Leg::Roll { to, .. } if part >= 1.0 => (pose.x, pose.y) = to,
+            Leg::Roll { to, .. } if part >= 1.0 => (pose.x, pose.y) = *to,
             Leg::Roll { to, .. } => {
                 pose.x += (to.0 - pose.x) * part;
                 pose.y += (to.1 - pose.y) * part;
+            }
+            Leg::Follow { path, facing, .. } => {
+                if let Some(spot) = path.at(path.length() * part) {
+                    (pose.x, pose.y, pose.theta) = (spot.x, spot.y, facing.at(spot.heading));
+                }
             }
         }
         pose
@@ -118,13 +148,21 @@ impl Motion {
             return Velocity::default();
         };
         let seconds = underway.lasts.as_secs_f64().max(1e-6);
-        match underway.leg {
+        match &underway.leg {
             Leg::Turn { by } => Velocity {
                 vx: 0.0,
                 omega: by / seconds,
             },
             Leg::Roll { to, backwards, .. } => {
                 let speed = self.pose.distance(to.0, to.1) / seconds;
+                Velocity {
+                    vx: if *backwards { -speed } else { speed },
+                    omega: 0.0,
+                }
+            }
+            Leg::Follow { path, facing, .. } => {
+                let speed = path.length() / seconds;
+                let backwards = matches!(facing, Facing::Along(turned) if turned.abs() > FRAC_PI_2);
                 Velocity {
                     vx: if backwards { -speed } else { speed },
                     omega: 0.0,
@@ -169,12 +207,22 @@ impl Motion {
         });
     }
 
+    /// Begins to follow a path.
+    pub(super) fn follow(&mut self, now: Moment, path: Path, speed: f64, facing: Facing, to_node: bool) {
+        let lasts = lasting(path.length(), speed);
+        self.underway = Some(Underway {
+            leg: Leg::Follow { path, facing, to_node },
+            begun: now,
+            lasts,
+        });
+    }
+
     /// Ends the present leg if its time has come; whether the vehicle rolled on it.
     pub(super) fn finish(&mut self, now: Moment) -> Option<bool> {
         self.end().filter(|end| *end <= now)?;
         let (rolled, to_node) = match self.underway {
             Some(Underway {
-                leg: Leg::Roll { to_node, .. },
+                leg: Leg::Roll { to_node, .. } | Leg::Follow { to_node, .. },
                 ..
             }) => (true, to_node),
             _ => (false, false),
@@ -222,6 +270,24 @@ mod tests {
         assert!(motion.velocity().omega < 0.0);
         assert_eq!(motion.finish(after(750)), Some(false));
         assert!((motion.pose(after(750)).theta + 3.0 * PI / 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_path_is_followed_looking_along_it_or_always_the_same_way() {
+        let path = Path::through([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)]);
+        for (facing, theta) in [
+            (Facing::Along(0.0), PI / 2.0),
+            (Facing::Along(PI), -PI / 2.0),
+            (Facing::Fixed(0.3), 0.3),
+        ] {
+            let mut motion = standing();
+            motion.follow(Moment::START, path.clone(), 2.0, facing, true);
+            let pose = motion.pose(after(1500));
+            assert!(pose.distance(2.0, 1.0) < 1e-9 && (pose.theta - theta).abs() < 1e-9);
+            assert_eq!(motion.velocity().vx < 0.0, facing == Facing::Along(PI));
+            assert_eq!(motion.finish(after(2000)), Some(true));
+            assert!(motion.reached && motion.pose(after(3000)).distance(2.0, 2.0) < 1e-9);
+        }
     }
 
     #[test]

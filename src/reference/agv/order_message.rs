@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::read::{Defect, Fields};
+use crate::nurbs::{Curve, Flaw, Path};
 
 /// Slack for angles written with few digits, such as 3.1416.
 const ANGLE: f64 = std::f64::consts::PI + 0.01;
@@ -119,6 +120,55 @@ pub(super) struct Node {
     pub(super) actions: Vec<ActionRequest>,
 }
 
+/// edge.corridor: how far the vehicle may leave its trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Corridor {
+    /// Metres to the left.
+    pub(super) left: f64,
+    /// Metres to the right.
+    pub(super) right: f64,
+    /// The whole contour has to stay inside, not the kinematic centre alone.
+    pub(super) contour: bool,
+}
+
+impl Corridor {
+    fn read(value: &Value, path: &str) -> Result<Self, Defect> {
+        let fields = Fields::open(value, path)?;
+        let point = fields.optional("corridorRefPoint", |fields, key| {
+            fields.literal(key, &["KINEMATICCENTER", "CONTOUR"])
+        })?;
+        Ok(Self {
+            left: fields.number_in("leftWidth", 0.0, FARTHEST)?,
+            right: fields.number_in("rightWidth", 0.0, FARTHEST)?,
+            contour: point == Some(1),
+        })
+    }
+}
+
+/// edge.trajectory: what was sent, and the path it means.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Trajectory {
+    pub(super) sent: Value,
+    pub(super) path: Path,
+}
+
+impl Trajectory {
+    fn read(value: &Value, path: &str) -> Result<Self, Defect> {
+        let (curve, flaws) = Curve::read(value);
+        let wrong = flaws.iter().any(|flaw| *flaw != Flaw::DegreeMissing);
+        match curve.filter(|_| !wrong) {
+            Some(curve) => Ok(Self {
+                sent: value.clone(),
+                path: curve.path(),
+            }),
+            None => Err(Defect {
+                path: path.to_owned(),
+                reason: "is no curve",
+            }),
+        }
+    }
+}
+
 /// An edge of an order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Edge {
@@ -135,6 +185,9 @@ pub(super) struct Edge {
     /// orientationType GLOBAL.
     pub(super) global: bool,
     pub(super) rotation_allowed: Option<bool>,
+    pub(super) trajectory: Option<Trajectory>,
+    pub(super) corridor: Option<Corridor>,
+    pub(super) direction: Option<String>,
     pub(super) actions: Vec<ActionRequest>,
 }
 
@@ -145,12 +198,12 @@ pub(super) struct Order {
     pub(super) update_id: u32,
     pub(super) nodes: Vec<Node>,
     pub(super) edges: Vec<Edge>,
-    /// Paths of optional fields this vehicle has no use for (OPT-02).
+    /// Paths of optional fields that not every vehicle has a use for (OPT-02).
     pub(super) unsupported: Vec<String>,
 }
 
-/// Optional fields of an edge that the vehicle cannot use.
-const UNSUPPORTED_EDGE_FIELDS: [&str; 4] = ["trajectory", "corridor", "direction", "minHeight"];
+/// Optional fields of an edge that not every vehicle can use.
+const SPECIAL_EDGE_FIELDS: [&str; 4] = ["trajectory", "corridor", "direction", "minHeight"];
 
 impl Order {
     /// Reads an order; `Err` if its format or a type is wrong (ORD-REJ-01).
@@ -257,7 +310,7 @@ fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
 fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge, Defect> {
     fields.optional("edgeDescription", Fields::prose)?;
     fields.optional("length", Fields::number)?;
-    for key in UNSUPPORTED_EDGE_FIELDS {
+    for key in SPECIAL_EDGE_FIELDS {
         if fields.has(key) {
             unsupported.push(fields.at(key));
         }
@@ -281,6 +334,15 @@ fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge,
         orientation: fields.optional("orientation", Fields::number)?,
         global,
         rotation_allowed: fields.optional("rotationAllowed", Fields::boolean)?,
+        trajectory: part(fields, "trajectory", Trajectory::read)?,
+        corridor: part(fields, "corridor", Corridor::read)?,
+        direction: fields.optional("direction", Fields::text)?.map(str::to_owned),
         actions: read_actions(fields)?,
     })
+}
+
+/// An optional object of an edge.
+fn part<T>(fields: &Fields<'_>, key: &str, read: fn(&Value, &str) -> Result<T, Defect>) -> Result<Option<T>, Defect> {
+    let value = fields.raw(key).filter(|value| !value.is_null());
+    value.map(|value| read(value, &fields.at(key))).transpose()
 }

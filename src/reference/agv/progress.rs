@@ -1,15 +1,17 @@
 //! Driving the order: setting out, arriving, traversing, and beginning actions (sections 6.10.2 and 6.12).
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Duration;
 
 use super::action_kinds::Deed;
 use super::actions::Origin;
 use super::book::Stop;
 use super::faults::FaultName as F;
+use super::motion::Facing;
 use super::order_message::{Blocking, Edge};
 use super::tolerances::ToleranceName as T;
 use super::{Agv, Mode, motion};
+use crate::nurbs::Path;
 
 /// An orientation is right within this, in radians.
 const ALIGNED: f64 = 1e-3;
@@ -37,7 +39,11 @@ impl Agv {
     /// Draws all consequences that need no time.
     pub(super) fn settle(&mut self) {
         for _ in 0..10_000 {
-            let progress = self.begin_deferred() | self.begin_triggered() | self.drive() | self.settle_cancel();
+            let progress = self.watch_corridor()
+                | self.begin_deferred()
+                | self.begin_triggered()
+                | self.drive()
+                | self.settle_cancel();
             if !progress {
                 break;
             }
@@ -131,8 +137,13 @@ impl Agv {
         let moment = self.moment();
         let edge = self.book.edge_ahead().cloned();
         let pose = self.motion.pose(moment);
-        let distance = pose.distance(stop.place.x, stop.place.y);
-        let (theta, backwards) = self.course(edge.as_ref(), stop);
+        if edge.as_ref().is_some_and(|edge| self.is_blocked(edge)) {
+            return false;
+        }
+        let curve = edge.as_ref().and_then(|edge| self.curve_ahead(edge, stop));
+        let straight = pose.distance(stop.place.x, stop.place.y);
+        let distance = curve.as_ref().map_or(straight, Path::length);
+        let (theta, backwards) = self.course(edge.as_ref(), stop, curve.as_ref());
         let aligned = self.turns_late() || distance < 1e-6 || motion::wrapped(theta - pose.theta).abs() <= ALIGNED;
         let turns_before = edge.as_ref().is_some_and(|edge| edge.rotation_allowed == Some(false));
         self.charging = false;
@@ -146,7 +157,7 @@ impl Agv {
         if distance < 1e-6 {
             self.motion.reached = true;
         } else if aligned {
-            self.roll(edge.as_ref(), stop, distance, backwards);
+            self.roll(edge.as_ref(), stop, (distance, backwards), curve);
         } else {
             self.motion.turn(moment, theta, self.rotation_speed(edge.as_ref()));
         }
@@ -164,7 +175,7 @@ impl Agv {
         }
     }
 
-    fn roll(&mut self, edge: Option<&Edge>, stop: &Stop, distance: f64, backwards: bool) {
+    fn roll(&mut self, edge: Option<&Edge>, stop: &Stop, (distance, backwards): (f64, bool), curve: Option<Path>) {
         let moment = self.moment();
         let pose = self.motion.pose(moment);
         let stops = edge.is_some_and(|edge| self.actions.edge_stops(edge.sequence_id));
@@ -189,13 +200,17 @@ impl Agv {
             _ if self.book.slipped => self.config.speed * 4.0,
             _ => self.config.speed,
         };
-        self.motion.roll(
-            moment,
-            to,
-            permitted.map_or(own, |permitted| permitted.min(own)),
-            backwards,
-            to_node,
-        );
+        let speed = permitted.map_or(own, |permitted| permitted.min(own));
+        let Some(curve) = curve else {
+            self.motion.roll(moment, to, speed, backwards, to_node);
+            return;
+        };
+        let facing = match () {
+            () if self.faults.has(F::TangentIgnored) => Facing::Fixed(pose.theta),
+            () if backwards => Facing::Along(PI),
+            () => Facing::Along(0.0),
+        };
+        self.motion.follow(moment, curve.first(way), speed, facing, to_node);
     }
 
     /// `traversed-early`: the rest of the way to the last node, which is reported already.
@@ -228,9 +243,13 @@ impl Agv {
     }
 
     /// The orientation on the way to a node, and whether it drives backwards (ORD-MSG-22).
-    fn course(&self, edge: Option<&Edge>, stop: &Stop) -> (f64, bool) {
+    fn course(&self, edge: Option<&Edge>, stop: &Stop, curve: Option<&Path>) -> (f64, bool) {
         let pose = self.motion.pose(self.moment());
-        let heading = (stop.place.y - pose.y).atan2(stop.place.x - pose.x);
+        let straight = (stop.place.y - pose.y).atan2(stop.place.x - pose.x);
+        let begin = curve
+            .filter(|_| !self.faults.has(F::TangentIgnored))
+            .and_then(|curve| curve.at(0.0));
+        let heading = begin.map_or(straight, |begin| begin.heading);
         let wanted = edge.filter(|_| !self.faults.has(F::EdgeOrientationIgnored));
         let relative = wanted.and_then(|edge| {
             edge.orientation.map(|orientation| {
@@ -242,11 +261,7 @@ impl Agv {
             })
         });
         let backwards = relative.is_some_and(|relative| motion::wrapped(relative).abs() > FRAC_PI_2);
-        let theta = if backwards {
-            heading + std::f64::consts::PI
-        } else {
-            heading
-        };
+        let theta = if backwards { heading + PI } else { heading };
         (motion::wrapped(theta), backwards)
     }
 
@@ -350,7 +365,7 @@ impl Agv {
         if stale || (self.faults.has(F::NodeSkipped) && plain && between) {
             return;
         }
-        self.book.last_node.clone_from(&stop.node.id);
+        self.book.last_node = self.mark_below().unwrap_or_else(|| stop.node.id.clone());
         if self.faults.has(F::LoopConfused) {
             let first = self
                 .book

@@ -63,6 +63,7 @@ impl Agv {
     /// Reports a refusal; nothing else changes (ORD-FLOW-12).
     pub(super) fn refuse(&mut self, message: &Value, refusal: Refusal) {
         self.refusal_side_effects(message, refusal.rule);
+        self.locked |= refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorLocks);
         if self.faults.has(F::RejectionSilent) {
             return;
         }

@@ -34,7 +34,7 @@ pub(super) struct Report {
 }
 
 /// Members that change without being an event.
-const SILENT: [&str; 3] = ["agvPosition", "velocity", "batteryState"];
+const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
 
 /// Faults that keep events from the state.
 const KEPT_EVENTS: [F; 9] = [
@@ -281,7 +281,9 @@ impl Agv {
 
     fn publish_visualization(&mut self) {
         let mut body = Map::new();
-        body.insert("agvPosition".into(), self.position_picture());
+        if !self.config.line_guided() {
+            body.insert("agvPosition".into(), self.position_picture());
+        }
         body.insert("velocity".into(), self.velocity_picture());
         self.publish("visualization", body, &[]);
     }

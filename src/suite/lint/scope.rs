@@ -10,7 +10,7 @@ use crate::suite::grammar::is_course_name;
 use crate::suite::model::{Step, Verb};
 
 /// The names of `time.`.
-const TIMES: [&str; 12] = [
+const TIMES: [&str; 13] = [
     "react",
     "slow",
     "event",
@@ -23,6 +23,7 @@ const TIMES: [&str; 12] = [
     "broker",
     "statePeriod",
     "settle",
+    "look",
 ];
 
 /// The names of `device.` that a profile may give.

@@ -34,6 +34,9 @@ impl Agv {
         if has(F::ZoneSetInvented) {
             set("zoneSetId", json!("factory"));
         }
+        if self.config.line_guided() {
+            set("distanceSinceLastNode", json!(self.distance_made()));
+        }
         if has(F::DistanceNegative) {
             set("distanceSinceLastNode", json!(-1.0));
         }
@@ -41,7 +44,9 @@ impl Agv {
         set("lastNodeSequenceId", json!(self.book.last_sequence));
         set("nodeStates", self.node_states(complete));
         set("edgeStates", self.edge_states(complete));
-        set("agvPosition", self.position_picture());
+        if !self.config.line_guided() {
+            set("agvPosition", self.position_picture());
+        }
         set("velocity", self.velocity_picture());
         set("loads", self.loads_picture());
         set("driving", json!(self.shows_driving()));
@@ -88,6 +93,13 @@ impl Agv {
         state
     }
 
+    /// Metres since the last node.
+    fn distance_made(&self) -> f64 {
+        let pose = self.motion.pose(self.moment());
+        let left = self.book.left.0.as_ref().filter(|_| self.book.entered);
+        left.map_or(0.0, |stop| pose.distance(stop.place.x, stop.place.y))
+    }
+
     fn shows_driving(&self) -> bool {
         let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
         (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported))
@@ -124,7 +136,7 @@ impl Agv {
             "sequenceId": node.sequence_id,
             "released": node.released || self.faults.has(F::HorizonReportedReleased),
         });
-        if let Some(position) = &node.sent_position {
+        if let Some(position) = node.sent_position.as_ref().filter(|_| !self.config.line_guided()) {
             picture["nodePosition"] = position.clone();
         }
         if self.faults.has(F::NodeStatesWithoutSequence)
@@ -143,15 +155,14 @@ impl Agv {
             .edges
             .iter()
             .filter(|edge| edge.released || !self.faults.has(F::HorizonNotReported));
-        let planned = self.faults.has(F::TrajectoryWithoutPoints);
         let picture = |edge: &Edge| {
             let mut picture = json!({
                 "edgeId": edge.id,
                 "sequenceId": edge.sequence_id,
                 "released": edge.released || self.faults.has(F::HorizonReportedReleased),
             });
-            if planned {
-                picture["trajectory"] = json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0] });
+            if let Some(path) = self.planned_path(edge) {
+                picture["trajectory"] = path;
             }
             picture
         };
@@ -199,10 +210,10 @@ impl Agv {
         } else {
             pose.theta
         };
-        let y = if self.faults.has(F::AxesMirrored) {
-            -pose.y
+        let x = if self.faults.has(F::AxesMirrored) {
+            -pose.x
         } else {
-            pose.y
+            pose.x
         };
         let map_id = match () {
             () if self.faults.has(F::PositionMapStale) => "factory-default".to_owned(),
@@ -219,8 +230,8 @@ impl Agv {
         json!({
             "positionInitialized": !self.lost,
             "localizationScore": 0.98,
-            "x": number(pose.x),
-            "y": number(y),
+            "x": number(x),
+            "y": number(pose.y),
             "theta": theta,
             "mapId": map_id,
         })
