@@ -6,9 +6,9 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 
 use super::header::Subject;
-use crate::course::Layout;
+use crate::course::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Layout};
 use crate::pack::{Pack, Role};
-use crate::profile::TimeLimits;
+use crate::profile::{Place, SAMPLE_ACTIONS, SampleAction, SampleActions, TimeLimits};
 use crate::reference::agv::{AgvConfig, LayoutNode, OnboardMap};
 
 /// The reference AGV and everything a run must know about it.
@@ -22,6 +22,61 @@ pub struct ReferenceAgv {
     pub config: AgvConfig,
     /// Its part of the timing contract.
     pub time: TimeLimits,
+    /// The actions tests may use for their own ends, and where they can be performed.
+    pub actions: SampleActions,
+}
+
+/// Nodes of the built-in floor: a shelf with a load, a shelf that is taken, a lift, a charger.
+const SHELF: &str = "E1";
+const TAKEN_SHELF: &str = "E2";
+const LIFT: &str = "E3";
+const CHARGER: &str = "E4";
+/// Where the vehicle comes out of the lift on the other floor.
+const UPPER_LIFT: &str = "U3";
+
+/// The actions of the built-in vehicle on the built-in floor.
+fn sample_actions(layout: &Layout) -> SampleActions {
+    let load = json!({ "stationType": "floor", "loadType": "EPAL" });
+    let object = json!({ "objectType": "EPAL" });
+    let lift = layout.node(UPPER_LIFT);
+    let pose = json!({
+        "x": lift.map(|node| node.x), "y": lift.map(|node| node.y), "theta": 0.0,
+        "mapId": lift.map(|node| node.map_id.as_str()), "lastNodeId": UPPER_LIFT,
+    });
+    let edge = format!("D1-{SHELF}");
+    let all = [
+        ("long-action", "beep", "", json!({ "duration": 0.5 })),
+        ("uninterruptible-action", "calibrate", "", json!({ "duration": 0.5 })),
+        ("edge-condition", "warningLights", "warningLights", json!({})),
+        ("pick", "pick", SHELF, load.clone()),
+        ("drop", "drop", SHELF, load.clone()),
+        ("edge-pick", "pick", &edge, load.clone()),
+        ("edge-drop", "drop", &edge, load.clone()),
+        ("failing-pick", "pick", CHARGER, load.clone()),
+        ("failing-drop", "drop", TAKEN_SHELF, load),
+        ("detect-object", "detectObject", SHELF, object.clone()),
+        ("edge-detect-object", "detectObject", &edge, object.clone()),
+        ("failing-detect-object", "detectObject", LIFT, object),
+        ("fine-positioning", "finePositioning", SHELF, json!({})),
+        ("edge-fine-positioning", "finePositioning", &edge, json!({})),
+        ("failing-fine-positioning", "finePositioning", LIFT, json!({})),
+        ("start-charging", "startCharging", CHARGER, json!({})),
+        ("failing-start-charging", "startCharging", SHELF, json!({})),
+        ("lift", "initPosition", LIFT, pose),
+    ];
+    let sample = |(name, action_type, place, parameters): (&str, &str, &str, Value)| {
+        let kind = SAMPLE_ACTIONS.iter().find(|kind| kind.name == name)?;
+        let mut action = SampleAction::plain(action_type);
+        action.parameters = parameters.as_object().cloned().unwrap_or_default();
+        match kind.place {
+            Place::Anywhere => {}
+            Place::Shown => action.shows = Some(place.to_owned()),
+            Place::Node => action.node = Some(place.to_owned()),
+            Place::Edge => action.edge = Some(place.to_owned()),
+        }
+        Some((kind.name, action))
+    };
+    SampleActions(all.into_iter().filter_map(sample).collect())
 }
 
 impl ReferenceAgv {
@@ -35,6 +90,8 @@ impl ReferenceAgv {
             topic_template: None,
         };
         let layout = Layout::built_in();
+        let actions = sample_actions(&layout);
+        let layout = layout.with_stations(&actions);
         let nodes: Vec<LayoutNode> = layout
             .nodes()
             .map(|node| LayoutNode {
@@ -45,10 +102,7 @@ impl ReferenceAgv {
                 map_id: node.map_id.clone(),
             })
             .collect();
-        let first = nodes
-            .first()
-            .map(|node| (node.id.clone(), node.map_id.clone()))
-            .unwrap_or_default();
+        let first = nodes.first().map(|node| node.id.clone()).unwrap_or_default();
         let config = AgvConfig {
             manufacturer: subject.manufacturer.clone(),
             serial_number: subject.serial_number.clone(),
@@ -60,14 +114,18 @@ impl ReferenceAgv {
                 .map(|(name, _)| name.to_owned())
                 .collect(),
             nodes,
-            // Tests rely on it: there is nothing to charge at on the built-in floor.
-            chargers: BTreeSet::new(),
-            start_node: first.0,
-            maps: vec![OnboardMap {
-                map_id: first.1,
-                map_version: "1".to_owned(),
-                enabled: true,
-            }],
+            chargers: BTreeSet::from([CHARGER.to_owned()]),
+            stations: [SHELF, TAKEN_SHELF].map(|node| (node.to_owned(), true)).into(),
+            // Two more fit, which tests rely on.
+            map_capacity: 4,
+            start_node: first,
+            maps: [BUILT_IN_MAP, BUILT_IN_UPPER_MAP]
+                .map(|map| OnboardMap {
+                    map_id: map.to_owned(),
+                    map_version: "1".to_owned(),
+                    enabled: true,
+                })
+                .to_vec(),
             // Brisk, so that a run over real sockets takes a minute; slow enough to be caught between two nodes.
             speed: 8.0,
             rotation_speed: 8.0 * std::f64::consts::PI,
@@ -92,6 +150,7 @@ impl ReferenceAgv {
             layout,
             config,
             time,
+            actions,
         }
     }
 
@@ -114,16 +173,19 @@ impl ReferenceAgv {
             ("node-bound", !stops),
             ("interruptible-actions", self.config.interruptible),
             ("uninterruptible-actions", true),
-            ("long-action", true),
-            ("uninterruptible-action", true),
             ("edge-actions", true),
-            ("no-charger-on-course", true),
+            ("small-map-storage", true),
             ("carries-load", true),
             ("map-hash", true),
             ("line-guided", false),
             ("free-navigation", true),
         ]
         .into_iter()
+        .chain(
+            SAMPLE_ACTIONS
+                .iter()
+                .map(|kind| (kind.name, self.actions.0.contains_key(kind.name))),
+        )
         .map(|(name, said)| (name.to_owned(), said))
         .collect()
     }
@@ -131,11 +193,7 @@ impl ReferenceAgv {
     /// `device.*` beside identity and factsheet: the actions tests may use for their own ends.
     #[must_use]
     pub fn device_bindings(&self) -> Map<String, Value> {
-        let action = |name: &str| json!({ "type": name, "parameters": { "duration": 0.5 } });
-        let mut all = Map::new();
-        all.insert("longAction".to_owned(), action("beep"));
-        all.insert("uninterruptibleAction".to_owned(), action("calibrate"));
-        all
+        self.actions.bindings()
     }
 
     /// Gives it another name.
@@ -149,7 +207,7 @@ impl ReferenceAgv {
     }
 
     /// The hooks it understands as commands.
-    pub const HOOKS: [&'static str; 14] = [
+    pub const HOOKS: [&'static str; 17] = [
         "power-cycle",
         "shutdown",
         "start",
@@ -161,6 +219,9 @@ impl ReferenceAgv {
         "remove-load",
         "press-pause",
         "release-pause",
+        "block-pause",
+        "unblock-pause",
+        "use-lift",
         "enable-map",
         "enter-field",
         "leave-field",

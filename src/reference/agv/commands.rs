@@ -16,7 +16,7 @@ use super::{Agv, Mode};
 ///
 /// `place-on {nodeId}`, `move-to {x, y, theta}`, `set-mode {mode}`, `enable-map {mapId, mapVersion}`,
 /// `place-load {loadId, loadType}`, `trigger {actionId?}`; the others take nothing.
-pub const COMMANDS: [&str; 16] = [
+pub const COMMANDS: [&str; 19] = [
     "power-cycle",
     "shutdown",
     "start",
@@ -28,6 +28,9 @@ pub const COMMANDS: [&str; 16] = [
     "release-emergency-stop",
     "press-pause",
     "release-pause",
+    "block-pause",
+    "unblock-pause",
+    "use-lift",
     "enable-map",
     "enter-field",
     "leave-field",
@@ -53,6 +56,10 @@ impl Agv {
             }
             "press-pause" => self.set_holds(|holds| holds.button = true),
             "release-pause" => self.set_holds(|holds| holds.button = false),
+            "block-pause" => self.pause_blocked = true,
+            "unblock-pause" => self.pause_blocked = false,
+            // The vehicle sees nothing of a lift: it is told where it is by initPosition.
+            "use-lift" => {}
             "enter-field" => self.set_holds(|holds| holds.field = true),
             "leave-field" => self.set_holds(|holds| holds.field = false),
             "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}

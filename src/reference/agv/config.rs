@@ -172,6 +172,8 @@ pub struct AgvConfig {
     pub stops_between_nodes: bool,
     /// Nodes with a charger.
     pub chargers: BTreeSet<String>,
+    /// Nodes where loads are handed over, and whether one stands there at first.
+    pub stations: BTreeMap<String, bool>,
     /// Number of maps the vehicle can store.
     pub map_capacity: usize,
     /// Maps on board at first.
@@ -209,6 +211,7 @@ impl Default for AgvConfig {
             })
             .collect();
         let chargers = nodes.iter().map(|node| node.id.clone()).collect();
+        let stations = nodes.iter().map(|node| (node.id.clone(), true)).collect();
         Self {
             manufacturer: "Reference".into(),
             serial_number: "agv-1".into(),
@@ -242,6 +245,7 @@ impl Default for AgvConfig {
             interruptible: true,
             stops_between_nodes: true,
             chargers,
+            stations,
             map_capacity: 8,
             maps: vec![OnboardMap {
                 map_id: "hall".into(),

@@ -116,7 +116,7 @@ impl Agv {
         action.status = Status::Running;
         let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
         let duration = if waits { super::cancel::MOMENT } else { duration };
-        let awaits = awaits && waits;
+        let awaits = awaits && waits || action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights);
         let endless = awaits || (stuck && !action.of_order());
         action.due = (!endless).then(|| moment + duration);
     }
@@ -194,7 +194,7 @@ impl Agv {
             Deed::StopPause => self.stop_pause(action),
             Deed::StartCharging => self.start_charging(action).into(),
             Deed::StopCharging => {
-                self.charging = false;
+                self.stop_charging();
                 Outcome::Done(None)
             }
             Deed::InitPosition => self.init_position(action).into(),
@@ -217,21 +217,15 @@ impl Agv {
             }
             Deed::Pick => self.pick(action).into(),
             Deed::Drop => self.put_down(action).into(),
-            Deed::DetectObject => {
-                let object = if action.text("objectType").is_empty() {
-                    "object"
-                } else {
-                    action.text("objectType")
-                };
-                Outcome::Done(Some(format!("{object} detected")))
-            }
+            Deed::DetectObject => self.detect(action),
+            Deed::FinePositioning => self.align(action).into(),
             Deed::FactsheetRequest => {
                 if !self.faults.has(F::FactsheetRequestUnanswered) {
                     self.publish_factsheet();
                 }
                 Outcome::Done(None)
             }
-            Deed::FinePositioning | Deed::WaitForTrigger | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
+            Deed::WaitForTrigger | Deed::WarningLights | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
             Deed::CancelOrder => {
                 self.cancel_order(&action.request.id);
                 Outcome::Open
@@ -243,7 +237,15 @@ impl Agv {
         }
     }
 
+    /// Whether a switch forbids what a message asks for (ACT-16).
+    fn is_pause_blocked(&self) -> bool {
+        self.pause_blocked && !self.faults.has(F::ButtonPauseOverridden)
+    }
+
     fn start_pause(&mut self, action: &Action) -> Outcome {
+        if self.is_pause_blocked() {
+            return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
+        }
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
         }
@@ -256,6 +258,9 @@ impl Agv {
 
     /// A pause made with the button is lifted with the button (ACT-16).
     fn stop_pause(&mut self, action: &Action) -> Outcome {
+        if self.is_pause_blocked() {
+            return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle paused"));
+        }
         if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
         }
@@ -278,6 +283,13 @@ impl Agv {
             (true, false) => self.actions.resume(moment),
             _ => {}
         }
+    }
+
+    fn stop_charging(&mut self) {
+        if self.charging && self.faults.has(F::ChargingEndsEarly) {
+            self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
+        }
+        self.charging &= self.faults.has(F::ChargingEndUnreported);
     }
 
     /// The charger is at a node: there is none where the vehicle drives (ACT-20).
@@ -316,11 +328,13 @@ impl Agv {
         }
         self.lost = self.faults.has(F::InitPositionUninitialized);
         self.maps.enable_any(map_id);
+        let stale = action.of_order() && self.faults.has(F::LiftMapStale);
+        let old = self.motion.pose(self.moment()).map_id;
         self.motion.place(Pose {
             x,
             y,
             theta: theta.clamp(-PI, PI),
-            map_id: map_id.to_owned(),
+            map_id: if stale { old } else { map_id.to_owned() },
         });
         if !self.faults.has(F::InitPositionKeepsNode) {
             action.text("lastNodeId").clone_into(&mut self.book.last_node);
@@ -346,14 +360,61 @@ impl Agv {
         result.map_err(|reason| Problem::map(action, reason))
     }
 
-    fn pick(&mut self, action: &Action) -> Result<(), Problem> {
-        if !self.loads.is_empty() {
-            if self.faults.has(F::PickFailureFinished) {
-                return Ok(());
-            }
-            let problem = Problem::new(Area::Load, action, "the vehicle carries a load already");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+    /// The node where an action takes place: on an edge the one it leads to.
+    fn site(&self, action: &Action) -> String {
+        let ahead = self.book.nodes.front().map(|stop| &stop.node.id);
+        let ahead = ahead.filter(|_| matches!(action.origin, Origin::Edge(_)));
+        ahead.unwrap_or(&self.book.last_node).clone()
+    }
+
+    /// A load or a charger is an object (ACT-35).
+    fn detect(&self, action: &Action) -> Outcome {
+        let site = self.site(action);
+        let there = self.stations.get(&site) == Some(&true) || self.config.chargers.contains(&site);
+        if !there && !self.faults.has(F::DetectionFailureFinished) {
+            return Outcome::Failed(Problem::new(Area::Load, action, "there is no object"));
         }
+        let object = if action.text("objectType").is_empty() {
+            "object"
+        } else {
+            action.text("objectType")
+        };
+        let result = format!("{object} detected");
+        Outcome::Done(Some(result).filter(|_| !self.faults.has(F::DetectionUndescribed)))
+    }
+
+    /// A station or a charger is a target (ACT-36).
+    fn align(&self, action: &Action) -> Result<(), Problem> {
+        let site = self.site(action);
+        let target = self.stations.contains_key(&site) || self.config.chargers.contains(&site);
+        if target || self.faults.has(F::PositioningFailureFinished) {
+            return Ok(());
+        }
+        Err(Problem::new(Area::Localization, action, "there is no target"))
+    }
+
+    /// pick or drop has failed.
+    fn load_problem(&self, action: &Action, reason: &str) -> Result<(), Problem> {
+        let mut problem = Problem::new(Area::Load, action, reason);
+        if self.faults.has(F::FailureUnreferenced) {
+            problem.references.clear();
+        }
+        Err(problem.silent_if(self.faults.has(F::FailureSilent)))
+    }
+
+    fn pick(&mut self, action: &Action) -> Result<(), Problem> {
+        let site = self.site(action);
+        let reason = match self.stations.get(&site) {
+            _ if !self.loads.is_empty() => Some("the vehicle carries a load already"),
+            Some(true) => None,
+            _ => Some("there is no load"),
+        };
+        match reason {
+            Some(_) if self.faults.has(F::PickFailureFinished) => return Ok(()),
+            Some(reason) => return self.load_problem(action, reason),
+            None => {}
+        }
+        self.stations.insert(site, false);
         if !self.faults.has(F::PickWithoutLoad) {
             let given = |key: &str, other: &str| match action.request.parameter(key).and_then(Value::as_str) {
                 Some(text) => text.to_owned(),
@@ -375,10 +436,18 @@ impl Agv {
             .iter()
             .position(|load| wanted.is_empty() || load.id == wanted);
         let Some(found) = found else {
-            let problem = Problem::new(Area::Load, action, "the vehicle does not carry that load");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+            return self.load_problem(action, "the vehicle does not carry that load");
         };
-        self.loads.remove(found);
+        let site = self.site(action);
+        match self.stations.get_mut(&site) {
+            Some(true) if self.faults.has(F::DropFailureFinished) => return Ok(()),
+            Some(true) => return self.load_problem(action, "the place is taken"),
+            Some(taken) => *taken = true,
+            None => {}
+        }
+        if !self.faults.has(F::DropKeepsLoad) {
+            self.loads.remove(found);
+        }
         Ok(())
     }
 }

@@ -117,7 +117,13 @@ pub struct Agv {
     holds: Holds,
     mode: Mode,
     loads: Vec<Load>,
+    /// Where loads are handed over, and whether one stands there.
+    stations: std::collections::BTreeMap<String, bool>,
     charging: bool,
+    /// It takes no orders until then (`charging-ends-early` only).
+    undocking: Option<Moment>,
+    /// A switch keeps it from pausing and from going on.
+    pause_blocked: bool,
     /// It has not found its pose (`init-position-uninitialized` only).
     lost: bool,
     /// The map it says it is on (`init-position-taken-anyway` only).
@@ -172,7 +178,10 @@ impl Agv {
             holds: Holds::default(),
             mode: Mode::Automatic,
             loads: Vec::new(),
+            stations: config.stations.clone(),
             charging: false,
+            undocking: None,
+            pause_blocked: false,
             lost: false,
             claimed_map: None,
             connection: Connection::new(),

@@ -79,6 +79,11 @@ impl Agv {
                 "information",
                 json!([{ "infoType": "service", "infoLevel": "WARNING" }]),
             );
+        } else if self.is_flashing() {
+            set(
+                "information",
+                json!([{ "infoType": "warningLights", "infoLevel": "INFO" }]),
+            );
         } else {
             set("information", json!([]));
         }
