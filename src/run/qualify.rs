@@ -237,7 +237,7 @@ fn kill(library: &Library, pack: &Pack, requests: &[VirtualRun], fault: Fault) -
         requirements: Vec::new(),
         verdict: None,
     };
-    for request in requests {
+    for request in requests.iter().filter(|request| request.device.own_tests) {
         let mut request = request.clone();
         request.faults = vec![fault.name.to_owned()];
         let finished = run_silently(library, pack, request)?;

@@ -24,6 +24,8 @@ pub struct ReferenceAgv {
     pub time: TimeLimits,
     /// The actions tests may use for their own ends, and where they can be performed.
     pub actions: SampleActions,
+    /// Whether some tests are for a vehicle like this only, so that faults have to be tried on it as well.
+    pub own_tests: bool,
 }
 
 /// Nodes of the built-in floor: a shelf with a load, a shelf that is taken, a lift, a charger.
@@ -151,17 +153,43 @@ impl ReferenceAgv {
             config,
             time,
             actions,
+            own_tests: true,
         }
     }
 
-    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well: one that can
-    /// stop on nodes only.
+    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well, and so that nobody
+    /// is blamed for what they need not have: one that can stop on nodes only, one without loads and chargers, one
+    /// without maps, and one that says as little as it may in its factsheet. The usual one is the first.
     #[must_use]
     pub fn variants(pack: &Pack) -> Vec<Self> {
         let usual = Self::new(pack);
         let mut node_bound = usual.clone();
         node_bound.config.stops_between_nodes = false;
-        vec![usual, node_bound]
+        let mut without_loads = usual.clone();
+        without_loads.own_tests = false;
+        without_loads
+            .actions
+            .0
+            .retain(|name, _| matches!(*name, "long-action" | "uninterruptible-action"));
+        let of_stations = [
+            "pick",
+            "drop",
+            "detectObject",
+            "finePositioning",
+            "startCharging",
+            "stopCharging",
+        ];
+        without_loads.config.without_actions = of_stations.map(str::to_owned).into();
+        let mut without_maps = usual.clone();
+        without_maps.own_tests = false;
+        without_maps
+            .config
+            .features
+            .retain(|feature| feature != "maps" && feature != "mapActions");
+        let mut terse = usual.clone();
+        terse.own_tests = false;
+        terse.config.minimal_factsheet = true;
+        vec![usual, node_bound, without_loads, without_maps, terse]
     }
 
     /// What a profile would state about it.
@@ -175,7 +203,7 @@ impl ReferenceAgv {
             ("uninterruptible-actions", true),
             ("edge-actions", true),
             ("small-map-storage", true),
-            ("carries-load", true),
+            ("carries-load", !self.config.without_actions.contains("pick")),
             ("map-hash", true),
             ("line-guided", false),
             ("free-navigation", true),

@@ -136,6 +136,8 @@ pub struct AgvConfig {
     pub features: BTreeSet<String>,
     /// Names of errors.
     pub errors: ErrorNames,
+    /// The factsheet says only what it has to.
+    pub minimal_factsheet: bool,
     /// Predefined actions this vehicle does *not* offer.
     pub without_actions: BTreeSet<String>,
     /// Nodes the vehicle knows the position of.
@@ -227,6 +229,7 @@ impl Default for AgvConfig {
             .map(String::from)
             .into(),
             errors: ErrorNames::default(),
+            minimal_factsheet: false,
             without_actions: BTreeSet::new(),
             nodes,
             start_node: "n1".into(),

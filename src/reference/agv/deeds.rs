@@ -2,20 +2,18 @@
 
 use std::f64::consts::PI;
 
-use serde_json::Value;
-
-use super::action_kinds::{Deed, LOAD_POSITIONS};
+use super::Agv;
+use super::action_kinds::Deed;
 use super::actions::{Action, Origin, Status};
 use super::faults::FaultName as F;
 use super::motion::Pose;
-use super::{Agv, Load};
 
 /// Coordinates beyond this are no place on any map of the site, in metres.
 const FARTHEST: f64 = 10_000.0;
 
 /// Which error a failed action raises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Area {
+pub(super) enum Area {
     InstantAction,
     Map,
     Localization,
@@ -28,12 +26,13 @@ enum Area {
 pub(super) struct Problem {
     area: Area,
     reason: String,
-    references: Vec<(String, String)>,
+    pub(super) references: Vec<(String, String)>,
     silent: bool,
 }
 
 impl Problem {
-    fn new(area: Area, action: &Action, reason: &str) -> Self {
+    /// What went wrong with an action.
+    pub(super) fn new(area: Area, action: &Action, reason: &str) -> Self {
         let reference = |key: &str, value: &str| (key.to_owned(), value.to_owned());
         let references = vec![
             reference("actionId", &action.request.id),
@@ -69,7 +68,7 @@ impl Problem {
 }
 
 /// How a deed went.
-enum Outcome {
+pub(super) enum Outcome {
     Done(Option<String>),
     Failed(Problem),
     /// Something else ends the action.
@@ -299,7 +298,8 @@ impl Agv {
                 return Ok(());
             }
             self.charging = self.faults.has(F::ChargingShownAnyway);
-            return Err(Problem::new(Area::Charging, action, "the vehicle is not at a charger"));
+            let problem = Problem::new(Area::Charging, action, "the vehicle is not at a charger");
+            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
         }
         self.charging = !self.faults.has(F::ChargingUnreported);
         Ok(())
@@ -358,96 +358,5 @@ impl Agv {
             .maps
             .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);
         result.map_err(|reason| Problem::map(action, reason))
-    }
-
-    /// The node where an action takes place: on an edge the one it leads to.
-    fn site(&self, action: &Action) -> String {
-        let ahead = self.book.nodes.front().map(|stop| &stop.node.id);
-        let ahead = ahead.filter(|_| matches!(action.origin, Origin::Edge(_)));
-        ahead.unwrap_or(&self.book.last_node).clone()
-    }
-
-    /// A load or a charger is an object (ACT-35).
-    fn detect(&self, action: &Action) -> Outcome {
-        let site = self.site(action);
-        let there = self.stations.get(&site) == Some(&true) || self.config.chargers.contains(&site);
-        if !there && !self.faults.has(F::DetectionFailureFinished) {
-            return Outcome::Failed(Problem::new(Area::Load, action, "there is no object"));
-        }
-        let object = if action.text("objectType").is_empty() {
-            "object"
-        } else {
-            action.text("objectType")
-        };
-        let result = format!("{object} detected");
-        Outcome::Done(Some(result).filter(|_| !self.faults.has(F::DetectionUndescribed)))
-    }
-
-    /// A station or a charger is a target (ACT-36).
-    fn align(&self, action: &Action) -> Result<(), Problem> {
-        let site = self.site(action);
-        let target = self.stations.contains_key(&site) || self.config.chargers.contains(&site);
-        if target || self.faults.has(F::PositioningFailureFinished) {
-            return Ok(());
-        }
-        Err(Problem::new(Area::Localization, action, "there is no target"))
-    }
-
-    /// pick or drop has failed.
-    fn load_problem(&self, action: &Action, reason: &str) -> Result<(), Problem> {
-        let mut problem = Problem::new(Area::Load, action, reason);
-        if self.faults.has(F::FailureUnreferenced) {
-            problem.references.clear();
-        }
-        Err(problem.silent_if(self.faults.has(F::FailureSilent)))
-    }
-
-    fn pick(&mut self, action: &Action) -> Result<(), Problem> {
-        let site = self.site(action);
-        let reason = match self.stations.get(&site) {
-            _ if !self.loads.is_empty() => Some("the vehicle carries a load already"),
-            Some(true) => None,
-            _ => Some("there is no load"),
-        };
-        match reason {
-            Some(_) if self.faults.has(F::PickFailureFinished) => return Ok(()),
-            Some(reason) => return self.load_problem(action, reason),
-            None => {}
-        }
-        self.stations.insert(site, false);
-        if !self.faults.has(F::PickWithoutLoad) {
-            let given = |key: &str, other: &str| match action.request.parameter(key).and_then(Value::as_str) {
-                Some(text) => text.to_owned(),
-                None => other.to_owned(),
-            };
-            self.loads.push(Load {
-                id: given("loadId", ""),
-                kind: given("loadType", "EPAL"),
-                position: given("lhd", LOAD_POSITIONS[0]),
-            });
-        }
-        Ok(())
-    }
-
-    fn put_down(&mut self, action: &Action) -> Result<(), Problem> {
-        let wanted = action.text("loadId");
-        let found = self
-            .loads
-            .iter()
-            .position(|load| wanted.is_empty() || load.id == wanted);
-        let Some(found) = found else {
-            return self.load_problem(action, "the vehicle does not carry that load");
-        };
-        let site = self.site(action);
-        match self.stations.get_mut(&site) {
-            Some(true) if self.faults.has(F::DropFailureFinished) => return Ok(()),
-            Some(true) => return self.load_problem(action, "the place is taken"),
-            Some(taken) => *taken = true,
-            None => {}
-        }
-        if !self.faults.has(F::DropKeepsLoad) {
-            self.loads.remove(found);
-        }
-        Ok(())
     }
 }

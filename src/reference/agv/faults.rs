@@ -235,8 +235,8 @@ faults! {
 
     // Actions
     ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07"] "Never begins the actions of an order.";
-    VendorPauseListed "vendor-pause-listed" ["ACT-05"] "Lists a pause action of its own beside startPause.";
-    PickParameterRenamed "pick-parameter-renamed" ["ACT-06"] "Calls the height of a pick liftHeightMm.";
+    VendorPauseListed "vendor-pause-listed" ["ACT-05"] "Lists its pause as StartPause and StopPause.";
+    PickParameterRenamed "pick-parameter-renamed" ["ACT-06"] "Calls the station type of a pick station_type in its factsheet.";
     UndescribedStatus "undescribed-status" ["ACT-41"] "Reports instant actions INITIALIZING that have no preparation.";
     PickPreparedAsRunning "pick-prepared-as-running" ["ACT-33", "ASTATE-02"] "Reports a pick RUNNING while it only prepares for it.";
     FieldDoesNotPause "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated.";
@@ -263,14 +263,14 @@ faults! {
     StateRequestUnanswered "state-request-unanswered" ["ACT-26"] "Reports stateRequest FINISHED only with the next periodic state.";
     LogNameMissing "log-name-missing" ["ACT-27", "STATE-MSG-12"] "Does not name the log it stored.";
     PickWithoutLoad "pick-without-load" ["ACT-28"] "Reports pick FINISHED and no load.";
-    DropKeepsLoad "drop-keeps-load" ["ACT-28"] "Reports drop FINISHED and the load still on board.";
+    DropReportedLate "drop-reported-late" ["ACT-28"] "Shows its load for another second after drop is FINISHED.";
     PickFailureFinished "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was nothing to pick.";
     DropFailureFinished "drop-failure-finished" ["ACT-29"] "Reports drop FINISHED although the place was taken.";
     FailureUnreferenced "failure-unreferenced" ["BP-03"] "Does not say in its error which pick or drop has failed.";
     DetectionFailureFinished "detection-failure-finished" ["ACT-35"] "Reports detectObject FINISHED although there is no object.";
     DetectionUndescribed "detection-undescribed" ["STATE-MSG-12"] "Does not describe what it has detected, as its factsheet promises.";
     PositioningFailureFinished "positioning-failure-finished" ["ACT-36"] "Reports finePositioning FINISHED although there is no target.";
-    FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick or drop fails.";
+    FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick, a drop or charging fails.";
     TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";

@@ -28,6 +28,7 @@ mod progress;
 mod read;
 mod rejection;
 mod report;
+mod stations;
 #[cfg(test)]
 mod tests;
 
@@ -119,6 +120,8 @@ pub struct Agv {
     loads: Vec<Load>,
     /// Where loads are handed over, and whether one stands there.
     stations: std::collections::BTreeMap<String, bool>,
+    /// A load it does not carry any more, and until when it is shown (`drop-reported-late` only).
+    shadow: Option<(Moment, Load)>,
     charging: bool,
     /// It takes no orders until then (`charging-ends-early` only).
     undocking: Option<Moment>,
@@ -179,6 +182,7 @@ impl Agv {
             mode: Mode::Automatic,
             loads: Vec::new(),
             stations: config.stations.clone(),
+            shadow: None,
             charging: false,
             undocking: None,
             pause_blocked: false,
@@ -218,6 +222,7 @@ impl Agv {
             self.connection.next_attempt(),
             self.connection.online_at,
             self.book.soon,
+            self.shadow.as_ref().map(|(end, _)| *end),
             self.next_report(),
         ];
         events.into_iter().flatten().min()
@@ -246,6 +251,7 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
+        self.shadow.take_if(|(end, _)| *end <= moment);
         self.a_moment_later();
         self.attempt_connection();
         self.settle();

@@ -261,7 +261,8 @@ impl Agv {
                 "weight": weight,
             })
         };
-        self.loads.iter().map(picture).collect()
+        let shadow = self.shadow.iter().map(|(_, load)| load);
+        self.loads.iter().chain(shadow).map(picture).collect()
     }
 
     fn battery(&self) -> Value {
