@@ -99,7 +99,7 @@ impl Layout {
             let Some(far) = graph.far(places) else { return Ok(None) };
             course.nodes.insert(FAR.to_owned(), far.clone());
         }
-        self.add_ways(&mut course, graph, need, stops)?;
+        add_ways(&mut course, graph, need, stops)?;
         let ids: Vec<(String, String)> = course
             .nodes
             .iter()
@@ -114,43 +114,42 @@ impl Layout {
         }
         Ok(Some(course))
     }
+}
 
-    /// Adds the ways to and from stations, with a name for every node on them.
-    fn add_ways(
-        &self,
-        course: &mut Course,
-        graph: &Graph<'_>,
-        need: &CourseNeed,
-        stops: &BTreeMap<String, Stop>,
-    ) -> Result<(), CourseError> {
-        let place = |course: &Course, name: &str| graph.place(&course.nodes.get(name)?.id);
-        for (from, to) in &need.ways {
-            let (Some(start), Some(end)) = (place(course, from), place(course, to)) else {
-                continue;
+/// Adds the ways to and from stations, with a name for every node on them.
+fn add_ways(
+    course: &mut Course,
+    graph: &Graph<'_>,
+    need: &CourseNeed,
+    stops: &BTreeMap<String, Stop>,
+) -> Result<(), CourseError> {
+    let place = |course: &Course, name: &str| graph.place(&course.nodes.get(name)?.id);
+    for (from, to) in &need.ways {
+        let (Some(start), Some(end)) = (place(course, from), place(course, to)) else {
+            continue;
+        };
+        let stop = stops.get(to).copied().unwrap_or(Stop {
+            node: end,
+            before: None,
+        });
+        let way =
+            ways::way(graph, start, stop).ok_or_else(|| ways::no_way(graph.nodes[start], graph.nodes[stop.node]))?;
+        let mut names = Vec::with_capacity(way.len());
+        for (at, inner) in way.iter().enumerate() {
+            let name = if at + 1 == way.len() {
+                to.clone()
+            } else {
+                ways::inner_name(from, to, at + 1)
             };
-            let stop = stops.get(to).copied().unwrap_or(Stop {
-                node: end,
-                before: None,
-            });
-            let way = ways::way(graph, start, stop)
-                .ok_or_else(|| ways::no_way(graph.nodes[start], graph.nodes[stop.node]))?;
-            let mut names = Vec::with_capacity(way.len());
-            for (at, inner) in way.iter().enumerate() {
-                let name = if at + 1 == way.len() {
-                    to.clone()
-                } else {
-                    ways::inner_name(from, to, at + 1)
-                };
-                course
-                    .nodes
-                    .entry(name.clone())
-                    .or_insert_with(|| graph.nodes[*inner].clone());
-                names.push(name);
-            }
-            course.ways.insert((from.clone(), to.clone()), names);
+            course
+                .nodes
+                .entry(name.clone())
+                .or_insert_with(|| graph.nodes[*inner].clone());
+            names.push(name);
         }
-        Ok(())
+        course.ways.insert((from.clone(), to.clone()), names);
     }
+    Ok(())
 }
 
 /// The names to be searched for: `a` first, then as the test uses them. Stations are known, and `far` is found

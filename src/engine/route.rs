@@ -89,7 +89,7 @@ impl RouteBuilder<'_> {
             }
             if let Some(before) = &stop.before {
                 let mut on_edge = self.take(&RoutePlace::Edge(before.clone(), last.to_owned()), &mut used);
-                if stop.names.iter().any(|name| self.is_on_edge(name)) {
+                if stop.names.iter().any(|name| is_on_edge(name)) {
                     on_edge.append(&mut actions);
                 }
                 edges.push(self.edge(before, last, sequence_id.saturating_sub(1), stop.released, on_edge)?);
@@ -127,11 +127,6 @@ impl RouteBuilder<'_> {
             }
         }
         Ok(stops)
-    }
-
-    /// Whether the actions of a station are for the edge that leads to it.
-    fn is_on_edge(&self, name: &str) -> bool {
-        SampleKind::of_variable(name).is_some_and(|kind| kind.place == Place::Edge)
     }
 
     fn take(&self, place: &RoutePlace, used: &mut [bool]) -> Vec<Value> {
@@ -205,6 +200,11 @@ impl RouteBuilder<'_> {
         }
         Ok(built)
     }
+}
+
+/// Whether the actions of a station are for the edge that leads to it.
+fn is_on_edge(name: &str) -> bool {
+    SampleKind::of_variable(name).is_some_and(|kind| kind.place == Place::Edge)
 }
 
 /// The members of these names that are there.

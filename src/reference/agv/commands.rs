@@ -58,8 +58,6 @@ impl Agv {
             "release-pause" => self.set_holds(|holds| holds.button = false),
             "block-pause" => self.pause_blocked = true,
             "unblock-pause" => self.pause_blocked = false,
-            // The vehicle sees nothing of a lift: it is told where it is by initPosition.
-            "use-lift" => {}
             "enter-field" => self.set_holds(|holds| holds.field = true),
             "leave-field" => self.set_holds(|holds| holds.field = false),
             "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
@@ -71,6 +69,7 @@ impl Agv {
             }
             "place-load" => self.place_load(text("loadId"), text("loadType")),
             "remove-load" => self.loads.clear(),
+            // The vehicle sees nothing of a lift (`use-lift`): it is told where it is by initPosition.
             _ => {}
         }
     }

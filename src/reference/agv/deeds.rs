@@ -243,6 +243,9 @@ impl Agv {
 
     fn start_pause(&mut self, action: &Action) -> Outcome {
         if self.is_pause_blocked() {
+            if self.faults.has(F::BlockedPauseTaken) {
+                self.set_holds(|holds| holds.pause = true);
+            }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
         }
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
@@ -258,6 +261,9 @@ impl Agv {
     /// A pause made with the button is lifted with the button (ACT-16).
     fn stop_pause(&mut self, action: &Action) -> Outcome {
         if self.is_pause_blocked() {
+            if self.faults.has(F::BlockedPauseTaken) {
+                self.set_holds(|holds| holds.pause = false);
+            }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle paused"));
         }
         if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
@@ -273,11 +279,13 @@ impl Agv {
     /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
     pub(super) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
         let before = self.holds.any();
+        let field = self.holds.field;
         change(&mut self.holds);
         let moment = self.moment();
         let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
         match (before, self.holds.any()) {
             (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
+            (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
             (false, true) => self.actions.hold(moment, self.faults),
             (true, false) => self.actions.resume(moment),
             _ => {}

@@ -240,6 +240,7 @@ faults! {
     UndescribedStatus "undescribed-status" ["ACT-41"] "Reports instant actions INITIALIZING that have no preparation.";
     PickPreparedAsRunning "pick-prepared-as-running" ["ACT-33", "ASTATE-02"] "Reports a pick RUNNING while it only prepares for it.";
     FieldDoesNotPause "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated.";
+    FieldPauseStuck "field-pause-stuck" ["ACT-34"] "Does not go on with its actions when its protective field is free again.";
     EdgeActionOutlivesEdge "edge-action-outlives-edge" ["ACT-02", "NODE-05"] "Lets the actions of an edge run on behind its end.";
     EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
@@ -249,6 +250,7 @@ faults! {
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Pauses and goes on by message although a switch or the button at the vehicle forbids it.";
+    BlockedPauseTaken "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
     ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
     ChargingEndUnreported "charging-end-unreported" ["ACT-19"] "Reports that it charges after stopCharging is FINISHED.";
@@ -267,6 +269,9 @@ faults! {
     PickFailureFinished "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was nothing to pick.";
     DropFailureFinished "drop-failure-finished" ["ACT-29"] "Reports drop FINISHED although the place was taken.";
     FailureUnreferenced "failure-unreferenced" ["BP-03"] "Does not say in its error which pick or drop has failed.";
+    FailureChangesLoad "failure-changes-load" ["ACT-29"] "Changes the load it shows although its pick or drop has failed.";
+    DetectionFails "detection-fails" ["ACT-35"] "Reports detectObject FAILED although the object is there.";
+    PositioningFails "positioning-fails" ["ACT-36"] "Reports finePositioning FAILED although it has reached the target.";
     DetectionFailureFinished "detection-failure-finished" ["ACT-35"] "Reports detectObject FINISHED although there is no object.";
     DetectionUndescribed "detection-undescribed" ["STATE-MSG-12"] "Does not describe what it has detected, as its factsheet promises.";
     PositioningFailureFinished "positioning-failure-finished" ["ACT-36"] "Reports finePositioning FINISHED although there is no target.";

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::action_kinds::LOAD_POSITIONS;
+use super::action_kinds::{Deed, LOAD_POSITIONS};
 use super::actions::{Action, Origin};
 use super::deeds::{Area, Outcome, Problem};
 use super::faults::FaultName as F;
@@ -22,6 +22,7 @@ impl Agv {
     pub(super) fn detect(&self, action: &Action) -> Outcome {
         let site = self.site(action);
         let there = self.stations.get(&site) == Some(&true) || self.config.chargers.contains(&site);
+        let there = there && !self.faults.has(F::DetectionFails);
         if !there && !self.faults.has(F::DetectionFailureFinished) {
             return Outcome::Failed(Problem::new(Area::Load, action, "there is no object"));
         }
@@ -38,6 +39,7 @@ impl Agv {
     pub(super) fn align(&self, action: &Action) -> Result<(), Problem> {
         let site = self.site(action);
         let target = self.stations.contains_key(&site) || self.config.chargers.contains(&site);
+        let target = target && !self.faults.has(F::PositioningFails);
         if target || self.faults.has(F::PositioningFailureFinished) {
             return Ok(());
         }
@@ -45,12 +47,28 @@ impl Agv {
     }
 
     /// pick or drop has failed.
-    fn load_problem(&self, action: &Action, reason: &str) -> Result<(), Problem> {
+    fn load_problem(&mut self, action: &Action, reason: &str) -> Result<(), Problem> {
+        if self.faults.has(F::FailureChangesLoad) {
+            self.change_load_anyway(action);
+        }
         let mut problem = Problem::new(Area::Load, action, reason);
         if self.faults.has(F::FailureUnreferenced) {
             problem.references.clear();
         }
         Err(problem.silent_if(self.faults.has(F::FailureSilent)))
+    }
+
+    /// `failure-changes-load`: what would be there had it not failed.
+    fn change_load_anyway(&mut self, action: &Action) {
+        match action.kind.map(|kind| kind.deed) {
+            Some(Deed::Pick) if self.loads.is_empty() => self.loads.push(Load {
+                id: String::new(),
+                kind: action.text("loadType").to_owned(),
+                position: LOAD_POSITIONS[0].to_owned(),
+            }),
+            Some(Deed::Drop) => self.loads.clear(),
+            _ => {}
+        }
     }
 
     pub(super) fn pick(&mut self, action: &Action) -> Result<(), Problem> {

@@ -323,6 +323,15 @@ fn at_stations(bench: &mut Bench) {
     let order2 = with(order("o2", 0, 0, "n3 n2 n1"), "/nodes/2/actions/-", plain("drop", "d"));
     bench.order(with(order2, "/nodes/1/actions/-", plain("detectObject", "found")));
     bench.wait(30.0);
+    bench.order(with(
+        order("o2b", 0, 0, "n1"),
+        "/nodes/0/actions/-",
+        plain("finePositioning", "held"),
+    ));
+    bench.command("enter-field", json!({}));
+    bench.wait(1.0);
+    bench.command("leave-field", json!({}));
+    bench.wait(5.0);
     bench.command("block-pause", json!({}));
     bench.instant("startPause", "b", json!({}));
     bench.instant("startCharging", "s", json!({}));
