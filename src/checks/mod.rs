@@ -10,6 +10,7 @@
 mod connection;
 mod errors;
 mod factsheet;
+mod factsheet_actions;
 mod header;
 mod header_id;
 mod message;
@@ -19,6 +20,7 @@ mod orders;
 mod state_actions;
 mod state_maps;
 mod state_period;
+mod state_predefined;
 mod state_route;
 mod state_triggers;
 mod state_values;
@@ -119,7 +121,7 @@ pub fn find(name: &str) -> Option<&'static Check> {
     REGISTRY.iter().find(|check| check.name == name)
 }
 
-static REGISTRY: [Check; 43] = [
+static REGISTRY: &[Check] = &[
     message::SCHEMA,
     message::ENCODING,
     header_id::ID_RISES,
@@ -137,6 +139,8 @@ static REGISTRY: [Check; 43] = [
     state_period::OWN_LIMITS,
     state_actions::TRANSITIONS,
     state_actions::KEPT,
+    state_predefined::STATUSES,
+    state_predefined::RESULTS,
     state_route::REMAINING_ROUTE,
     state_route::LAST_NODE,
     state_triggers::TRIGGERS,
@@ -150,6 +154,7 @@ static REGISTRY: [Check; 43] = [
     trajectory::PLANNED_PATH,
     errors::PERSIST,
     factsheet::CONSISTENCY,
+    factsheet_actions::PREDEFINED,
     motion::EDGE_SPEED,
     motion::EDGE_ROTATION_SPEED,
     motion::EDGE_ORIENTATION,

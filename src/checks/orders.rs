@@ -84,6 +84,11 @@ fn placed(message: &Value, list: &str, on_edge: bool) -> Vec<Placed> {
     elements(message, list).flat_map(of_element).take(ELEMENTS).collect()
 }
 
+/// Whether an action of this type gives the vehicle a pose and a last node; later versions spell it out.
+pub(super) fn sets_position(action_type: &str) -> bool {
+    matches!(action_type, "initPosition" | "initializePosition")
+}
+
 /// One order message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct SentOrder {
@@ -92,6 +97,8 @@ pub(super) struct SentOrder {
     pub nodes: Vec<Element>,
     pub edges: Vec<Element>,
     pub actions: Vec<Placed>,
+    /// Whether an action of it puts the vehicle somewhere else.
+    pub places: bool,
     /// Whether its graph is one that a vehicle may accept. Tests also send others, on purpose.
     pub sound: bool,
 }
@@ -109,6 +116,10 @@ impl SentOrder {
             nodes: nodes.unwrap_or_default(),
             edges: edges.unwrap_or_default(),
             actions: [placed(message, "nodes", false), placed(message, "edges", true)].concat(),
+            places: elements(message, "nodes")
+                .flat_map(|node| elements(node, "actions"))
+                .take(ELEMENTS)
+                .any(|action| sets_position(text(action, "actionType"))),
             sound,
         };
         sent.sound &= sent.is_chain();

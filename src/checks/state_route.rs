@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::orders::{Element, Orders, SentOrder, last_node, may_abandon, number, read_elements};
+use super::orders::{Element, Orders, SentOrder, last_node, may_abandon, number, read_elements, sets_position};
 use super::traffic::{Traffic, actions, broken, outside_influence, quote, remark, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -54,7 +54,7 @@ impl Shown {
         let moved = to_vehicle("instantActions", entry, context).is_some_and(|message| {
             actions(message).any(|action| {
                 let name = text(action, "actionType");
-                matches!(name, "cancelOrder" | "initPosition" | "initializePosition")
+                name == "cancelOrder" || sets_position(name)
             })
         });
         if moved || outside_influence(entry) {
@@ -341,7 +341,7 @@ impl Running for LastNode {
             return true;
         }
         let sent: Vec<&SentOrder> = self.shown.orders.of(&order).collect();
-        if sent.is_empty() || sent.iter().any(|sent| !sent.sound) {
+        if sent.is_empty() || sent.iter().any(|sent| !sent.sound || sent.places) {
             return false;
         }
         let nodes = || sent.iter().flat_map(|sent| &sent.nodes);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
 use crate::pack::Pack;
-use crate::profile::{self, Claim, Effective};
+use crate::profile::{self, Claim, Effective, Place, SAMPLE_ACTIONS};
 use crate::reference::agv::TOLERANCES;
 use crate::run::{Library, ReferenceAgv};
 
@@ -62,11 +62,9 @@ pub(super) fn tolerate(device: &mut ReferenceAgv, tolerances: &[String]) -> Resu
 /// What the profile states, and what follows from the actions it names.
 pub(super) fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
     let mut all = device.statements.clone();
-    all.insert("long-action".to_owned(), device.long_action.is_some());
-    all.insert(
-        "uninterruptible-action".to_owned(),
-        device.uninterruptible_action.is_some(),
-    );
+    for kind in SAMPLE_ACTIONS.iter().filter(|kind| kind.place == Place::Anywhere) {
+        all.insert(kind.name.to_owned(), device.sample_actions.0.contains_key(kind.name));
+    }
     all
 }
 

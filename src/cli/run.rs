@@ -546,7 +546,7 @@ struct Commands(RunningDevice);
 
 impl Operator for Commands {
     fn hooks(&self) -> Vec<String> {
-        ReferenceAgv::HOOKS.map(str::to_owned).to_vec()
+        ReferenceAgv::HOOKS.iter().map(|hook| (*hook).to_owned()).collect()
     }
 
     async fn run(&mut self, hook: &str, parameters: serde_json::Map<String, serde_json::Value>) -> HookOutcome {

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Course, CourseError, CourseNeed, FAR, HERE, Layout, Node, Standing};
+use super::ways::{self, Stop};
+use super::{Course, CourseError, CourseNeed, FAR, HERE, Layout, Node, Standing, is_station};
 
 /// How far from a node the vehicle may stand to be on it, in metres, unless the node allows more.
 const TOLERANCE: f64 = 0.5;
@@ -58,15 +59,18 @@ impl Layout {
             return Err(unsatisfiable(need, names.len(), start));
         }
         let graph = Graph::of(self, &start.id);
+        let stops = self.stops(need, &graph)?;
+        let taken: BTreeSet<usize> = stops.values().map(|stop| stop.node).collect();
         let mut budget = BUDGET;
         for returning in [true, false] {
-            let mut search = Search::new(&graph, need, &names, returning, budget);
+            let mut search = Search::new(&graph, need, &names, &taken, returning, budget);
             search.place(1, 0.0);
             budget = search.budget;
             if let Some((_, places)) = search.best {
-                return self
-                    .course(&graph, need, &names, &places)
+                let course = self
+                    .course(&graph, need, &names, &places, &stops)?
                     .ok_or_else(|| unsatisfiable(need, names.len() + 1, start));
+                return course;
             }
             if budget == 0 {
                 return Err(CourseError::GivenUp);
@@ -75,14 +79,27 @@ impl Layout {
         Err(unsatisfiable(need, names.len(), start))
     }
 
-    fn course(&self, graph: &Graph<'_>, need: &CourseNeed, names: &[&str], places: &[usize]) -> Option<Course> {
+    /// The course of these places; `None` if there is no node left for `far`.
+    fn course(
+        &self,
+        graph: &Graph<'_>,
+        need: &CourseNeed,
+        names: &[&str],
+        places: &[usize],
+        stops: &BTreeMap<String, Stop>,
+    ) -> Result<Option<Course>, CourseError> {
         let mut course = Course::default();
         for (name, place) in names.iter().zip(places) {
             course.nodes.insert((*name).to_owned(), graph.nodes[*place].clone());
         }
-        if need.nodes.iter().any(|name| name == FAR) && !course.nodes.contains_key(FAR) {
-            course.nodes.insert(FAR.to_owned(), graph.far(places)?.clone());
+        for (name, stop) in stops {
+            course.nodes.insert(name.clone(), graph.nodes[stop.node].clone());
         }
+        if need.nodes.iter().any(|name| name == FAR) && !course.nodes.contains_key(FAR) {
+            let Some(far) = graph.far(places) else { return Ok(None) };
+            course.nodes.insert(FAR.to_owned(), far.clone());
+        }
+        add_ways(&mut course, graph, need, stops)?;
         let ids: Vec<(String, String)> = course
             .nodes
             .iter()
@@ -95,12 +112,48 @@ impl Layout {
                 }
             }
         }
-        Some(course)
+        Ok(Some(course))
     }
 }
 
-/// The names to be searched for: `a` first, then as the test uses them. `far` is found afterwards, unless
-/// the test wants edges to it.
+/// Adds the ways to and from stations, with a name for every node on them.
+fn add_ways(
+    course: &mut Course,
+    graph: &Graph<'_>,
+    need: &CourseNeed,
+    stops: &BTreeMap<String, Stop>,
+) -> Result<(), CourseError> {
+    let place = |course: &Course, name: &str| graph.place(&course.nodes.get(name)?.id);
+    for (from, to) in &need.ways {
+        let (Some(start), Some(end)) = (place(course, from), place(course, to)) else {
+            continue;
+        };
+        let stop = stops.get(to).copied().unwrap_or(Stop {
+            node: end,
+            before: None,
+        });
+        let way =
+            ways::way(graph, start, stop).ok_or_else(|| ways::no_way(graph.nodes[start], graph.nodes[stop.node]))?;
+        let mut names = Vec::with_capacity(way.len());
+        for (at, inner) in way.iter().enumerate() {
+            let name = if at + 1 == way.len() {
+                to.clone()
+            } else {
+                ways::inner_name(from, to, at + 1)
+            };
+            course
+                .nodes
+                .entry(name.clone())
+                .or_insert_with(|| graph.nodes[*inner].clone());
+            names.push(name);
+        }
+        course.ways.insert((from.clone(), to.clone()), names);
+    }
+    Ok(())
+}
+
+/// The names to be searched for: `a` first, then as the test uses them. Stations are known, and `far` is found
+/// afterwards, unless the test wants edges to it.
 fn names_of(need: &CourseNeed) -> Vec<&str> {
     let in_edges = need.edges.iter().flat_map(|(from, to)| [from.as_str(), to.as_str()]);
     let mut names = vec![HERE];
@@ -108,7 +161,7 @@ fn names_of(need: &CourseNeed) -> Vec<&str> {
         .nodes
         .iter()
         .map(String::as_str)
-        .filter(|name| *name != FAR)
+        .filter(|name| *name != FAR && !is_station(name))
         .chain(in_edges)
     {
         if !names.contains(&name) {
@@ -128,10 +181,10 @@ fn unsatisfiable(need: &CourseNeed, nodes: usize, start: &Node) -> CourseError {
 }
 
 /// The layout by numbers, on the map where the vehicle stands. Node 0 is where it stands.
-struct Graph<'a> {
-    nodes: Vec<&'a Node>,
+pub(super) struct Graph<'a> {
+    pub(super) nodes: Vec<&'a Node>,
     /// Lengths of the edges from a node, by end.
-    ways: Vec<BTreeMap<usize, f64>>,
+    pub(super) ways: Vec<BTreeMap<usize, f64>>,
     /// Nodes from which the vehicle can come back to where it stands.
     returning: BTreeSet<usize>,
 }
@@ -167,6 +220,11 @@ impl<'a> Graph<'a> {
         Self { nodes, ways, returning }
     }
 
+    /// The number of a node.
+    pub(super) fn place(&self, id: &str) -> Option<usize> {
+        self.nodes.iter().position(|node| node.id == id)
+    }
+
     /// A node that is not taken, not next to where the vehicle stands if possible, and as far away as possible.
     fn far(&self, taken: &[usize]) -> Option<&'a Node> {
         let here = self.nodes.first()?;
@@ -190,6 +248,8 @@ struct Search<'g, 'a> {
     graph: &'g Graph<'a>,
     /// For each name: earlier names it must be joined to, and whether the edge leads from (true) or to them.
     joins: Vec<Vec<(usize, bool)>>,
+    /// Stations of the test, which get no other name. Where the vehicle stands may be one.
+    taken: &'g BTreeSet<usize>,
     returning: bool,
     budget: u32,
     places: Vec<usize>,
@@ -197,7 +257,14 @@ struct Search<'g, 'a> {
 }
 
 impl<'g, 'a> Search<'g, 'a> {
-    fn new(graph: &'g Graph<'a>, need: &CourseNeed, names: &[&str], returning: bool, budget: u32) -> Self {
+    fn new(
+        graph: &'g Graph<'a>,
+        need: &CourseNeed,
+        names: &[&str],
+        taken: &'g BTreeSet<usize>,
+        returning: bool,
+        budget: u32,
+    ) -> Self {
         let number = |name: &str| names.iter().position(|other| *other == name);
         let mut joins = vec![Vec::new(); names.len()];
         for (from, to) in &need.edges {
@@ -216,6 +283,7 @@ impl<'g, 'a> Search<'g, 'a> {
         Self {
             graph,
             joins,
+            taken,
             returning,
             budget,
             places: vec![0],
@@ -250,7 +318,7 @@ impl<'g, 'a> Search<'g, 'a> {
             None => (0..self.graph.nodes.len()).collect(),
         }
         .into_iter()
-        .filter(|place| !self.places.contains(place))
+        .filter(|place| !self.places.contains(place) && !self.taken.contains(place))
         .filter(|place| !self.returning || self.graph.returning.contains(place))
         .filter_map(|place| Some((self.length(name, place)?, place)))
         .collect();

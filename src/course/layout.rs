@@ -4,12 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value};
 
-use super::CourseError;
+use super::{CourseError, Station};
 use crate::diagnostic;
 use crate::profile::LayoutList;
 
 /// mapId of [`Layout::built_in`].
 pub const BUILT_IN_MAP: &str = "reference-floor";
+
+/// mapId of the other floor of [`Layout::built_in`].
+pub const BUILT_IN_UPPER_MAP: &str = "reference-upper-floor";
 
 /// A place the vehicle can stand on.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,6 +127,8 @@ pub struct Layout {
     nodes: BTreeMap<String, Node>,
     /// By start and end; of parallel edges the first one counts.
     edges: BTreeMap<(String, String), Edge>,
+    /// Where actions of the profile can be performed, by their names in suites.
+    pub(super) stations: BTreeMap<String, Station>,
     /// What the source has and the layout leaves out, one sentence each.
     left_out: Vec<String>,
 }
@@ -135,6 +140,7 @@ impl Layout {
         let mut layout = Self {
             nodes: nodes.into_iter().map(|node| (node.id.clone(), node)).collect(),
             edges: BTreeMap::new(),
+            stations: BTreeMap::new(),
             left_out,
         };
         for edge in edges {
@@ -182,12 +188,12 @@ impl Layout {
         Self::assemble(nodes.collect(), edges.collect(), Vec::new())
     }
 
-    /// The floor of the reference AGV: four by four nodes, two metres apart, A1 to D4, with edges both ways to
-    /// every neighbour, the diagonal ones included. Every path and every loop of up to six nodes can start at
-    /// every node.
+    /// The floor of the reference AGV: four by four nodes, two metres apart, A1 to D4, and beside them E1 to E4, where
+    /// there is something to do, with edges both ways to every neighbour, the diagonal ones included. Every path and
+    /// every loop of up to six nodes can start at every node. Above E3 is U3, on another floor.
     #[must_use]
     pub fn built_in() -> Self {
-        const COLUMNS: [(&str, f64); 4] = [("A", 0.0), ("B", 2.0), ("C", 4.0), ("D", 6.0)];
+        const COLUMNS: [(&str, f64); 5] = [("A", 0.0), ("B", 2.0), ("C", 4.0), ("D", 6.0), ("E", 8.0)];
         const ROWS: [(&str, f64); 4] = [("1", 0.0), ("2", 2.0), ("3", 4.0), ("4", 6.0)];
         let mut nodes = Vec::new();
         for (column, x) in COLUMNS {
@@ -200,14 +206,19 @@ impl Layout {
                     theta: None,
                     deviation_xy: None,
                     deviation_theta: None,
-                    station: false,
+                    station: column == "E",
                 });
             }
         }
+        nodes.extend(nodes.iter().find(|node| node.id == "E3").cloned().map(|below| Node {
+            id: "U3".to_owned(),
+            map_id: BUILT_IN_UPPER_MAP.to_owned(),
+            ..below
+        }));
         let mut edges = Vec::new();
         for start in &nodes {
             for end in &nodes {
-                if start.id != end.id && start.distance(end.x, end.y) < 3.0 {
+                if start.id != end.id && start.map_id == end.map_id && start.distance(end.x, end.y) < 3.0 {
                     edges.push(Edge {
                         id: format!("{}-{}", start.id, end.id),
                         start: start.id.clone(),
@@ -281,6 +292,13 @@ impl Layout {
     pub fn directed(mut self) -> Self {
         self.edges.retain(|_, edge| edge.direction.is_some());
         self
+    }
+
+    /// Marks a node that courses avoid.
+    pub(super) fn mark_station(&mut self, id: &str) {
+        if let Some(node) = self.nodes.get_mut(id) {
+            node.station = true;
+        }
     }
 
     /// Nodes by id.

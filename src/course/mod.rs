@@ -10,15 +10,17 @@ mod layout;
 mod lif;
 #[cfg(test)]
 mod tests;
+mod ways;
 
 use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-pub use layout::{BUILT_IN_MAP, Edge, Layout, Node};
+pub use layout::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout, Node};
+pub use ways::Station;
 
 use crate::diagnostic::{Diagnostic, Source};
-use crate::profile::{LayoutSource, Profile};
+use crate::profile::{LayoutSource, Profile, SampleKind};
 
 /// What a test asks of the course.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,6 +31,21 @@ pub struct CourseNeed {
     pub edges: Vec<(String, String)>,
     /// Whether every edge must say in which direction it leaves a junction.
     pub directed: bool,
+    /// Pairs of names, one of them a station, that must be joined by a way of any length.
+    pub ways: Vec<(String, String)>,
+}
+
+/// Whether this names a place of the profile, such as `pick`: the variable of a sample action with a place of its own.
+#[must_use]
+pub fn is_station(name: &str) -> bool {
+    SampleKind::of_variable(name).is_some_and(SampleKind::is_station)
+}
+
+impl CourseNeed {
+    /// The names of stations, in order of first use.
+    pub fn stations(&self) -> impl Iterator<Item = &str> {
+        self.nodes.iter().map(String::as_str).filter(|name| is_station(name))
+    }
 }
 
 impl Layout {
@@ -60,6 +77,7 @@ impl Layout {
                 )]
             })?;
         }
+        let layout = layout.with_stations(&profile.device.sample_actions);
         Ok(Some(match profile.motion.max_speed {
             Some(cap) => layout.slower_than(cap),
             None => layout,
@@ -122,6 +140,22 @@ pub enum CourseError {
         /// The edges that are asked for.
         edges: String,
     },
+    /// A station of the profile cannot be used.
+    #[error("the place of `{setting}` cannot be used: {reason}")]
+    Station {
+        /// Such as `device.pick`.
+        setting: String,
+        /// Why not.
+        reason: String,
+    },
+    /// No way leads to a station, or back.
+    #[error("no way leads from {from:?} to {to:?} in the layout")]
+    NoWay {
+        /// nodeId.
+        from: String,
+        /// nodeId.
+        to: String,
+    },
     /// The search was given up.
     #[error(
         "the layout is too big to say whether it has a course as the test asks; name a few nodes in `layout.allow-list`"
@@ -134,9 +168,17 @@ pub enum CourseError {
 pub struct Course {
     nodes: BTreeMap<String, Node>,
     edges: BTreeMap<(String, String), Edge>,
+    /// By the names it joins: the names of the nodes after the first one.
+    ways: BTreeMap<(String, String), Vec<String>>,
 }
 
 impl Course {
+    /// The names of the nodes on the way between two names, without the first. Empty where both are one node.
+    #[must_use]
+    pub fn way(&self, from: &str, to: &str) -> Option<&[String]> {
+        self.ways.get(&(from.to_owned(), to.to_owned())).map(Vec::as_slice)
+    }
+
     /// The node of a name.
     #[must_use]
     pub fn node(&self, name: &str) -> Option<&Node> {
@@ -175,7 +217,8 @@ impl Course {
     }
 
     /// The value of `course`: `a` is a nodeId, `a-b` an edgeId; everything else about them stands below
-    /// `nodes` and `edges`, where `course.a.x` is to be looked up as `course.nodes.a.x`.
+    /// `nodes` and `edges`, where `course.a.x` is to be looked up as `course.nodes.a.x`. `ways` has for `a-pick` the
+    /// names of the nodes behind `a`.
     #[must_use]
     pub fn bindings(&self) -> Value {
         let mut all = Map::new();
@@ -191,6 +234,9 @@ impl Course {
         }
         all.insert("nodes".into(), nodes.into());
         all.insert("edges".into(), edges.into());
+        let ways = self.ways.iter();
+        let ways = ways.map(|((from, to), names)| (format!("{from}-{to}"), names.clone().into()));
+        all.insert("ways".into(), Value::Object(ways.collect()));
         all.into()
     }
 }

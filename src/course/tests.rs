@@ -7,6 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::diagnostic::{Diagnostic, Source};
+use crate::profile::{SampleAction, SampleActions};
 
 fn fixture(name: &str) -> Arc<Source> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -84,7 +85,7 @@ fn every_node_of_the_built_in_floor_can_start_every_usual_course() {
         "b-a c-a",
         "a-b c-d far",
     ];
-    for node in layout.nodes() {
+    for node in layout.nodes().filter(|node| node.map_id == BUILT_IN_MAP) {
         for text in needs {
             let need = need(text);
             let course = layout.assign(&need, &on(&node.id)).expect(text);
@@ -94,6 +95,110 @@ fn every_node_of_the_built_in_floor_can_start_every_usual_course() {
             }
         }
     }
+}
+
+/// `hall` with a pick on P1 and a drop on the edge to it.
+fn stations(layout: Layout) -> Layout {
+    let action = |node: Option<&str>, edge: Option<&str>| SampleAction {
+        node: node.map(str::to_owned),
+        edge: edge.map(str::to_owned),
+        ..SampleAction::plain("x")
+    };
+    layout.with_stations(&SampleActions(
+        [
+            ("pick", action(Some("P1"), None)),
+            ("edge-drop", action(None, Some("H3-P1"))),
+            ("lift", action(Some("U1"), None)),
+            ("drop", action(Some("P9"), None)),
+        ]
+        .into(),
+    ))
+}
+
+/// The nodeIds a way leads over, from `start` on.
+fn way(layout: &Layout, start: &str, from: &str, to: &str) -> Result<Vec<String>, CourseError> {
+    let need = CourseNeed {
+        nodes: vec![from.to_owned(), to.to_owned()],
+        ways: vec![(from.to_owned(), to.to_owned())],
+        ..CourseNeed::default()
+    };
+    let course = layout.assign(&need, &on(start))?;
+    let names = course.way(from, to).expect("a way");
+    let mut last = from;
+    for name in names {
+        assert!(course.edge(last, name).is_some(), "{last}-{name}");
+        last = name;
+    }
+    Ok(names
+        .iter()
+        .map(|name| course.node(name).expect("a node").id.clone())
+        .collect())
+}
+
+#[test]
+fn a_way_leads_to_a_station_however_far_it_is() {
+    let layout = stations(hall());
+    assert_eq!(
+        way(&layout, "H6", "a", "pick").expect("a way"),
+        ["H5", "H4", "H3", "P1"]
+    );
+    assert_eq!(way(&layout, "H3", "a", "pick").expect("a way"), ["P1"]);
+    assert!(
+        way(&layout, "P1", "a", "pick").expect("a way").is_empty(),
+        "it is there already"
+    );
+    assert_eq!(
+        way(&layout, "P1", "a", "edgeDrop").expect("a way"),
+        ["H3", "P1"],
+        "the edge has to be driven"
+    );
+    assert_eq!(way(&layout, "H3", "pick", "a").expect("a way"), ["H3"]);
+}
+
+#[test]
+fn a_station_that_cannot_be_reached_is_said_with_its_setting() {
+    let layout = stations(hall());
+    let error = |to: &str| way(&layout, "H1", "a", to).expect_err("no way").to_string();
+    assert_eq!(
+        error("drop"),
+        "the place of `device.drop` cannot be used: there is no node \"P9\" in the layout; it has H1, H2, H3, H4, H5, H6, P1, U1"
+    );
+    assert!(error("lift").ends_with("node \"U1\" is on map \"upper-floor\", and the vehicle on \"hall\""));
+    assert!(error("failingPick").ends_with("it is not set"));
+    let apart = one_way_loop().with_stations(&SampleActions(
+        [(
+            "pick",
+            SampleAction {
+                node: Some("L2".into()),
+                ..SampleAction::plain("pick")
+            },
+        )]
+        .into(),
+    ));
+    let no_way = way(&apart, "E1", "a", "pick").expect_err("a dead end");
+    assert_eq!(
+        no_way,
+        CourseError::NoWay {
+            from: "E1".into(),
+            to: "L2".into()
+        }
+    );
+}
+
+#[test]
+fn other_names_keep_away_from_stations() {
+    let layout = stations(hall());
+    let need = CourseNeed {
+        ways: vec![("b".into(), "pick".into())],
+        ..need("a-b pick")
+    };
+    let course = layout.assign(&need, &on("P1")).expect("a course");
+    assert_eq!(
+        course.node("a"),
+        course.node("pick"),
+        "where it stands may be the station"
+    );
+    assert_eq!(course.node("b").map(|node| node.id.as_str()), Some("H3"));
 }
 
 #[test]

@@ -3,6 +3,8 @@
 use serde_json::{Map, Value, json};
 
 use super::compose::ComposeError;
+use crate::course::is_station;
+use crate::profile::{Place, SampleKind};
 use crate::suite::model::{Route, RoutePlace};
 
 /// The ways sent in this test, latest last.
@@ -25,6 +27,24 @@ impl SentOrders {
         let mut found =
             ways.filter_map(|(_, nodes)| nodes.iter().rev().find(|node| node.released && node.name == name));
         found.next().map_or(0, |node| node.sequence_id)
+    }
+}
+
+/// One node of a route, under all the names it has there.
+struct Stop {
+    /// The name of the node before.
+    before: Option<String>,
+    names: Vec<String>,
+    released: bool,
+}
+
+impl Stop {
+    fn new(before: Option<&str>, name: &str, released: bool) -> Self {
+        Self {
+            before: before.map(str::to_owned),
+            names: vec![name.to_owned()],
+            released,
+        }
     }
 }
 
@@ -54,23 +74,59 @@ impl RouteBuilder<'_> {
         let mut edges = Vec::new();
         let mut visited = Vec::new();
         let mut used = vec![false; self.actions.len()];
-        for (at, (name, released)) in names.iter().enumerate() {
+        for (at, stop) in self.stops(&names)?.iter().enumerate() {
             let sequence_id = first.saturating_add(u32::try_from(at).unwrap_or(u32::MAX).saturating_mul(2));
-            if at > 0 {
-                let before = names[at - 1].0;
-                let actions = self.take(&RoutePlace::Edge(before.to_owned(), (*name).to_owned()), &mut used);
-                edges.push(self.edge(before, name, sequence_id.saturating_sub(1), *released, actions)?);
+            let mut actions = Vec::new();
+            let last = stop.names.first().map_or("", String::as_str);
+            for name in &stop.names {
+                let place = RoutePlace::Node(name.clone());
+                actions.extend(self.take(&place, &mut used));
+                visited.push(Visited {
+                    name: name.clone(),
+                    sequence_id,
+                    released: stop.released,
+                });
             }
-            let actions = self.take(&RoutePlace::Node((*name).to_owned()), &mut used);
-            nodes.push(self.node(name, sequence_id, *released, actions)?);
-            visited.push(Visited {
-                name: (*name).to_owned(),
-                sequence_id,
-                released: *released,
-            });
+            if let Some(before) = &stop.before {
+                let mut on_edge = self.take(&RoutePlace::Edge(before.clone(), last.to_owned()), &mut used);
+                if stop.names.iter().any(|name| is_on_edge(name)) {
+                    on_edge.append(&mut actions);
+                }
+                edges.push(self.edge(before, last, sequence_id.saturating_sub(1), stop.released, on_edge)?);
+            }
+            nodes.push(self.node(last, sequence_id, stop.released, actions)?);
         }
         sent.0.push((order.to_owned(), visited));
         Ok((Value::Array(nodes), Value::Array(edges)))
+    }
+
+    /// The nodes of the order: those of the route, and those of the ways to and from its stations.
+    fn stops(&self, names: &[(&str, bool)]) -> Result<Vec<Stop>, ComposeError> {
+        let mut stops: Vec<Stop> = Vec::new();
+        for (at, (name, released)) in names.iter().enumerate() {
+            let Some(before) = at.checked_sub(1).map(|before| names[before].0) else {
+                stops.push(Stop::new(None, name, *released));
+                continue;
+            };
+            if !is_station(name) && !is_station(before) {
+                stops.push(Stop::new(Some(before), name, *released));
+                continue;
+            }
+            let way = self
+                .member("ways", &format!("{before}-{name}"))
+                .and_then(Value::as_array)
+                .ok_or_else(|| ComposeError::Course(format!("way `{before}-{name}`")))?;
+            let mut last = before;
+            for next in way.iter().filter_map(Value::as_str) {
+                stops.push(Stop::new(Some(last), next, *released));
+                last = next;
+            }
+            // The vehicle is there already.
+            if let Some(here) = stops.last_mut().filter(|_| way.is_empty()) {
+                here.names.push((*name).to_owned());
+            }
+        }
+        Ok(stops)
     }
 
     fn take(&self, place: &RoutePlace, used: &mut [bool]) -> Vec<Value> {
@@ -145,6 +201,11 @@ impl RouteBuilder<'_> {
         }
         Ok(built)
     }
+}
+
+/// Whether the actions of a station are for the edge that leads to it.
+fn is_on_edge(name: &str) -> bool {
+    SampleKind::of_variable(name).is_some_and(|kind| kind.place == Place::Edge)
 }
 
 /// The members of these names that are there.

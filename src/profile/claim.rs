@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::key::{SAMPLE_ACTIONS, STATEMENTS, Statement};
+use super::key::{SAMPLE_ACTIONS, STATEMENTS};
 use crate::diagnostic;
 
 /// One claim of `device.claims`.
@@ -68,8 +68,11 @@ impl FromStr for Claim {
                     "such as `limit NAME = 10`".to_owned(),
                 )),
             },
-            ["no", name] => statement(name, STATEMENTS.iter().chain(SAMPLE_ACTIONS)).map(Self::NoStatement),
-            [name] => statement(name, STATEMENTS.iter()).map(Self::Statement),
+            ["no", name] => {
+                let actions = SAMPLE_ACTIONS.iter().map(|action| action.name);
+                statement(name, statements().chain(actions)).map(Self::NoStatement)
+            }
+            [name] => statement(name, statements()).map(Self::Statement),
             _ => Err((
                 format!("`{text}` is not a claim"),
                 "a claim is `action NAME`, `action NAME NODE`, `no action NAME`, `optional PATH`, `no optional PATH`, \
@@ -80,8 +83,11 @@ impl FromStr for Claim {
     }
 }
 
-fn statement<'a>(name: &str, known: impl Iterator<Item = &'a Statement> + Clone) -> Result<String, (String, String)> {
-    let names = known.map(|statement| statement.name);
+fn statements() -> impl Iterator<Item = &'static str> + Clone {
+    STATEMENTS.iter().map(|statement| statement.name)
+}
+
+fn statement(name: &str, names: impl Iterator<Item = &'static str> + Clone) -> Result<String, (String, String)> {
     if names.clone().any(|known| known == name) {
         return Ok(name.to_owned());
     }

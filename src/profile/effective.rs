@@ -8,7 +8,8 @@ use super::key::{KEYS, SAMPLE_ACTIONS, STATEMENTS};
 use super::layer::Layer;
 use super::value::Value;
 use super::{
-    Bench, Claim, Device, Layout, LayoutSource, Motion, PasswordSource, Profile, SampleAction, Setting, TimeLimits,
+    Bench, Claim, Device, Layout, LayoutSource, Motion, PasswordSource, Profile, SampleAction, SampleActions, Setting,
+    TimeLimits,
 };
 use crate::diagnostic::{self, Diagnostic, Span};
 use crate::pack::Role;
@@ -176,8 +177,12 @@ impl Taken<'_> {
                 protocol: self.text("device.protocol"),
                 topic_template: self.text("device.topic-template"),
                 command: self.texts("device.command"),
-                long_action: self.action("device.long-action"),
-                uninterruptible_action: self.action("device.uninterruptible-action"),
+                sample_actions: SampleActions(
+                    SAMPLE_ACTIONS
+                        .iter()
+                        .filter_map(|kind| Some((kind.name, self.action(&format!("device.{}", kind.name))?)))
+                        .collect(),
+                ),
                 statements: self.statements(),
                 claims: self.claims(),
             },

@@ -102,6 +102,11 @@ pub const HOOKS: &[HookInfo] = &[
         "A pause and its end by a message were made possible again.",
     ),
     agv(
+        "use-lift",
+        &["mapId"],
+        "The lift with the vehicle in it was brought to the floor of a map.",
+    ),
+    agv(
         "enable-map",
         &["mapId", "mapVersion"],
         "A map version was enabled at the vehicle.",

@@ -41,8 +41,8 @@ pub enum Kind {
     Version,
     /// A program and its arguments, as a list or as one line.
     Command,
-    /// An action and its parameters; its type alone when it has none.
-    Action,
+    /// An action and its parameters; its type alone when it has none and needs no place.
+    Action(Place),
     /// Statements about capabilities.
     Claims,
     /// Several names.
@@ -95,12 +95,12 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "The vehicle carries loads, and one may be put on it during the run.",
     },
     Statement {
-        name: "no-charger-on-course",
-        doc: "There is no charger on any node of the course.",
-    },
-    Statement {
         name: "map-hash",
         doc: "The vehicle checks mapHash as SHA-256 in hexadecimal.",
+    },
+    Statement {
+        name: "small-map-storage",
+        doc: "At most two more maps fit into the vehicle.",
     },
     Statement {
         name: "charges",
@@ -113,17 +113,166 @@ pub const STATEMENTS: &[Statement] = &[
     },
 ];
 
-/// Actions of the vehicle that tests may use; `needs: profile NAME` of a test asks for one, and
-/// `${device.…}` holds it.
-pub const SAMPLE_ACTIONS: &[Statement] = &[
-    Statement {
-        name: "long-action",
-        doc: "An action on a node that runs for some seconds and does no harm.",
-    },
-    Statement {
-        name: "uninterruptible-action",
-        doc: "An action on a node that runs for some seconds and cannot be interrupted.",
-    },
+/// Where a sample action can be performed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// On any node, or wherever the test says.
+    Anywhere,
+    /// On any edge, where its effect is shown as an information of this type.
+    Shown,
+    /// At a node the profile names.
+    Node,
+    /// On an edge the profile names.
+    Edge,
+}
+
+/// An action of the vehicle that tests may use. `needs: profile NAME` of a test asks for it, `${device.VARIABLE.type}`
+/// holds it, and, if it has a place of its own, a route can lead there: `base: [a, VARIABLE]`.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleKind {
+    /// Name, as in `[device]`.
+    pub name: &'static str,
+    /// Name in suites.
+    pub variable: &'static str,
+    /// Where it can be performed.
+    pub place: Place,
+    /// What it is.
+    pub doc: &'static str,
+}
+
+impl SampleKind {
+    /// The sample action of that name in suites.
+    #[must_use]
+    pub fn of_variable(variable: &str) -> Option<&'static Self> {
+        SAMPLE_ACTIONS.iter().find(|sample| sample.variable == variable)
+    }
+
+    /// Whether the profile has to say where it can be performed.
+    #[must_use]
+    pub fn is_station(&self) -> bool {
+        matches!(self.place, Place::Node | Place::Edge)
+    }
+}
+
+const fn sample(name: &'static str, variable: &'static str, place: Place, doc: &'static str) -> SampleKind {
+    SampleKind {
+        name,
+        variable,
+        place,
+        doc,
+    }
+}
+
+/// Every sample action there is.
+pub const SAMPLE_ACTIONS: &[SampleKind] = &[
+    sample(
+        "long-action",
+        "longAction",
+        Place::Anywhere,
+        "An action on a node that runs for some seconds and does no harm.",
+    ),
+    sample(
+        "uninterruptible-action",
+        "uninterruptibleAction",
+        Place::Anywhere,
+        "An action on a node that runs for some seconds and cannot be interrupted.",
+    ),
+    sample(
+        "edge-condition",
+        "edgeCondition",
+        Place::Shown,
+        "An action on an edge that holds a condition as long as the vehicle is there, shown as an information.",
+    ),
+    sample(
+        "pick",
+        "pick",
+        Place::Node,
+        "A pick that succeeds: a load stands there whenever a test begins.",
+    ),
+    sample(
+        "drop",
+        "drop",
+        Place::Node,
+        "A drop that succeeds, and after which the pick succeeds again.",
+    ),
+    sample(
+        "edge-pick",
+        "edgePick",
+        Place::Edge,
+        "A pick on an edge that succeeds: a load stands there whenever a test begins.",
+    ),
+    sample(
+        "edge-drop",
+        "edgeDrop",
+        Place::Edge,
+        "A drop on an edge that succeeds, and after which the pick on the edge succeeds again.",
+    ),
+    sample(
+        "failing-pick",
+        "failingPick",
+        Place::Node,
+        "A pick that fails, because no load stands there.",
+    ),
+    sample(
+        "failing-drop",
+        "failingDrop",
+        Place::Node,
+        "A drop that fails, because the place is taken.",
+    ),
+    sample(
+        "detect-object",
+        "detectObject",
+        Place::Node,
+        "A search that finds its object.",
+    ),
+    sample(
+        "edge-detect-object",
+        "edgeDetectObject",
+        Place::Edge,
+        "A search on an edge that finds its object.",
+    ),
+    sample(
+        "failing-detect-object",
+        "failingDetectObject",
+        Place::Node,
+        "A search that does not find its object.",
+    ),
+    sample(
+        "fine-positioning",
+        "finePositioning",
+        Place::Node,
+        "A positioning on a target that is there.",
+    ),
+    sample(
+        "edge-fine-positioning",
+        "edgeFinePositioning",
+        Place::Edge,
+        "A positioning on an edge along a target that is there.",
+    ),
+    sample(
+        "failing-fine-positioning",
+        "failingFinePositioning",
+        Place::Node,
+        "A positioning on a target that is not there.",
+    ),
+    sample(
+        "start-charging",
+        "startCharging",
+        Place::Node,
+        "The beginning of charging, at a charger that is free.",
+    ),
+    sample(
+        "failing-start-charging",
+        "failingStartCharging",
+        Place::Node,
+        "The beginning of charging where there is no charger.",
+    ),
+    sample(
+        "lift",
+        "lift",
+        Place::Node,
+        "An initPosition in a lift, which puts the vehicle on the map of another floor.",
+    ),
 ];
 
 const fn key(path: &'static str, kind: Kind) -> Key {
@@ -145,12 +294,28 @@ pub const KEYS: &[Key] = &[
     key("device.line-guided", Kind::Flag),
     key("device.free-navigation", Kind::Flag),
     key("device.carries-load", Kind::Flag),
-    key("device.no-charger-on-course", Kind::Flag),
     key("device.map-hash", Kind::Flag),
+    key("device.small-map-storage", Kind::Flag),
     key("device.charges", Kind::Flag),
     key("device.room-beside-edges", Kind::Flag),
-    key("device.long-action", Kind::Action),
-    key("device.uninterruptible-action", Kind::Action),
+    key("device.long-action", Kind::Action(Place::Anywhere)),
+    key("device.uninterruptible-action", Kind::Action(Place::Anywhere)),
+    key("device.edge-condition", Kind::Action(Place::Shown)),
+    key("device.pick", Kind::Action(Place::Node)),
+    key("device.drop", Kind::Action(Place::Node)),
+    key("device.edge-pick", Kind::Action(Place::Edge)),
+    key("device.edge-drop", Kind::Action(Place::Edge)),
+    key("device.failing-pick", Kind::Action(Place::Node)),
+    key("device.failing-drop", Kind::Action(Place::Node)),
+    key("device.detect-object", Kind::Action(Place::Node)),
+    key("device.edge-detect-object", Kind::Action(Place::Edge)),
+    key("device.failing-detect-object", Kind::Action(Place::Node)),
+    key("device.fine-positioning", Kind::Action(Place::Node)),
+    key("device.edge-fine-positioning", Kind::Action(Place::Edge)),
+    key("device.failing-fine-positioning", Kind::Action(Place::Node)),
+    key("device.start-charging", Kind::Action(Place::Node)),
+    key("device.failing-start-charging", Kind::Action(Place::Node)),
+    key("device.lift", Kind::Action(Place::Node)),
     key("device.claims", Kind::Claims),
     key("bench.listen", Kind::Address),
     key("bench.tap", Kind::Flag),
@@ -236,8 +401,19 @@ impl Kind {
             ),
             Self::Version => "a text such as \"1.2\" or \"1.2.3\"".to_owned(),
             Self::Command => "a list such as [\"./agv\", \"--broker\", \"{broker-host}:{broker-port}\"]".to_owned(),
-            Self::Action => {
+            Self::Action(Place::Anywhere) => {
                 "an action such as \"beep\" or { type = \"wait\", parameters = { seconds = 20 } }".to_owned()
+            }
+            Self::Action(Place::Shown) => {
+                "an action and the infoType that shows it, such as { type = \"blink\", shows = \"blinking\" }".to_owned()
+            }
+            Self::Action(Place::Node) => {
+                "an action and its node, such as { type = \"pick\", node = \"P1\", parameters = { loadType = \"EPAL\" } }"
+                    .to_owned()
+            }
+            Self::Action(Place::Edge) => {
+                "an action and its edge, such as { type = \"pick\", edge = \"A1-P1\", parameters = { loadType = \"EPAL\" } }"
+                    .to_owned()
             }
             Self::Claims => "a list of texts such as \"action pick NODE\", \"no action drop\", \"optional PATH\", \
                              \"limit NAME = 10\", or names of statements"

@@ -26,7 +26,9 @@ use serde_json::{Map, Value, json};
 pub use claim::Claim;
 pub use effective::Effective;
 pub use hooks::{HOOKS, Hook, HookAction, HookInfo, RESTART_DEVICE, fill, find as find_hook, placeholders};
-pub use key::{COMMON_PLACEHOLDERS, KEYS, Key, Kind, PASSWORD_VARIABLE, SAMPLE_ACTIONS, STATEMENTS, Statement};
+pub use key::{
+    COMMON_PLACEHOLDERS, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind, Statement,
+};
 pub use layer::{Surroundings, check, load};
 pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 
@@ -86,10 +88,8 @@ pub struct Device {
     pub topic_template: Option<String>,
     /// Program and arguments that start the device itself, with [`COMMON_PLACEHOLDERS`].
     pub command: Option<Vec<String>>,
-    /// An action on a node that runs for some seconds and does no harm.
-    pub long_action: Option<SampleAction>,
-    /// An action on a node that runs for some seconds and cannot be interrupted.
-    pub uninterruptible_action: Option<SampleAction>,
+    /// Actions that tests may use, by names of [`SAMPLE_ACTIONS`].
+    pub sample_actions: SampleActions,
     /// What the vehicle is like; a name of [`STATEMENTS`] or [`SAMPLE_ACTIONS`] that is missing is not known.
     pub statements: BTreeMap<String, bool>,
     /// What it can do, beside its factsheet or against it.
@@ -103,8 +103,8 @@ impl Device {
         self.statements.get(statement).copied()
     }
 
-    /// What suites know as `device.…` from the profile alone: `manufacturer`, `serialNumber`, and of each
-    /// sample action `longAction.type` and `longAction.parameters`. What is not known is absent.
+    /// What suites know as `device.…` from the profile alone: `manufacturer`, `serialNumber`, and the sample
+    /// actions. What is not known is absent.
     #[must_use]
     pub fn bindings(&self) -> Map<String, Value> {
         let texts = [
@@ -114,16 +114,29 @@ impl Device {
         let texts = texts
             .into_iter()
             .filter_map(|(name, text)| Some((name, Value::from(text.as_deref()?))));
-        let actions = [
-            ("longAction", &self.long_action),
-            ("uninterruptibleAction", &self.uninterruptible_action),
-        ];
-        let actions = actions
-            .into_iter()
-            .filter_map(|(name, action)| Some((name, action.as_ref()?.value())));
-        texts
-            .chain(actions)
-            .map(|(name, value)| (name.to_owned(), value))
+        let mut all: Map<String, Value> = texts.map(|(name, value)| (name.to_owned(), value)).collect();
+        all.extend(self.sample_actions.bindings());
+        all
+    }
+}
+
+/// Sample actions by their names in a profile.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleActions(pub BTreeMap<&'static str, SampleAction>);
+
+impl SampleActions {
+    /// The sample actions that are known, with what kind each is of.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static SampleKind, &SampleAction)> {
+        SAMPLE_ACTIONS
+            .iter()
+            .filter_map(|kind| Some((kind, self.0.get(kind.name)?)))
+    }
+
+    /// `longAction: { type, parameters }` and so on, as suites know them below `device`.
+    #[must_use]
+    pub fn bindings(&self) -> Map<String, Value> {
+        self.iter()
+            .map(|(kind, action)| (kind.variable.to_owned(), action.value()))
             .collect()
     }
 }
@@ -135,13 +148,49 @@ pub struct SampleAction {
     pub action_type: String,
     /// Key and value of each of its actionParameters.
     pub parameters: Map<String, Value>,
+    /// nodeId of where it can be performed.
+    pub node: Option<String>,
+    /// edgeId of where it can be performed.
+    pub edge: Option<String>,
+    /// infoType of the information that shows its effect.
+    pub shows: Option<String>,
 }
 
 impl SampleAction {
-    /// `{ type, parameters }`.
+    /// An action without parameters that can be performed anywhere.
+    #[must_use]
+    pub fn plain(action_type: &str) -> Self {
+        Self {
+            action_type: action_type.to_owned(),
+            parameters: Map::new(),
+            node: None,
+            edge: None,
+            shows: None,
+        }
+    }
+
+    /// `{ type, parameters }`, and `node`, `edge` and `shows` where it has them.
     #[must_use]
     pub fn value(&self) -> Value {
-        json!({ "type": self.action_type, "parameters": self.parameters })
+        let mut value = json!({ "type": self.action_type, "parameters": self.parameters });
+        for (name, text) in [("node", &self.node), ("edge", &self.edge), ("shows", &self.shows)] {
+            if let Some(text) = text {
+                value[name] = text.as_str().into();
+            }
+        }
+        value
+    }
+
+    /// In one line: `pick at P1 {…}`.
+    fn shown(&self) -> String {
+        let mut text = self.action_type.clone();
+        if let Some(place) = self.node.as_ref().or(self.edge.as_ref()) {
+            text = format!("{text} at {place}");
+        }
+        if !self.parameters.is_empty() {
+            text = format!("{text} {}", Value::Object(self.parameters.clone()));
+        }
+        text
     }
 }
 

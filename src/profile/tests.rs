@@ -211,12 +211,9 @@ fn the_schema_for_editors_knows_the_same_names_as_the_reader() {
 
 #[test]
 fn every_statement_is_a_setting_of_the_device() {
-    for statement in STATEMENTS.iter().chain(SAMPLE_ACTIONS) {
-        assert!(
-            Key::find(&format!("device.{}", statement.name)).is_some(),
-            "{}",
-            statement.name
-        );
+    let actions = SAMPLE_ACTIONS.iter().map(|action| action.name);
+    for name in STATEMENTS.iter().map(|statement| statement.name).chain(actions) {
+        assert!(Key::find(&format!("device.{name}")).is_some(), "{name}");
     }
 }
 
@@ -242,6 +239,8 @@ fn a_full_profile_arrives_whole() {
         "serialNumber": "carrier_07",
         "longAction": { "type": "wait", "parameters": { "seconds": 20, "quiet": true } },
         "uninterruptibleAction": { "type": "finePositioning", "parameters": {} },
+        "pick": { "type": "pick", "parameters": { "stationType": "rack", "loadType": "EPAL" }, "node": "P1" },
+        "edgeCondition": { "type": "blink", "parameters": {}, "shows": "blinking" },
     });
     assert_eq!(bindings, expected);
     assert_eq!(profile.motion.max_speed, Some(0.4));

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 use super::SampleAction;
 use super::claim::Claim;
 use super::hooks;
-use super::key::{COMMON_PLACEHOLDERS, Kind, TEMPLATE_PLACEHOLDERS};
+use super::key::{COMMON_PLACEHOLDERS, Kind, Place, TEMPLATE_PLACEHOLDERS};
 use super::time;
 use crate::diagnostic;
 
@@ -91,7 +91,8 @@ impl Value {
         };
         match (kind, value) {
             (Kind::Flag, DeValue::Boolean(flag)) => Ok(Self::Flag(*flag)),
-            (Kind::Action, DeValue::Table(table)) => action(table),
+            (Kind::Action(place), DeValue::Table(table)) => action(table, place),
+            (Kind::Action(place), _) if place != Place::Anywhere => Err(wrong_type()),
             (Kind::Speed, _) => speed(number(value).ok_or_else(wrong_type)?),
             (Kind::Files | Kind::Claims | Kind::Names | Kind::Command, DeValue::Array(items)) => {
                 let mut texts = Vec::with_capacity(items.len());
@@ -142,10 +143,8 @@ impl Value {
                 .parse::<crate::pack::Version>()
                 .map(|_| Self::Text(text.to_owned()))
                 .map_err(|_| expected("not a version".to_owned())),
-            Kind::Action => Ok(Self::Action(SampleAction {
-                action_type: text.to_owned(),
-                parameters: serde_json::Map::new(),
-            })),
+            Kind::Action(Place::Anywhere) => Ok(Self::Action(SampleAction::plain(text))),
+            Kind::Action(_) => Err(expected("this has to be said in a profile".to_owned())),
             Kind::Command => {
                 let words = shlex::split(text).ok_or_else(|| expected("a quote is left open".to_owned()))?;
                 Self::from_list(kind, words, folder)
@@ -215,24 +214,30 @@ impl Value {
                 .collect::<Vec<_>>()
                 .join(", "),
             Self::Texts(texts) => texts.join(", "),
-            Self::Action(action) if action.parameters.is_empty() => action.action_type.clone(),
-            Self::Action(action) => {
-                let parameters = serde_json::Value::Object(action.parameters.clone());
-                format!("{} {parameters}", action.action_type)
-            }
+            Self::Action(action) => action.shown(),
             Self::Claims(claims) => claims.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         }
     }
 }
 
-fn action(table: &DeTable<'_>) -> Result<Value, Refusal> {
-    let expected = |label: String| Refusal::bad(label).hint(format!("expected {}", Kind::Action.hint()));
-    let mut action_type = None;
+fn action(table: &DeTable<'_>, place: Place) -> Result<Value, Refusal> {
+    let expected = |label: String| Refusal::bad(label).hint(format!("expected {}", Kind::Action(place).hint()));
+    let own = match place {
+        Place::Anywhere => None,
+        Place::Shown => Some("shows"),
+        Place::Node => Some("node"),
+        Place::Edge => Some("edge"),
+    };
+    let mut texts = std::collections::BTreeMap::new();
     let mut parameters = serde_json::Map::new();
     for (name, value) in table {
         match (name.get_ref().as_ref(), value.get_ref()) {
-            ("type", DeValue::String(text)) if !text.trim().is_empty() => action_type = Some(text.clone().into_owned()),
-            ("type", _) => return Err(expected("`type` is the name of an action".to_owned())),
+            (key, DeValue::String(text)) if (key == "type" || Some(key) == own) && !text.trim().is_empty() => {
+                texts.insert(key.to_owned(), text.clone().into_owned());
+            }
+            (key, _) if key == "type" || Some(key) == own => {
+                return Err(expected(format!("`{key}` is a name")));
+            }
             ("parameters", DeValue::Table(table)) => {
                 for (key, value) in table {
                     let value = json(value.get_ref()).ok_or_else(|| {
@@ -249,16 +254,25 @@ fn action(table: &DeTable<'_>) -> Result<Value, Refusal> {
             (other, _) => {
                 return Err(Refusal {
                     code: "unknown-key",
-                    ..Refusal::bad(format!("an action has no `{other}`"))
-                        .hint(diagnostic::did_you_mean(other, ["type", "parameters"]))
+                    ..Refusal::bad(format!("an action has no `{other}`")).hint(diagnostic::did_you_mean(
+                        other,
+                        ["type", "parameters"].into_iter().chain(own),
+                    ))
                 });
             }
         }
     }
-    let action_type = action_type.ok_or_else(|| expected("`type` is missing".to_owned()))?;
+    if let Some(missing) = own.filter(|own| !texts.contains_key(*own)) {
+        return Err(expected(format!("`{missing}` is missing")));
+    }
     Ok(Value::Action(SampleAction {
-        action_type,
+        action_type: texts
+            .remove("type")
+            .ok_or_else(|| expected("`type` is missing".to_owned()))?,
         parameters,
+        node: texts.remove("node"),
+        edge: texts.remove("edge"),
+        shows: texts.remove("shows"),
     }))
 }
 

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::journal::event::{Capability, Gate};
 use crate::link::Vantage;
+use crate::profile::{SAMPLE_ACTIONS, SampleKind};
 use crate::suite::model::{Need, Test, Verb};
 
 /// What is known about device, bench and profile.
@@ -43,7 +44,12 @@ impl Capabilities {
                 Verb::Operator(operator) => Some(Need::Hook(operator.hook.clone())),
                 _ => None,
             });
-        for need in test.needs.iter().cloned().chain(hooks) {
+        let stations = test
+            .course
+            .stations()
+            .filter_map(SampleKind::of_variable)
+            .map(|sample| Need::Profile(sample.name.to_owned()));
+        for need in test.needs.iter().cloned().chain(stations).chain(hooks) {
             match self.has(&need) {
                 Gate::Runs => {}
                 Gate::NotApplicable(why) => return Gate::NotApplicable(why),
@@ -71,7 +77,10 @@ impl Capabilities {
             Need::Profile(name) => match self.statements.get(name) {
                 Some(true) => Gate::Runs,
                 Some(false) => Gate::NotApplicable(format!("the profile says that the device is not `{name}`")),
-                None => Gate::Unobservable(format!("the profile does not say whether the device is `{name}`")),
+                None => Gate::Unobservable(match SAMPLE_ACTIONS.iter().find(|sample| sample.name == name) {
+                    Some(sample) => format!("the profile does not name `device.{name}`: {}", sample.doc),
+                    None => format!("the profile does not say whether the device is `{name}`"),
+                }),
             },
             Need::Action { name, scope } => self.declared(&action_name(name, scope.as_deref()), |sheet| {
                 has_action(sheet, name, scope.as_deref())

@@ -6,9 +6,9 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 
 use super::header::Subject;
-use crate::course::{Edge, Layout};
+use crate::course::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout};
 use crate::pack::{Pack, Role};
-use crate::profile::TimeLimits;
+use crate::profile::{Place, SAMPLE_ACTIONS, SampleAction, SampleActions, TimeLimits};
 use crate::reference::agv::tolerances::UnknownTolerance;
 use crate::reference::agv::{AgvConfig, LayoutNode, OnboardMap};
 
@@ -23,6 +23,61 @@ pub struct ReferenceAgv {
     pub config: AgvConfig,
     /// Its part of the timing contract.
     pub time: TimeLimits,
+    /// The actions tests may use for their own ends, and where they can be performed.
+    pub actions: SampleActions,
+}
+
+/// Nodes of the built-in floor: a shelf with a load, a shelf that is taken, a lift, a charger.
+const SHELF: &str = "E2";
+const TAKEN_SHELF: &str = "E4";
+const LIFT: &str = "E3";
+const CHARGER: &str = "E1";
+/// Where the vehicle comes out of the lift on the other floor.
+const UPPER_LIFT: &str = "U3";
+
+/// The actions of the built-in vehicle on the built-in floor.
+fn sample_actions(layout: &Layout) -> SampleActions {
+    let load = json!({ "stationType": "floor", "loadType": "EPAL" });
+    let object = json!({ "objectType": "EPAL" });
+    let lift = layout.node(UPPER_LIFT);
+    let pose = json!({
+        "x": lift.map(|node| node.x), "y": lift.map(|node| node.y), "theta": 0.0,
+        "mapId": lift.map(|node| node.map_id.as_str()), "lastNodeId": UPPER_LIFT,
+    });
+    let edge = format!("D2-{SHELF}");
+    let all = [
+        ("long-action", "beep", "", json!({ "duration": 0.5 })),
+        ("uninterruptible-action", "calibrate", "", json!({ "duration": 0.5 })),
+        ("edge-condition", "warningLights", "warningLights", json!({})),
+        ("pick", "pick", SHELF, load.clone()),
+        ("drop", "drop", SHELF, load.clone()),
+        ("edge-pick", "pick", &edge, load.clone()),
+        ("edge-drop", "drop", &edge, load.clone()),
+        ("failing-pick", "pick", CHARGER, load.clone()),
+        ("failing-drop", "drop", TAKEN_SHELF, load),
+        ("detect-object", "detectObject", SHELF, object.clone()),
+        ("edge-detect-object", "detectObject", &edge, object.clone()),
+        ("failing-detect-object", "detectObject", LIFT, object),
+        ("fine-positioning", "finePositioning", SHELF, json!({})),
+        ("edge-fine-positioning", "finePositioning", &edge, json!({})),
+        ("failing-fine-positioning", "finePositioning", LIFT, json!({})),
+        ("start-charging", "startCharging", CHARGER, json!({})),
+        ("failing-start-charging", "startCharging", SHELF, json!({})),
+        ("lift", "initPosition", LIFT, pose),
+    ];
+    let sample = |(name, action_type, place, parameters): (&str, &str, &str, Value)| {
+        let kind = SAMPLE_ACTIONS.iter().find(|kind| kind.name == name)?;
+        let mut action = SampleAction::plain(action_type);
+        action.parameters = parameters.as_object().cloned().unwrap_or_default();
+        match kind.place {
+            Place::Anywhere => {}
+            Place::Shown => action.shows = Some(place.to_owned()),
+            Place::Node => action.node = Some(place.to_owned()),
+            Place::Edge => action.edge = Some(place.to_owned()),
+        }
+        Some((kind.name, action))
+    };
+    SampleActions(all.into_iter().filter_map(sample).collect())
 }
 
 /// Kinds of reference AGVs.
@@ -35,11 +90,24 @@ pub enum Vehicle {
     LineGuided,
     /// Plans its own way, follows trajectories, and keeps to corridors
     Free,
+    /// Carries no load, and does not charge on the course
+    WithoutLoads,
+    /// Knows nothing of maps
+    WithoutMaps,
+    /// Says as little as it may in its factsheet
+    Terse,
 }
 
 impl Vehicle {
     /// Every kind; the usual one first.
-    pub const ALL: [Self; 3] = [Self::Usual, Self::LineGuided, Self::Free];
+    pub const ALL: [Self; 6] = [
+        Self::Usual,
+        Self::LineGuided,
+        Self::Free,
+        Self::WithoutLoads,
+        Self::WithoutMaps,
+        Self::Terse,
+    ];
 }
 
 impl ReferenceAgv {
@@ -53,6 +121,8 @@ impl ReferenceAgv {
             topic_template: None,
         };
         let layout = Layout::built_in();
+        let actions = sample_actions(&layout);
+        let layout = layout.with_stations(&actions);
         let nodes: Vec<LayoutNode> = layout
             .nodes()
             .map(|node| LayoutNode {
@@ -63,10 +133,7 @@ impl ReferenceAgv {
                 map_id: node.map_id.clone(),
             })
             .collect();
-        let first = nodes
-            .first()
-            .map(|node| (node.id.clone(), node.map_id.clone()))
-            .unwrap_or_default();
+        let first = nodes.first().map(|node| node.id.clone()).unwrap_or_default();
         let config = AgvConfig {
             manufacturer: subject.manufacturer.clone(),
             serial_number: subject.serial_number.clone(),
@@ -78,14 +145,18 @@ impl ReferenceAgv {
                 .map(|(name, _)| name.to_owned())
                 .collect(),
             nodes,
-            // Tests rely on it: there is nothing to charge at on the built-in floor.
-            chargers: BTreeSet::new(),
-            start_node: first.0,
-            maps: vec![OnboardMap {
-                map_id: first.1,
-                map_version: "1".to_owned(),
-                enabled: true,
-            }],
+            chargers: BTreeSet::from([CHARGER.to_owned()]),
+            stations: [SHELF, TAKEN_SHELF].map(|node| (node.to_owned(), true)).into(),
+            // Two more fit, which tests rely on.
+            map_capacity: 4,
+            start_node: first,
+            maps: [BUILT_IN_MAP, BUILT_IN_UPPER_MAP]
+                .map(|map| OnboardMap {
+                    map_id: map.to_owned(),
+                    map_version: "1".to_owned(),
+                    enabled: true,
+                })
+                .to_vec(),
             // Brisk, so that a run over real sockets takes a minute; slow enough to be caught between two nodes.
             speed: 8.0,
             rotation_speed: 8.0 * std::f64::consts::PI,
@@ -110,11 +181,12 @@ impl ReferenceAgv {
             layout,
             config,
             time,
+            actions,
         }
     }
 
-    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well: one that follows a
-    /// line and can stop on nodes only, and one that plans its own way, follows trajectories and keeps to corridors.
+    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well, and so that nobody
+    /// is blamed for what they need not have. The usual one is the first.
     #[must_use]
     pub fn variants(pack: &Pack) -> Vec<Self> {
         Vehicle::ALL
@@ -134,6 +206,9 @@ impl ReferenceAgv {
                 this.config.trajectories = true;
                 this.config.plans = true;
             }
+            Vehicle::WithoutLoads => this.without_loads(),
+            Vehicle::WithoutMaps => this.without_maps(),
+            Vehicle::Terse => this.config.minimal_factsheet = true,
         }
         this
     }
@@ -148,6 +223,28 @@ impl ReferenceAgv {
         self.config.branches = Some(self.layout.edges().filter_map(branch).collect());
     }
 
+    /// It carries nothing, charges nowhere, and offers no action that needs a station.
+    fn without_loads(&mut self) {
+        self.actions
+            .0
+            .retain(|name, _| matches!(*name, "long-action" | "uninterruptible-action"));
+        let of_stations = [
+            "pick",
+            "drop",
+            "detectObject",
+            "finePositioning",
+            "startCharging",
+            "stopCharging",
+        ];
+        self.config.without_actions = of_stations.map(str::to_owned).into();
+    }
+
+    fn without_maps(&mut self) {
+        self.config
+            .features
+            .retain(|feature| feature != "maps" && feature != "mapActions");
+    }
+
     /// What a profile would state about it.
     #[must_use]
     pub fn statements(&self) -> BTreeMap<String, bool> {
@@ -157,17 +254,20 @@ impl ReferenceAgv {
             ("node-bound", !stops),
             ("interruptible-actions", self.config.interruptible),
             ("uninterruptible-actions", true),
-            ("long-action", true),
-            ("uninterruptible-action", true),
             ("edge-actions", true),
-            ("no-charger-on-course", true),
-            ("carries-load", true),
+            ("small-map-storage", true),
+            ("carries-load", !self.config.without_actions.contains("pick")),
             ("map-hash", true),
             ("line-guided", self.config.branches.is_some()),
             ("free-navigation", self.config.plans),
             ("room-beside-edges", true),
         ]
         .into_iter()
+        .chain(
+            SAMPLE_ACTIONS
+                .iter()
+                .map(|kind| (kind.name, self.actions.0.contains_key(kind.name))),
+        )
         .map(|(name, said)| (name.to_owned(), said))
         .collect()
     }
@@ -175,13 +275,7 @@ impl ReferenceAgv {
     /// `device.*` beside identity and factsheet: the actions tests may use for their own ends.
     #[must_use]
     pub fn device_bindings(&self) -> Map<String, Value> {
-        // Long enough for what a test does meanwhile.
-        let seconds = 0.5 + 3.0 * (self.config.answers_after + self.config.min_state_interval).as_secs_f64();
-        let action = |name: &str| json!({ "type": name, "parameters": { "duration": seconds } });
-        let mut all = Map::new();
-        all.insert("longAction".to_owned(), action("beep"));
-        all.insert("uninterruptibleAction".to_owned(), action("calibrate"));
-        all
+        self.actions.bindings()
     }
 
     /// Lets it take a liberty, and gives it the time it then needs.
@@ -192,6 +286,13 @@ impl ReferenceAgv {
         let speed = self.config.speed;
         self.config.tolerate(name)?;
         self.time.drive = self.time.drive.mul_f64((speed / self.config.speed).max(1.0));
+        // Long enough for what a test does meanwhile.
+        let seconds = 0.5 + 3.0 * (self.config.answers_after + self.config.min_state_interval).as_secs_f64();
+        for name in ["long-action", "uninterruptible-action"] {
+            if let Some(action) = self.actions.0.get_mut(name) {
+                action.parameters.insert("duration".to_owned(), json!(seconds));
+            }
+        }
         Ok(())
     }
 
@@ -206,7 +307,7 @@ impl ReferenceAgv {
     }
 
     /// The hooks it understands as commands.
-    pub const HOOKS: [&'static str; 18] = [
+    pub const HOOKS: &'static [&'static str] = &[
         "power-cycle",
         "shutdown",
         "start",
@@ -218,6 +319,9 @@ impl ReferenceAgv {
         "remove-load",
         "press-pause",
         "release-pause",
+        "block-pause",
+        "unblock-pause",
+        "use-lift",
         "enable-map",
         "enter-field",
         "leave-field",

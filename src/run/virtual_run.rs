@@ -84,7 +84,7 @@ struct OnTheBus;
 
 impl Operator for OnTheBus {
     fn hooks(&self) -> Vec<String> {
-        ReferenceAgv::HOOKS.map(str::to_owned).to_vec()
+        ReferenceAgv::HOOKS.iter().map(|hook| (*hook).to_owned()).collect()
     }
 
     async fn run(&mut self, _hook: &str, _parameters: Map<String, Value>) -> HookOutcome {

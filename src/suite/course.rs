@@ -2,6 +2,7 @@
 
 use super::grammar::is_course_name;
 use super::model::{CourseNeed, Step, Test, Verb};
+use crate::course::is_station;
 
 /// The nodes in order of first use, and the pairs that need an edge. `far` is a node no edge is asked for.
 pub(super) fn course_need(test: &Test) -> CourseNeed {
@@ -54,7 +55,12 @@ fn node(name: &str, need: &mut CourseNeed) {
 
 fn edge(from: &str, to: &str, need: &mut CourseNeed) {
     let pair = (from.to_owned(), to.to_owned());
-    if from != "far" && to != "far" && !need.edges.contains(&pair) {
-        need.edges.push(pair);
+    let pairs = if is_station(from) || is_station(to) {
+        &mut need.ways
+    } else {
+        &mut need.edges
+    };
+    if from != "far" && to != "far" && !pairs.contains(&pair) {
+        pairs.push(pair);
     }
 }

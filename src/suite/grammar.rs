@@ -5,8 +5,10 @@ use serde_json::Value;
 use super::fields::{Problems, short, text_of};
 use super::model::{Need, RoutePlace, Station, TimeTerm, Walk};
 use super::terms::{milliseconds, term};
-use crate::diagnostic::{Diagnostic, Span, did_you_mean};
+use crate::course::is_station;
+use crate::diagnostic::{Diagnostic, Span, closest, did_you_mean};
 use crate::pattern::{Bindings, Term, TermKind, Unbound};
+use crate::profile::SAMPLE_ACTIONS;
 use crate::yaml::Node;
 
 /// The longest duration that may be written out.
@@ -156,9 +158,9 @@ pub(super) fn need(node: &Node, problems: &mut Problems) -> Option<Need> {
     Some(found)
 }
 
-/// Whether this is the name of a course node: one letter, or `far`.
+/// Whether this is the name of a course node: one letter, `far`, or a station of the profile.
 pub(super) fn is_course_name(name: &str) -> bool {
-    name == "far" || (name.len() == 1 && name.bytes().all(|byte| byte.is_ascii_lowercase()))
+    name == "far" || (name.len() == 1 && name.bytes().all(|byte| byte.is_ascii_lowercase())) || is_station(name)
 }
 
 /// The name of a course node.
@@ -172,6 +174,15 @@ pub(super) fn course_name(node: &Node, problems: &mut Problems) -> Option<String
 }
 
 fn bad_course_name(text: &str, span: &Span, problems: &mut Problems) {
+    let stations = SAMPLE_ACTIONS.iter().filter(|sample| sample.is_station());
+    let hint = match closest(text, stations.map(|sample| sample.variable)) {
+        Some(close) => format!("did you mean `{close}`?"),
+        None => {
+            "nodes of the course are a, b, c, d …, `far` for one that is out of reach, and places of the profile such \
+                 as `pick`"
+                .to_owned()
+        }
+    };
     problems.add(
         Diagnostic::new(
             "bad-node-name",
@@ -179,7 +190,7 @@ fn bad_course_name(text: &str, span: &Span, problems: &mut Problems) {
             format!("`{}` is no name of a course node", short(text)),
             "not a name",
         )
-        .hint("nodes of the course are a, b, c, d …, and `far` for one that is out of reach"),
+        .hint(hint),
     );
 }
 
@@ -187,10 +198,22 @@ fn bad_course_name(text: &str, span: &Span, problems: &mut Problems) {
 pub(super) fn place(node: &Node, problems: &mut Problems) -> Option<RoutePlace> {
     let text = text_of(node, problems)?;
     match text.split_once('-') {
-        Some((from, to)) if is_course_name(from) && is_course_name(to) => {
+        Some((from, to)) if [from, to].iter().all(|name| is_course_name(name) && !is_station(name)) => {
             Some(RoutePlace::Edge(from.to_owned(), to.to_owned()))
         }
         None if is_course_name(text) => Some(RoutePlace::Node(text.to_owned())),
+        Some((from, to)) if is_course_name(from) && is_course_name(to) => {
+            problems.add(
+                Diagnostic::new(
+                    "bad-node-name",
+                    node.span.clone(),
+                    format!("`{}` is no edge of the course", short(text)),
+                    "a way of any length, not one edge",
+                )
+                .hint("a place of the profile that is on an edge, such as `edgePick`, has its actions on that edge"),
+            );
+            None
+        }
         _ => {
             bad_course_name(text, &node.span, problems);
             None

@@ -89,6 +89,12 @@ impl Agv {
                 "the vehicle is not in an automatic mode",
             ));
         }
+        if self.undocking.is_some_and(|until| until > self.moment()) {
+            return Err(Refusal::new(
+                Rule::OtherOrderActive,
+                "the vehicle is still at the charger",
+            ));
+        }
         if new {
             self.check_new(order)?;
             Ok(Decision::Begin)

@@ -46,6 +46,7 @@ pub(super) enum Deed {
     WaitForTrigger,
     CancelOrder,
     FactsheetRequest,
+    WarningLights,
     Beep,
     Calibrate,
 }
@@ -96,6 +97,7 @@ const fn optional(key: &'static str, data_type: &'static str) -> Parameter {
 const INSTANT: &[Scope] = &[Scope::Instant];
 const INSTANT_NODE: &[Scope] = &[Scope::Instant, Scope::Node];
 const NODE: &[Scope] = &[Scope::Node];
+const EDGE: &[Scope] = &[Scope::Edge];
 const NODE_EDGE: &[Scope] = &[Scope::Node, Scope::Edge];
 const ALL: &[Scope] = &[Scope::Instant, Scope::Node, Scope::Edge];
 const MAP: &[Parameter] = &[required("mapId", "STRING"), required("mapVersion", "STRING")];
@@ -184,7 +186,7 @@ impl ActionKind {
 }
 
 /// All actions, in the order of the factsheet.
-const KINDS: [ActionKind; 19] = [
+const KINDS: [ActionKind; 20] = [
     kind(
         "startPause",
         Deed::StartPause,
@@ -277,6 +279,13 @@ const KINDS: [ActionKind; 19] = [
         INSTANT,
         &[],
         "Sends the factsheet",
+    ),
+    kind(
+        "warningLights",
+        Deed::WarningLights,
+        EDGE,
+        &[],
+        "Flashes as long as the vehicle is on the edge",
     ),
     kind(
         "beep",

@@ -16,7 +16,7 @@ use super::{Agv, Mode};
 ///
 /// `place-on {nodeId}`, `move-to {nodeId}` or `{x, y, theta}`, `place-obstacle {edgeId}`, `remove-obstacle {edgeId}`, `set-mode {mode}`, `enable-map {mapId, mapVersion}`,
 /// `place-load {loadId, loadType}`, `trigger {actionId?}`; the others take nothing.
-pub const COMMANDS: [&str; 19] = [
+pub const COMMANDS: &[&str] = &[
     "power-cycle",
     "shutdown",
     "start",
@@ -31,6 +31,9 @@ pub const COMMANDS: [&str; 19] = [
     "release-emergency-stop",
     "press-pause",
     "release-pause",
+    "block-pause",
+    "unblock-pause",
+    "use-lift",
     "enable-map",
     "enter-field",
     "leave-field",
@@ -67,6 +70,8 @@ impl Agv {
             }
             "press-pause" => self.set_holds(|holds| holds.button = true),
             "release-pause" => self.set_holds(|holds| holds.button = false),
+            "block-pause" => self.pause_blocked = true,
+            "unblock-pause" => self.pause_blocked = false,
             "enter-field" => self.set_holds(|holds| holds.field = true),
             "leave-field" => self.set_holds(|holds| holds.field = false),
             "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
@@ -78,6 +83,7 @@ impl Agv {
             }
             "place-load" => self.place_load(text("loadId"), text("loadType")),
             "remove-load" => self.loads.clear(),
+            // The vehicle sees nothing of a lift (`use-lift`): it is told where it is by initPosition.
             _ => {}
         }
     }

@@ -141,6 +141,8 @@ pub struct AgvConfig {
     pub features: BTreeSet<String>,
     /// Names of errors.
     pub errors: ErrorNames,
+    /// The factsheet says only what it has to.
+    pub minimal_factsheet: bool,
     /// Predefined actions this vehicle does *not* offer.
     pub without_actions: BTreeSet<String>,
     /// Nodes the vehicle knows the position of.
@@ -186,6 +188,8 @@ pub struct AgvConfig {
     pub branches: Option<Vec<(String, String, String)>>,
     /// Nodes with a charger.
     pub chargers: BTreeSet<String>,
+    /// Nodes where loads are handed over, and whether one stands there at first.
+    pub stations: BTreeMap<String, bool>,
     /// Number of maps the vehicle can store.
     pub map_capacity: usize,
     /// Maps on board at first.
@@ -225,6 +229,7 @@ impl Default for AgvConfig {
             })
             .collect();
         let chargers = nodes.iter().map(|node| node.id.clone()).collect();
+        let stations = nodes.iter().map(|node| (node.id.clone(), true)).collect();
         Self {
             manufacturer: "Reference".into(),
             serial_number: "agv-1".into(),
@@ -240,6 +245,7 @@ impl Default for AgvConfig {
             .map(String::from)
             .into(),
             errors: ErrorNames::default(),
+            minimal_factsheet: false,
             without_actions: BTreeSet::new(),
             nodes,
             start_node: "n1".into(),
@@ -262,6 +268,7 @@ impl Default for AgvConfig {
             plans: false,
             branches: None,
             chargers,
+            stations,
             map_capacity: 8,
             maps: vec![OnboardMap {
                 map_id: "hall".into(),

@@ -2,21 +2,19 @@
 
 use std::f64::consts::PI;
 
-use serde_json::Value;
-
-use super::action_kinds::{Deed, LOAD_POSITIONS};
+use super::Agv;
+use super::action_kinds::Deed;
 use super::actions::{Action, Origin, Status};
 use super::faults::FaultName as F;
 use super::motion::Pose;
 use super::tolerances::ToleranceName as T;
-use super::{Agv, Load};
 
 /// Coordinates beyond this are no place on any map of the site, in metres.
 const FARTHEST: f64 = 10_000.0;
 
 /// Which error a failed action raises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Area {
+pub(super) enum Area {
     InstantAction,
     Map,
     Localization,
@@ -29,12 +27,13 @@ enum Area {
 pub(super) struct Problem {
     area: Area,
     reason: String,
-    references: Vec<(String, String)>,
+    pub(super) references: Vec<(String, String)>,
     silent: bool,
 }
 
 impl Problem {
-    fn new(area: Area, action: &Action, reason: &str) -> Self {
+    /// What went wrong with an action.
+    pub(super) fn new(area: Area, action: &Action, reason: &str) -> Self {
         let reference = |key: &str, value: &str| (key.to_owned(), value.to_owned());
         let references = vec![
             reference("actionId", &action.request.id),
@@ -70,7 +69,7 @@ impl Problem {
 }
 
 /// How a deed went.
-enum Outcome {
+pub(super) enum Outcome {
     Done(Option<String>),
     Failed(Problem),
     /// Something else ends the action.
@@ -117,7 +116,7 @@ impl Agv {
         action.status = Status::Running;
         let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
         let duration = if waits { super::cancel::MOMENT } else { duration };
-        let awaits = awaits && waits;
+        let awaits = awaits && waits || action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights);
         let endless = awaits || (stuck && !action.of_order());
         action.due = (!endless).then(|| moment + duration);
     }
@@ -195,7 +194,7 @@ impl Agv {
             Deed::StopPause => self.stop_pause(action),
             Deed::StartCharging => self.start_charging(action).into(),
             Deed::StopCharging => {
-                self.charging = false;
+                self.stop_charging();
                 Outcome::Done(None)
             }
             Deed::InitPosition => self.init_position(action).into(),
@@ -218,21 +217,15 @@ impl Agv {
             }
             Deed::Pick => self.pick(action).into(),
             Deed::Drop => self.put_down(action).into(),
-            Deed::DetectObject => {
-                let object = if action.text("objectType").is_empty() {
-                    "object"
-                } else {
-                    action.text("objectType")
-                };
-                Outcome::Done(Some(format!("{object} detected")))
-            }
+            Deed::DetectObject => self.detect(action),
+            Deed::FinePositioning => self.align(action).into(),
             Deed::FactsheetRequest => {
                 if !self.faults.has(F::FactsheetRequestUnanswered) {
                     self.publish_factsheet();
                 }
                 Outcome::Done(None)
             }
-            Deed::FinePositioning | Deed::WaitForTrigger | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
+            Deed::WaitForTrigger | Deed::WarningLights | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
             Deed::CancelOrder => {
                 self.cancel_order(&action.request.id);
                 Outcome::Open
@@ -244,7 +237,18 @@ impl Agv {
         }
     }
 
+    /// Whether a switch forbids what a message asks for (ACT-16).
+    fn is_pause_blocked(&self) -> bool {
+        self.pause_blocked && !self.faults.has(F::ButtonPauseOverridden)
+    }
+
     fn start_pause(&mut self, action: &Action) -> Outcome {
+        if self.is_pause_blocked() {
+            if self.faults.has(F::BlockedPauseTaken) {
+                self.set_holds(|holds| holds.pause = true);
+            }
+            return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
+        }
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
         }
@@ -257,6 +261,12 @@ impl Agv {
 
     /// A pause made with the button is lifted with the button (ACT-16).
     fn stop_pause(&mut self, action: &Action) -> Outcome {
+        if self.is_pause_blocked() {
+            if self.faults.has(F::BlockedPauseTaken) {
+                self.set_holds(|holds| holds.pause = false);
+            }
+            return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle paused"));
+        }
         if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
         }
@@ -270,15 +280,24 @@ impl Agv {
     /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
     pub(super) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
         let before = self.holds.any();
+        let field = self.holds.field;
         change(&mut self.holds);
         let moment = self.moment();
         let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
         match (before, self.holds.any()) {
             (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
+            (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
             (false, true) => self.actions.hold(moment, self.faults),
             (true, false) => self.actions.resume(moment),
             _ => {}
         }
+    }
+
+    fn stop_charging(&mut self) {
+        if self.charging && self.faults.has(F::ChargingEndsEarly) {
+            self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
+        }
+        self.charging &= self.faults.has(F::ChargingEndUnreported);
     }
 
     /// The charger is at a node: there is none where the vehicle drives (ACT-20).
@@ -288,7 +307,8 @@ impl Agv {
                 return Ok(());
             }
             self.charging = self.faults.has(F::ChargingShownAnyway);
-            return Err(Problem::new(Area::Charging, action, "the vehicle is not at a charger"));
+            let problem = Problem::new(Area::Charging, action, "the vehicle is not at a charger");
+            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
         }
         self.charging = !self.faults.has(F::ChargingUnreported);
         Ok(())
@@ -317,11 +337,13 @@ impl Agv {
         }
         self.lost = self.faults.has(F::InitPositionUninitialized);
         self.maps.enable_any(map_id);
+        let stale = action.of_order() && self.faults.has(F::LiftMapStale);
+        let old = self.motion.pose(self.moment()).map_id;
         self.motion.place(Pose {
             x,
             y,
             theta: theta.clamp(-PI, PI),
-            map_id: map_id.to_owned(),
+            map_id: if stale { old } else { map_id.to_owned() },
         });
         if !self.faults.has(F::InitPositionKeepsNode) {
             action.text("lastNodeId").clone_into(&mut self.book.last_node);
@@ -345,41 +367,5 @@ impl Agv {
             .maps
             .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);
         result.map_err(|reason| Problem::map(action, reason))
-    }
-
-    fn pick(&mut self, action: &Action) -> Result<(), Problem> {
-        if !self.loads.is_empty() {
-            if self.faults.has(F::PickFailureFinished) {
-                return Ok(());
-            }
-            let problem = Problem::new(Area::Load, action, "the vehicle carries a load already");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
-        }
-        if !self.faults.has(F::PickWithoutLoad) {
-            let given = |key: &str, other: &str| match action.request.parameter(key).and_then(Value::as_str) {
-                Some(text) => text.to_owned(),
-                None => other.to_owned(),
-            };
-            self.loads.push(Load {
-                id: given("loadId", ""),
-                kind: given("loadType", "EPAL"),
-                position: given("lhd", LOAD_POSITIONS[0]),
-            });
-        }
-        Ok(())
-    }
-
-    fn put_down(&mut self, action: &Action) -> Result<(), Problem> {
-        let wanted = action.text("loadId");
-        let found = self
-            .loads
-            .iter()
-            .position(|load| wanted.is_empty() || load.id == wanted);
-        let Some(found) = found else {
-            let problem = Problem::new(Area::Load, action, "the vehicle does not carry that load");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
-        };
-        self.loads.remove(found);
-        Ok(())
     }
 }

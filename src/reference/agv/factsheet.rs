@@ -46,6 +46,9 @@ impl Agv {
         let Value::Object(mut body) = self.factsheet() else {
             return;
         };
+        if self.config.minimal_factsheet {
+            strip(&mut body);
+        }
         if self.faults.has(F::FactsheetWithoutLimits) {
             body.remove("protocolLimits");
         }
@@ -182,13 +185,10 @@ impl Agv {
             .map(|name| json!({ "parameter": name, "support": support }))
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
-        let mut actions: Vec<Value> = action_kinds::offered(&self.config)
+        let actions: Vec<Value> = action_kinds::offered(&self.config)
             .filter(|kind| !(missing && kind.deed == Deed::CancelOrder))
             .map(|kind| self.action_picture(kind))
             .collect();
-        if self.faults.has(F::VendorPauseListed) {
-            actions.push(json!({ "actionType": "pauseVehicle", "actionScopes": ["INSTANT"] }));
-        }
         let mut features = json!({ "optionalParameters": parameters, "agvActions": actions });
         if self.faults.has(F::OptionalParametersMissing)
             && let Some(fields) = features.as_object_mut()
@@ -214,15 +214,24 @@ impl Agv {
                 }
             })
             .collect();
-        let renamed = self.faults.has(F::PickParameterRenamed);
+        let renamed = kind.deed == Deed::Pick && self.faults.has(F::PickParameterRenamed);
         let mut picture = Map::new();
-        picture.insert("actionType".into(), json!(kind.name));
+        let capital = matches!(kind.deed, Deed::StartPause | Deed::StopPause) && self.faults.has(F::VendorPauseListed);
+        let name = if capital {
+            kind.name.replacen('s', "S", 1)
+        } else {
+            kind.name.to_owned()
+        };
+        picture.insert("actionType".into(), json!(name));
         picture.insert("actionDescription".into(), json!(kind.description));
         picture.insert("actionScopes".into(), json!(scopes));
         if !kind.parameters.is_empty() {
             let parameters = kind.parameters.iter().map(|parameter| {
                 json!({
-                    "key": if parameter.key == "height" && renamed { "liftHeightMm" } else { parameter.key },
+                    "key": match parameter.key {
+                        "stationType" if renamed => "station_type",
+                        key => key,
+                    },
                     "valueDataType": parameter.data_type,
                     "isOptional": parameter.optional,
                 })
@@ -291,6 +300,26 @@ impl Agv {
             "SMALL"
         };
         json!({ "loadPositions": LOAD_POSITIONS, "loadSets": [set("DEFAULT", "EPAL"), set(second, "KLT")] })
+    }
+}
+
+/// Takes away everything a factsheet need not have.
+fn strip(body: &mut Map<String, Value>) {
+    body.insert("agvGeometry".into(), json!({}));
+    body.insert("loadSpecification".into(), json!({}));
+    body.remove("vehicleConfig");
+    if let Some(features) = body.get_mut("protocolFeatures") {
+        features["optionalParameters"] = json!([]);
+        for action in features["agvActions"].as_array_mut().into_iter().flatten() {
+            if let Some(action) = action.as_object_mut() {
+                action.retain(|key, _| matches!(key.as_str(), "actionType" | "actionScopes"));
+            }
+        }
+    }
+    if let Some(limits) = body.get_mut("protocolLimits") {
+        limits["maxStringLens"] = json!({});
+        limits["maxArrayLens"] = json!({});
+        limits["timing"] = json!({ "minOrderInterval": 0.0, "minStateInterval": 0.0 });
     }
 }
 

@@ -93,7 +93,7 @@ faults! {
     FactsheetSupportYes "factsheet-support-yes" ["FACT-06"] "Says YES where the support of a parameter is asked for.";
     OptionalParametersMissing "optional-parameters-missing" ["OPT-04", "FACT-06"] "Leaves optionalParameters out of the factsheet.";
     FactsheetScopeLowerCase "factsheet-scope-lower-case" ["FACT-07", "JSON-02"] "Spells the scopes of its actions in lower case.";
-    ListedActionRefused "listed-action-refused" ["FACT-07"] "Refuses finePositioning and detectObject although its factsheet lists them.";
+    ListedActionRefused "listed-action-refused" ["ACT-01", "ACT-35", "ACT-36"] "Refuses finePositioning and detectObject although its factsheet lists them.";
     FactsheetActionMissing "factsheet-action-missing" ["FACT-07"] "Offers cancelOrder but does not list it.";
     PolygonCrossed "polygon-crossed" ["FACT-08"] "Draws its contour as a polygon that crosses itself.";
     LoadSetTwice "load-set-twice" ["FACT-09"] "Uses one name for two load sets.";
@@ -245,25 +245,30 @@ faults! {
     EnableOnlyUpwards "enable-only-upwards" ["MAP-24"] "Reports enableMap FINISHED and keeps the newer version enabled.";
     EnableUnknownDisables "enable-unknown-disables" ["MAP-25"] "Disables its maps before it fails to enable one it does not have.";
     UsedMapDisabled "used-map-disabled" ["MAP-32"] "Disables the map it drives on before it fails to delete it.";
-    LiftMapStale "lift-map-stale" ["MAP-35"] "Keeps its old mapId when it arrives on another floor.";
+    LiftMapStale "lift-map-stale" ["MAP-35", "ACT-23"] "Keeps its old mapId when an action of an order puts it on another floor.";
 
     // Actions
     ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07"] "Never begins the actions of an order.";
-    VendorPauseListed "vendor-pause-listed" ["ACT-05"] "Lists a pause action of its own beside startPause.";
-    PickParameterRenamed "pick-parameter-renamed" ["ACT-06"] "Calls the height of a pick liftHeightMm.";
+    VendorPauseListed "vendor-pause-listed" ["ACT-05"] "Lists its pause as StartPause and StopPause.";
+    PickParameterRenamed "pick-parameter-renamed" ["ACT-06"] "Calls the station type of a pick station_type in its factsheet.";
     UndescribedStatus "undescribed-status" ["ACT-41"] "Reports instant actions INITIALIZING that have no preparation.";
     PickPreparedAsRunning "pick-prepared-as-running" ["ACT-33", "ASTATE-02"] "Reports a pick RUNNING while it only prepares for it.";
     FieldDoesNotPause "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated.";
+    FieldPauseStuck "field-pause-stuck" ["ACT-34"] "Does not go on with its actions when its protective field is free again.";
     EdgeActionOutlivesEdge "edge-action-outlives-edge" ["ACT-02", "NODE-05"] "Lets the actions of an edge run on behind its end.";
+    EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
     PauseTwiceFails "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused.";
     PauseDrivesOn "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses.";
     PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
-    ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Reports stopPause FINISHED although the button still holds it.";
+    ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Pauses and goes on by message although a switch or the button at the vehicle forbids it.";
+    BlockedPauseTaken "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
     ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
+    ChargingEndUnreported "charging-end-unreported" ["ACT-19"] "Reports that it charges after stopCharging is FINISHED.";
+    ChargingEndsEarly "charging-ends-early" ["ACT-22"] "Reports that it does not charge any more while it cannot take orders yet.";
     ChargingFailureFinished "charging-failure-finished" ["ACT-20"] "Reports startCharging FINISHED although there is no charger.";
     ChargingShownAnyway "charging-shown-anyway" ["ACT-20"] "Reports that it charges although startCharging failed.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23", "ACT-24"] "Reports initPosition FINISHED and does nothing.";
@@ -273,9 +278,18 @@ faults! {
     InitPositionUnchecked "init-position-unchecked" ["ACT-25"] "Takes over a pose on a map it does not have.";
     StateRequestUnanswered "state-request-unanswered" ["ACT-26"] "Reports stateRequest FINISHED only with the next periodic state.";
     LogNameMissing "log-name-missing" ["ACT-27", "STATE-MSG-12"] "Does not name the log it stored.";
-    PickWithoutLoad "pick-without-load" ["ACT-28"] "Reports pick FINISHED before the load is there.";
-    PickFailureFinished "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was no room for the load.";
-    FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick or drop fails.";
+    PickWithoutLoad "pick-without-load" ["ACT-28"] "Reports pick FINISHED and no load.";
+    DropReportedLate "drop-reported-late" ["ACT-28"] "Shows its load for another second after drop is FINISHED.";
+    PickFailureFinished "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was nothing to pick.";
+    DropFailureFinished "drop-failure-finished" ["ACT-29"] "Reports drop FINISHED although the place was taken.";
+    FailureUnreferenced "failure-unreferenced" ["BP-03"] "Does not say in its error which pick or drop has failed.";
+    FailureChangesLoad "failure-changes-load" ["ACT-29"] "Changes the load it shows although its pick or drop has failed.";
+    DetectionFails "detection-fails" ["ACT-35"] "Reports detectObject FAILED although the object is there.";
+    PositioningFails "positioning-fails" ["ACT-36"] "Reports finePositioning FAILED although it has reached the target.";
+    DetectionFailureFinished "detection-failure-finished" ["ACT-35"] "Reports detectObject FINISHED although there is no object.";
+    DetectionUndescribed "detection-undescribed" ["STATE-MSG-12"] "Does not describe what it has detected, as its factsheet promises.";
+    PositioningFailureFinished "positioning-failure-finished" ["ACT-36"] "Reports finePositioning FINISHED although there is no target.";
+    FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick, a drop or charging fails.";
     TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
@@ -376,7 +390,7 @@ pub fn find(name: &str) -> Option<&'static Fault> {
 
 /// A set of faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Faults([u128; 3]);
+pub(super) struct Faults([u128; 4]);
 
 impl Faults {
     /// The set of the named faults; `Err` with the first unknown name.

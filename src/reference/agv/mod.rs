@@ -29,6 +29,7 @@ mod progress;
 mod read;
 mod rejection;
 mod report;
+mod stations;
 #[cfg(test)]
 mod tests;
 pub mod tolerances;
@@ -129,7 +130,15 @@ pub struct Agv {
     locked: bool,
     /// It has left its corridor and was not put back yet.
     strayed: bool,
+    /// Where loads are handed over, and whether one stands there.
+    stations: std::collections::BTreeMap<String, bool>,
+    /// A load it does not carry any more, and until when it is shown (`drop-reported-late` only).
+    shadow: Option<(Moment, Load)>,
     charging: bool,
+    /// It takes no orders until then (`charging-ends-early` only).
+    undocking: Option<Moment>,
+    /// A switch keeps it from pausing and from going on.
+    pause_blocked: bool,
     /// It has not found its pose (`init-position-uninitialized` only).
     lost: bool,
     /// The map it says it is on (`init-position-taken-anyway` only).
@@ -193,7 +202,11 @@ impl Agv {
             obstacles: BTreeSet::new(),
             locked: false,
             strayed: false,
+            stations: config.stations.clone(),
+            shadow: None,
             charging: false,
+            undocking: None,
+            pause_blocked: false,
             lost: false,
             claimed_map: None,
             connection: Connection::new(),
@@ -235,6 +248,7 @@ impl Agv {
             self.book.soon,
             self.lingers_until,
             self.inbox.front().map(|(due, ..)| *due),
+            self.shadow.as_ref().map(|(end, _)| *end),
             self.next_report(),
         ];
         events.into_iter().flatten().min()
@@ -269,6 +283,7 @@ impl Agv {
                 self.message(&topic, &payload);
             }
         }
+        self.shadow.take_if(|(end, _)| *end <= moment);
         self.a_moment_later();
         self.attempt_connection();
         self.settle();

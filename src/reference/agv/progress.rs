@@ -326,9 +326,7 @@ impl Agv {
             }
             self.book.left.1 = Some(edge);
         }
-        if !self.faults.has(F::LiftMapStale) {
-            self.motion.set_map(stop.place.map_id.clone());
-        }
+        self.motion.set_map(stop.place.map_id.clone());
         if self.faults.has(F::TraversalSplit) {
             self.flush();
         }
@@ -376,6 +374,16 @@ impl Agv {
         } else if !self.faults.has(F::LastNodeStale) {
             self.book.last_sequence = stop.node.sequence_id;
         }
+    }
+
+    /// Whether the warning lights are on: as long as it is on the edge (ACT-03).
+    pub(super) fn is_flashing(&self) -> bool {
+        self.actions
+            .iter()
+            .filter(|action| action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights))
+            .any(|action| {
+                action.status.is_active() || (action.status.is_terminal() && self.faults.has(F::EdgeConditionStays))
+            })
     }
 
     /// Whether the vehicle is lifting.

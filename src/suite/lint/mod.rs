@@ -19,6 +19,7 @@ use self::scope::Scope;
 use super::CheckInfo;
 use super::fields::Problems;
 use super::model::{Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
+use crate::course::is_station;
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
 use crate::pack::{RequirementId, Role, VersionRange};
 use crate::pattern::Pattern;
@@ -217,7 +218,8 @@ impl Linter<'_> {
                 self.exists_somewhere("factsheet", &names, path, at);
             }
             Need::Profile(name) => {
-                let known = || STATEMENTS.iter().chain(SAMPLE_ACTIONS).map(|statement| statement.name);
+                let samples = || SAMPLE_ACTIONS.iter().map(|sample| sample.name);
+                let known = || STATEMENTS.iter().map(|statement| statement.name).chain(samples());
                 if !known().any(|other| other == name) {
                     self.problems
                         .unknown("unknown-statement", at, "statement of a profile", name, known());
@@ -475,7 +477,7 @@ impl Linter<'_> {
             })
         };
         // `far` is never driven to by a good vehicle; a bad one may try.
-        let leaves = |base: &[String]| base.len() > 1 || base.iter().any(|name| name == "far");
+        let leaves = |base: &[String]| base.len() > 1 || base.iter().any(|name| name == "far" || is_station(name));
         let driving = sends().find(|(_, send)| send.route.as_ref().is_some_and(|route| leaves(&route.base)));
         if !test.moves
             && let Some((step, send)) = driving

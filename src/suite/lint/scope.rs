@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::vocabulary::Vocabulary;
+use crate::course::is_station;
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
 use crate::pattern::{Term, TermKind};
+use crate::profile::{Place, SAMPLE_ACTIONS, SampleKind};
 use crate::suite::fields::Problems;
 use crate::suite::grammar::is_course_name;
 use crate::suite::model::{Step, Verb};
@@ -27,12 +29,21 @@ const TIMES: [&str; 13] = [
 ];
 
 /// The names of `device.` that a profile may give.
-const PROFILE: [&str; 4] = [
-    "longAction.type",
-    "longAction.parameters",
-    "uninterruptibleAction.type",
-    "uninterruptibleAction.parameters",
-];
+fn of_profile() -> Vec<String> {
+    let members = |sample: &SampleKind| {
+        let own = match sample.place {
+            Place::Anywhere => None,
+            Place::Shown => Some("shows"),
+            Place::Node => Some("node"),
+            Place::Edge => Some("edge"),
+        };
+        ["type", "parameters"].into_iter().chain(own)
+    };
+    let names = SAMPLE_ACTIONS
+        .iter()
+        .flat_map(|sample| members(sample).map(|member| format!("{}.{member}", sample.variable)));
+    names.collect()
+}
 
 /// Where names of a test come from.
 #[derive(Clone, PartialEq, Eq)]
@@ -266,11 +277,16 @@ impl<'a> Scope<'a> {
                 ))
             }
             // What a profile tells of a device beyond its factsheet; a test that uses it `needs: [profile …]`.
-            _ if PROFILE.contains(&rest) => None,
-            _ => unknown(did_you_mean(
-                rest,
-                ["manufacturer", "serialNumber", "factsheet"].into_iter().chain(PROFILE),
-            )),
+            _ => {
+                let names = of_profile();
+                // A parameter of an action is known to the profile only.
+                let parameter = |name: &String| name.ends_with(".parameters") && rest.starts_with(&format!("{name}."));
+                if names.iter().any(|name| name == rest || parameter(name)) {
+                    return None;
+                }
+                let others = ["manufacturer", "serialNumber", "factsheet"].into_iter();
+                unknown(did_you_mean(rest, others.chain(names.iter().map(String::as_str))))
+            }
         }
     }
 
@@ -324,7 +340,7 @@ fn too_early(name: &str, span: &Span) -> Diagnostic {
 fn is_course_use(rest: &str) -> bool {
     let name = rest.split(['.', '[']).next().unwrap_or(rest);
     match name.split_once('-') {
-        Some((from, to)) => is_course_name(from) && is_course_name(to),
+        Some((from, to)) => [from, to].iter().all(|name| is_course_name(name) && !is_station(name)),
         None => is_course_name(name),
     }
 }

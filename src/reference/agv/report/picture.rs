@@ -84,6 +84,11 @@ impl Agv {
                 "information",
                 json!([{ "infoType": "service", "infoLevel": "WARNING" }]),
             );
+        } else if self.is_flashing() {
+            set(
+                "information",
+                json!([{ "infoType": "warningLights", "infoLevel": "INFO" }]),
+            );
         } else {
             set("information", json!([]));
         }
@@ -267,7 +272,8 @@ impl Agv {
                 "weight": weight,
             })
         };
-        self.loads.iter().map(picture).collect()
+        let shadow = self.shadow.iter().map(|(_, load)| load);
+        self.loads.iter().chain(shadow).map(picture).collect()
     }
 
     fn battery(&self) -> Value {

@@ -230,7 +230,7 @@ fn the_factsheet_lists_what_the_vehicle_does() {
         assert!(factsheet[part].is_object(), "{part}");
     }
     let actions = factsheet["protocolFeatures"]["agvActions"].as_array().unwrap();
-    assert_eq!(actions.len(), 19);
+    assert_eq!(actions.len(), 20);
     let pick = actions.iter().find(|action| action["actionType"] == "pick").unwrap();
     assert_eq!(pick["actionScopes"], json!(["NODE", "EDGE"]));
     assert_eq!(

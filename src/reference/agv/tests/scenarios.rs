@@ -39,6 +39,7 @@ pub(super) fn all() -> Vec<Scenario> {
         (config(), node_actions),
         (config(), instant_actions),
         (config(), held_by_hand),
+        (stations(), at_stations),
         (config(), modes),
         (config(), broken_link),
         (many_maps(), asked_afterwards),
@@ -297,6 +298,49 @@ fn held_by_hand(bench: &mut Bench) {
     bench.wait(1.0);
     bench.command("release-pause", json!({}));
     bench.command("place-load", json!({ "loadId": "L", "loadType": "EPAL" }));
+    bench.wait(1.0);
+}
+
+/// A load and a charger on n1, a load on n2, nothing on n3.
+fn stations() -> AgvConfig {
+    AgvConfig {
+        stations: ["n1", "n2"].map(|node| (node.to_owned(), true)).into(),
+        ..many_maps()
+    }
+}
+
+fn at_stations(bench: &mut Bench) {
+    let load = || json!({ "stationType": "floor", "loadType": "EPAL" });
+    let plain = |name, id| action(name, id, "HARD", json!({}));
+    let lights = action("warningLights", "l", "NONE", json!({}));
+    let pick = action("pick", "p", "HARD", load());
+    let order1 = with(order("o1", 0, 0, "n1 n2 n3"), "/nodes/0/actions/-", pick);
+    let order1 = with(order1, "/edges/0/actions/-", lights);
+    let order1 = with(order1, "/nodes/1/actions/-", plain("drop", "taken"));
+    let list = json!([plain("detectObject", "o"), plain("finePositioning", "f")]);
+    bench.order(with(order1, "/nodes/2/actions", list));
+    bench.wait(30.0);
+    let order2 = with(order("o2", 0, 0, "n3 n2 n1"), "/nodes/2/actions/-", plain("drop", "d"));
+    bench.order(with(order2, "/nodes/1/actions/-", plain("detectObject", "found")));
+    bench.wait(30.0);
+    bench.order(with(
+        order("o2b", 0, 0, "n1"),
+        "/nodes/0/actions/-",
+        plain("finePositioning", "held"),
+    ));
+    bench.command("enter-field", json!({}));
+    bench.wait(1.0);
+    bench.command("leave-field", json!({}));
+    bench.wait(5.0);
+    bench.command("block-pause", json!({}));
+    bench.instant("startPause", "b", json!({}));
+    bench.instant("startCharging", "s", json!({}));
+    bench.wait(1.0);
+    bench.instant("stopCharging", "e", json!({}));
+    bench.wait(1.0);
+    let pose = json!({ "x": 0.0, "y": 0.0, "theta": 0.0, "mapId": "loft", "lastNodeId": "up" });
+    let ride = action("initPosition", "i", "HARD", pose);
+    bench.order(with(order("o3", 0, 0, "n1"), "/nodes/0/actions/-", ride));
     bench.wait(1.0);
 }
 

@@ -1,0 +1,124 @@
+//! What is done at a station: picking, dropping, detecting, aligning. Charging is left to `deeds`.
+
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::action_kinds::{Deed, LOAD_POSITIONS};
+use super::actions::{Action, Origin};
+use super::deeds::{Area, Outcome, Problem};
+use super::faults::FaultName as F;
+use super::{Agv, Load};
+
+impl Agv {
+    /// The node where an action takes place: on an edge the one it leads to.
+    fn site(&self, action: &Action) -> String {
+        let ahead = self.book.nodes.front().map(|stop| &stop.node.id);
+        let ahead = ahead.filter(|_| matches!(action.origin, Origin::Edge(_)));
+        ahead.unwrap_or(&self.book.last_node).clone()
+    }
+
+    /// A load or a charger is an object (ACT-35).
+    pub(super) fn detect(&self, action: &Action) -> Outcome {
+        let site = self.site(action);
+        let there = self.stations.get(&site) == Some(&true) || self.config.chargers.contains(&site);
+        let there = there && !self.faults.has(F::DetectionFails);
+        if !there && !self.faults.has(F::DetectionFailureFinished) {
+            return Outcome::Failed(Problem::new(Area::Load, action, "there is no object"));
+        }
+        let object = if action.text("objectType").is_empty() {
+            "object"
+        } else {
+            action.text("objectType")
+        };
+        let result = format!("{object} detected");
+        Outcome::Done(Some(result).filter(|_| !self.faults.has(F::DetectionUndescribed)))
+    }
+
+    /// A station or a charger is a target (ACT-36).
+    pub(super) fn align(&self, action: &Action) -> Result<(), Problem> {
+        let site = self.site(action);
+        let target = self.stations.contains_key(&site) || self.config.chargers.contains(&site);
+        let target = target && !self.faults.has(F::PositioningFails);
+        if target || self.faults.has(F::PositioningFailureFinished) {
+            return Ok(());
+        }
+        Err(Problem::new(Area::Localization, action, "there is no target"))
+    }
+
+    /// pick or drop has failed.
+    fn load_problem(&mut self, action: &Action, reason: &str) -> Result<(), Problem> {
+        if self.faults.has(F::FailureChangesLoad) {
+            self.change_load_anyway(action);
+        }
+        let mut problem = Problem::new(Area::Load, action, reason);
+        if self.faults.has(F::FailureUnreferenced) {
+            problem.references.clear();
+        }
+        Err(problem.silent_if(self.faults.has(F::FailureSilent)))
+    }
+
+    /// `failure-changes-load`: what would be there had it not failed.
+    fn change_load_anyway(&mut self, action: &Action) {
+        match action.kind.map(|kind| kind.deed) {
+            Some(Deed::Pick) if self.loads.is_empty() => self.loads.push(Load {
+                id: String::new(),
+                kind: action.text("loadType").to_owned(),
+                position: LOAD_POSITIONS[0].to_owned(),
+            }),
+            Some(Deed::Drop) => self.loads.clear(),
+            _ => {}
+        }
+    }
+
+    pub(super) fn pick(&mut self, action: &Action) -> Result<(), Problem> {
+        let site = self.site(action);
+        let reason = match self.stations.get(&site) {
+            _ if !self.loads.is_empty() => Some("the vehicle carries a load already"),
+            Some(true) => None,
+            _ => Some("there is no load"),
+        };
+        match reason {
+            Some(_) if self.faults.has(F::PickFailureFinished) => return Ok(()),
+            Some(reason) => return self.load_problem(action, reason),
+            None => {}
+        }
+        if self.faults.has(F::PickWithoutLoad) {
+            return Ok(());
+        }
+        self.stations.insert(site, false);
+        let given = |key: &str, other: &str| match action.request.parameter(key).and_then(Value::as_str) {
+            Some(text) => text.to_owned(),
+            None => other.to_owned(),
+        };
+        self.loads.push(Load {
+            id: given("loadId", ""),
+            kind: given("loadType", "EPAL"),
+            position: given("lhd", LOAD_POSITIONS[0]),
+        });
+        Ok(())
+    }
+
+    pub(super) fn put_down(&mut self, action: &Action) -> Result<(), Problem> {
+        let wanted = action.text("loadId");
+        let found = self
+            .loads
+            .iter()
+            .position(|load| wanted.is_empty() || load.id == wanted);
+        let Some(found) = found else {
+            return self.load_problem(action, "the vehicle does not carry that load");
+        };
+        let site = self.site(action);
+        match self.stations.get_mut(&site) {
+            Some(true) if self.faults.has(F::DropFailureFinished) => return Ok(()),
+            Some(true) => return self.load_problem(action, "the place is taken"),
+            Some(taken) => *taken = true,
+            None => {}
+        }
+        let load = self.loads.remove(found);
+        if self.faults.has(F::DropReportedLate) {
+            self.shadow = Some((self.moment() + Duration::from_secs(1), load));
+        }
+        Ok(())
+    }
+}
