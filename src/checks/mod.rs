@@ -7,8 +7,10 @@
 //! not accuse anybody falsely: states coalesce, links break, wills are old by nature, retained messages are
 //! stale, and tests send broken messages on purpose. Memory is bounded whatever a device sends.
 
+mod blocking;
 mod connection;
 mod errors;
+mod errors_ready;
 mod factsheet;
 mod header;
 mod header_id;
@@ -17,7 +19,10 @@ mod motion;
 mod mqtt;
 mod orders;
 mod state_actions;
+mod state_battery;
+mod state_bursts;
 mod state_maps;
+mod state_paused;
 mod state_period;
 mod state_route;
 mod state_triggers;
@@ -26,6 +31,7 @@ mod topic;
 #[cfg(test)]
 mod trace;
 mod traffic;
+mod visualization;
 
 use std::time::Duration;
 
@@ -118,7 +124,7 @@ pub fn find(name: &str) -> Option<&'static Check> {
     REGISTRY.iter().find(|check| check.name == name)
 }
 
-static REGISTRY: [Check; 35] = [
+static REGISTRY: [Check; 43] = [
     message::SCHEMA,
     message::ENCODING,
     header_id::ID_RISES,
@@ -134,17 +140,24 @@ static REGISTRY: [Check; 35] = [
     connection::VALUES,
     state_period::PERIOD,
     state_period::OWN_LIMITS,
+    state_bursts::BURSTS,
     state_actions::TRANSITIONS,
     state_actions::KEPT,
     state_route::REMAINING_ROUTE,
     state_route::LAST_NODE,
     state_triggers::TRIGGERS,
+    blocking::BLOCKING,
+    state_paused::PAUSED,
     state_values::IDLE_EMPTY,
     state_maps::MAPS,
     state_values::POSITION_RANGE,
     state_values::IDENTIFIERS,
     state_values::DRIVING,
+    state_battery::LEVELS,
+    visualization::RATE,
+    visualization::PUBLISHED,
     errors::PERSIST,
+    errors_ready::READY,
     factsheet::CONSISTENCY,
     motion::EDGE_SPEED,
     motion::EDGE_ROTATION_SPEED,
@@ -154,6 +167,7 @@ static REGISTRY: [Check; 35] = [
     motion::NODE_THETA,
     motion::AXES,
     motion::VELOCITY_SIGN,
+    motion::MODE_SPEED,
 ];
 
 #[cfg(test)]

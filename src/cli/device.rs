@@ -47,6 +47,7 @@ pub(super) fn check_faults(faults: &[String]) -> Result<(), Problem> {
 pub(super) fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
     let mut all = device.statements.clone();
     all.insert("long-action".to_owned(), device.long_action.is_some());
+    all.insert("brief-action".to_owned(), device.brief_action.is_some());
     all.insert(
         "uninterruptible-action".to_owned(),
         device.uninterruptible_action.is_some(),

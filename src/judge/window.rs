@@ -11,7 +11,7 @@ use crate::checks::{self, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::pack::Pack;
 use crate::pattern::Bindings;
-use crate::suite::model::CheckUse;
+use crate::suite::model::{Binding, CheckUse};
 use crate::verdict::Verdict;
 
 /// Everything around a step.
@@ -38,6 +38,8 @@ pub(super) struct CheckWindow {
     running: Box<dyn Running>,
     with: Map<String, Value>,
     findings: Vec<CheckFinding>,
+    /// Those of them that are about the window.
+    told: Vec<CheckFinding>,
     /// How many entries of the test it has seen.
     seen: usize,
 }
@@ -79,6 +81,7 @@ impl CheckWindow {
             running,
             with,
             findings: Vec::new(),
+            told: Vec::new(),
             seen: 0,
         })
     }
@@ -94,6 +97,9 @@ impl CheckWindow {
                 .running
                 .observe(next, &context(scene, &self.with), &mut self.findings);
             if next.seq() == entry.seq() {
+                let here = self.findings.iter().skip(before);
+                self.told
+                    .extend(here.filter(|finding| finding.seq == next.seq()).cloned());
                 said = match self.worst(before, Some(entry.seq())) {
                     Some(found) => found,
                     None if judged => Said::Right,
@@ -116,11 +122,32 @@ impl CheckWindow {
         found.max_by_key(severity).map(Said::of)
     }
 
+    /// What it found in the window about one of these requirements, sorted out: for each the worst, if any. `None`
+    /// while everything it found concerns whatever the clause is bound to.
+    pub(super) fn sorted(&self, bindings: &[Binding]) -> Option<Vec<Option<(u64, Said)>>> {
+        let about = |finding: &&CheckFinding, binding: &Binding| finding.requirement.as_ref() == Some(&binding.requirement);
+        let severity = |finding: &&CheckFinding| match finding.verdict {
+            Some(Verdict::Warning) => 0,
+            Some(Verdict::Inconclusive) => 1,
+            _ => 2,
+        };
+        let named = |finding: &CheckFinding| bindings.iter().any(|binding| about(&finding, binding));
+        if self.told.is_empty() || !self.told.iter().all(named) {
+            return None;
+        }
+        let worst = |binding: &Binding| {
+            let own = self.told.iter().filter(|finding| about(finding, binding));
+            own.max_by_key(severity).map(|finding| (finding.seq, Said::of(finding)))
+        };
+        Some(bindings.iter().map(worst).collect())
+    }
+
     /// The window has ended; returns what was found by that.
     pub(super) fn finish(&mut self, end: crate::clock::Moment, scene: &Scene<'_>) -> Option<(Holds, String)> {
         let before = self.findings.len();
         self.running
             .finish(end, &context(scene, &self.with), &mut self.findings);
+        self.told.extend(self.findings.iter().skip(before).cloned());
         match self.worst(before, None)? {
             Said::Wrong(holds, message) => Some((holds, message)),
             Said::Nothing | Said::Right => None,

@@ -177,6 +177,9 @@ impl Taken<'_> {
                 topic_template: self.text("device.topic-template"),
                 command: self.texts("device.command"),
                 long_action: self.action("device.long-action"),
+                brief_action: self
+                    .action("device.brief-action")
+                    .or_else(|| self.action("device.long-action")),
                 uninterruptible_action: self.action("device.uninterruptible-action"),
                 statements: self.statements(),
                 claims: self.claims(),

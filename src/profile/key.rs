@@ -83,6 +83,10 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "The long action can be done on an edge as well.",
     },
     Statement {
+        name: "instant-actions",
+        doc: "The long action can be sent as an instant action as well.",
+    },
+    Statement {
         name: "line-guided",
         doc: "The vehicle follows a physical or virtual line and may have no coordinates.",
     },
@@ -116,6 +120,10 @@ pub const SAMPLE_ACTIONS: &[Statement] = &[
         doc: "An action on a node that runs for some seconds and does no harm.",
     },
     Statement {
+        name: "brief-action",
+        doc: "An action on a node that ends soon and does no harm; the long one unless said.",
+    },
+    Statement {
         name: "uninterruptible-action",
         doc: "An action on a node that runs for some seconds and cannot be interrupted.",
     },
@@ -137,6 +145,7 @@ pub const KEYS: &[Key] = &[
     key("device.node-bound", Kind::Flag),
     key("device.interruptible-actions", Kind::Flag),
     key("device.edge-actions", Kind::Flag),
+    key("device.instant-actions", Kind::Flag),
     key("device.line-guided", Kind::Flag),
     key("device.free-navigation", Kind::Flag),
     key("device.carries-load", Kind::Flag),
@@ -144,6 +153,7 @@ pub const KEYS: &[Key] = &[
     key("device.map-hash", Kind::Flag),
     key("device.charges", Kind::Flag),
     key("device.long-action", Kind::Action),
+    key("device.brief-action", Kind::Action),
     key("device.uninterruptible-action", Kind::Action),
     key("device.claims", Kind::Claims),
     key("bench.listen", Kind::Address),

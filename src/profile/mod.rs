@@ -88,6 +88,8 @@ pub struct Device {
     pub command: Option<Vec<String>>,
     /// An action on a node that runs for some seconds and does no harm.
     pub long_action: Option<SampleAction>,
+    /// An action on a node that ends soon and does no harm; the long one unless said.
+    pub brief_action: Option<SampleAction>,
     /// An action on a node that runs for some seconds and cannot be interrupted.
     pub uninterruptible_action: Option<SampleAction>,
     /// What the vehicle is like; a name of [`STATEMENTS`] or [`SAMPLE_ACTIONS`] that is missing is not known.
@@ -116,6 +118,7 @@ impl Device {
             .filter_map(|(name, text)| Some((name, Value::from(text.as_deref()?))));
         let actions = [
             ("longAction", &self.long_action),
+            ("briefAction", &self.brief_action),
             ("uninterruptibleAction", &self.uninterruptible_action),
         ];
         let actions = actions

@@ -63,6 +63,7 @@ impl ReferenceAgv {
             // Tests rely on it: there is nothing to charge at on the built-in floor.
             chargers: BTreeSet::new(),
             start_node: first.0,
+            zone_set: Some("hall-zones".to_owned()),
             maps: vec![OnboardMap {
                 map_id: first.1,
                 map_version: "1".to_owned(),
@@ -115,8 +116,10 @@ impl ReferenceAgv {
             ("interruptible-actions", self.config.interruptible),
             ("uninterruptible-actions", true),
             ("long-action", true),
+            ("brief-action", true),
             ("uninterruptible-action", true),
             ("edge-actions", true),
+            ("instant-actions", true),
             ("no-charger-on-course", true),
             ("carries-load", true),
             ("map-hash", true),
@@ -131,10 +134,11 @@ impl ReferenceAgv {
     /// `device.*` beside identity and factsheet: the actions tests may use for their own ends.
     #[must_use]
     pub fn device_bindings(&self) -> Map<String, Value> {
-        let action = |name: &str| json!({ "type": name, "parameters": { "duration": 0.5 } });
+        let action = |name: &str, duration: f64| json!({ "type": name, "parameters": { "duration": duration } });
         let mut all = Map::new();
-        all.insert("longAction".to_owned(), action("beep"));
-        all.insert("uninterruptibleAction".to_owned(), action("calibrate"));
+        all.insert("longAction".to_owned(), action("beep", 0.5));
+        all.insert("briefAction".to_owned(), action("beep", 0.05));
+        all.insert("uninterruptibleAction".to_owned(), action("calibrate", 0.5));
         all
     }
 
@@ -149,11 +153,15 @@ impl ReferenceAgv {
     }
 
     /// The hooks it understands as commands.
-    pub const HOOKS: [&'static str; 14] = [
+    pub const HOOKS: [&'static str; 18] = [
         "power-cycle",
         "shutdown",
         "start",
         "set-mode",
+        "drive-manually",
+        "move-to",
+        "provoke-error",
+        "clear-error",
         "emergency-stop",
         "release-emergency-stop",
         "trigger",

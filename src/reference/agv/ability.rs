@@ -34,6 +34,7 @@ impl Agv {
     /// Whether the vehicle can do all this; the first `known` nodes are only the joint.
     pub(super) fn check_ability(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
         self.check_memory(order, known)?;
+        self.check_zone_set(order)?;
         if let Some(path) = order
             .unsupported
             .first()
@@ -58,6 +59,16 @@ impl Agv {
             self.check_edge(edge, ends)?;
         }
         self.check_actions(order, known)
+    }
+
+    /// It plans with the zone set it has, or not at all.
+    fn check_zone_set(&self, order: &Order) -> Result<(), Refusal> {
+        let Some(wanted) = &order.zone_set else { return Ok(()) };
+        let known = self.config.zone_set.as_ref() == Some(wanted);
+        if known || self.faults.has(F::ZoneSetUnchecked) || self.faults.has(F::UnsupportedFieldIgnored) {
+            return Ok(());
+        }
+        Err(Refusal::at_field(Rule::Unable, "the vehicle does not have the zone set", "zoneSetId"))
     }
 
     fn check_memory(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {

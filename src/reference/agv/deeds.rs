@@ -175,7 +175,9 @@ impl Agv {
             Area::Load => &names.load,
             Area::Charging => &names.charging,
         };
-        self.warn(name.clone(), problem.references.clone(), problem.reason.clone());
+        let mut references = problem.references.clone();
+        references.retain(|(key, _)| key != "actionId" || !self.faults.has(F::FailureUnreferenced));
+        self.warn(name.clone(), references, problem.reason.clone());
     }
 
     fn forget_if_faulty(&mut self, id: &str) {

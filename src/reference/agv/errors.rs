@@ -18,6 +18,8 @@ pub(super) enum Life {
     Until(Moment),
     /// While the emergency stop is active.
     WhileStopped,
+    /// While the vehicle itself has a defect.
+    WhileDefective,
 }
 
 /// One active error.
@@ -51,12 +53,18 @@ impl Errors {
 
     /// A new order was accepted.
     pub(super) fn new_order(&mut self) {
-        self.active.retain(|error| error.life == Life::WhileStopped);
+        self.active
+            .retain(|error| matches!(error.life, Life::WhileStopped | Life::WhileDefective));
     }
 
     /// The emergency stop was released.
     pub(super) fn released(&mut self) {
         self.active.retain(|error| error.life != Life::WhileStopped);
+    }
+
+    /// The defect was put right.
+    pub(super) fn cleared(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileDefective);
     }
 
     /// Drops what has run out.

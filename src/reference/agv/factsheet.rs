@@ -148,8 +148,10 @@ impl Agv {
         } else {
             "SUPPORTED"
         };
+        let zones = self.config.zone_set.is_some().then_some("order.zoneSetId");
         let parameters: Vec<Value> = OPTIONAL_PARAMETERS
-            .iter()
+            .into_iter()
+            .chain(zones)
             .map(|name| json!({ "parameter": name, "support": support }))
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
@@ -186,6 +188,7 @@ impl Agv {
             })
             .collect();
         let renamed = self.faults.has(F::PickParameterRenamed);
+        let unknown = self.faults.has(F::ParameterTypeUnknown);
         let mut picture = Map::new();
         picture.insert("actionType".into(), json!(kind.name));
         picture.insert("actionDescription".into(), json!(kind.description));
@@ -194,7 +197,7 @@ impl Agv {
             let parameters = kind.parameters.iter().map(|parameter| {
                 json!({
                     "key": if parameter.key == "height" && renamed { "liftHeightMm" } else { parameter.key },
-                    "valueDataType": parameter.data_type,
+                    "valueDataType": if unknown { "DOUBLE" } else { parameter.data_type },
                     "isOptional": parameter.optional,
                 })
             });

@@ -83,13 +83,15 @@ struct Holds {
     emergency: bool,
     /// Something stands in the protective field.
     field: bool,
+    /// A defect that keeps it from running.
+    defect: bool,
     /// Nothing at all (`pause-not-lifted` only).
     stuck: bool,
 }
 
 impl Holds {
     fn any(self) -> bool {
-        self.pause || self.button || self.emergency || self.field || self.stuck
+        self.pause || self.button || self.emergency || self.field || self.defect || self.stuck
     }
 }
 

@@ -26,9 +26,11 @@ const TIMES: [&str; 12] = [
 ];
 
 /// The names of `device.` that a profile may give.
-const PROFILE: [&str; 4] = [
+const PROFILE: [&str; 6] = [
     "longAction.type",
     "longAction.parameters",
+    "briefAction.type",
+    "briefAction.parameters",
     "uninterruptibleAction.type",
     "uninterruptibleAction.parameters",
 ];

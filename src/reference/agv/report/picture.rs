@@ -31,8 +31,9 @@ impl Agv {
         }
         set("orderId", json!(order_id));
         set("orderUpdateId", json!(self.book.update_id));
-        if has(F::ZoneSetInvented) {
-            set("zoneSetId", json!("factory"));
+        if let Some(zones) = &self.config.zone_set {
+            let invented = has(F::ZoneSetInvented) && self.book.zoned;
+            set("zoneSetId", json!(if invented { "factory" } else { zones }));
         }
         if has(F::DistanceNegative) {
             set("distanceSinceLastNode", json!(-1.0));
@@ -262,7 +263,11 @@ impl Agv {
     fn battery(&self) -> Value {
         let mut battery = Map::new();
         if !self.faults.has(F::ChargeMissing) {
-            battery.insert("batteryCharge".into(), json!(87.5));
+            let charge = match self.motion.is_moving() {
+                moving if self.faults.has(F::ChargeGoodBad) => json!(if moving { 0.0 } else { 100.0 }),
+                _ => json!(87.5),
+            };
+            battery.insert("batteryCharge".into(), charge);
         }
         battery.insert("batteryVoltage".into(), json!(48.2));
         battery.insert("batteryHealth".into(), json!(96));
@@ -289,6 +294,7 @@ impl Agv {
             Mode::Semiautomatic => "SEMIAUTOMATIC",
             Mode::Manual => "MANUAL",
             Mode::Service => "SERVICE",
+            Mode::Teachin if self.faults.has(F::TeachInAsService) => "SERVICE",
             Mode::Teachin => "TEACHIN",
         };
         if self.faults.has(F::ModeLowerCase) {
