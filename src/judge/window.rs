@@ -164,3 +164,60 @@ fn context<'a>(scene: &'a Scene<'_>, with: &'a Map<String, Value>) -> CheckConte
         bindings: scene.run_bindings,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::{Source, Span};
+    use crate::pack::RequirementId;
+
+    struct Silent;
+
+    impl Running for Silent {
+        fn observe(&mut self, _: &Entry, _: &CheckContext<'_>, _: &mut Vec<CheckFinding>) -> bool {
+            false
+        }
+    }
+
+    fn finding(requirement: Option<&str>, verdict: Option<Verdict>, seq: u64) -> CheckFinding {
+        CheckFinding {
+            requirement: requirement.map(RequirementId::from),
+            verdict,
+            seq,
+            message: format!("found at {seq}"),
+        }
+    }
+
+    fn sorted(told: Vec<CheckFinding>) -> Option<Vec<Option<(u64, Said)>>> {
+        let window = CheckWindow {
+            running: Box::new(Silent),
+            with: Map::new(),
+            findings: Vec::new(),
+            told,
+            seen: 0,
+        };
+        let source = Source::new("test", "");
+        let bindings = ["BLOCK-01", "BLOCK-05"].map(|id| Binding {
+            requirement: RequirementId::from(id),
+            span: Span::new(&source, 0, 0),
+        });
+        window.sorted(&bindings)
+    }
+
+    #[test]
+    fn each_requirement_gets_the_worst_that_was_found_about_it() {
+        let told = vec![
+            finding(Some("BLOCK-05"), Some(Verdict::Warning), 3),
+            finding(Some("BLOCK-05"), None, 5),
+        ];
+        let expected = Said::Wrong(Holds::No, "found at 5".to_owned());
+        assert_eq!(sorted(told), Some(vec![None, Some((5, expected))]));
+    }
+
+    #[test]
+    fn a_finding_on_whatever_the_clause_is_bound_to_is_not_sorted() {
+        assert_eq!(sorted(vec![finding(None, None, 3)]), None);
+        assert_eq!(sorted(vec![finding(Some("BLOCK-07"), None, 3)]), None);
+        assert_eq!(sorted(Vec::new()), None);
+    }
+}

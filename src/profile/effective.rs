@@ -177,9 +177,7 @@ impl Taken<'_> {
                 topic_template: self.text("device.topic-template"),
                 command: self.texts("device.command"),
                 long_action: self.action("device.long-action"),
-                brief_action: self
-                    .action("device.brief-action")
-                    .or_else(|| self.action("device.long-action")),
+                brief_action: self.action("device.brief-action"),
                 uninterruptible_action: self.action("device.uninterruptible-action"),
                 statements: self.statements(),
                 claims: self.claims(),

@@ -121,7 +121,7 @@ pub const SAMPLE_ACTIONS: &[Statement] = &[
     },
     Statement {
         name: "brief-action",
-        doc: "An action on a node that ends soon and does no harm; the long one unless said.",
+        doc: "An action on a node that ends within a second or two and does no harm.",
     },
     Statement {
         name: "uninterruptible-action",

@@ -88,7 +88,7 @@ pub struct Device {
     pub command: Option<Vec<String>>,
     /// An action on a node that runs for some seconds and does no harm.
     pub long_action: Option<SampleAction>,
-    /// An action on a node that ends soon and does no harm; the long one unless said.
+    /// An action on a node that ends within a second or two and does no harm.
     pub brief_action: Option<SampleAction>,
     /// An action on a node that runs for some seconds and cannot be interrupted.
     pub uninterruptible_action: Option<SampleAction>,

@@ -241,7 +241,6 @@ fn a_full_profile_arrives_whole() {
         "manufacturer": "ACME",
         "serialNumber": "carrier_07",
         "longAction": { "type": "wait", "parameters": { "seconds": 20, "quiet": true } },
-        "briefAction": { "type": "wait", "parameters": { "seconds": 20, "quiet": true } },
         "uninterruptibleAction": { "type": "finePositioning", "parameters": {} },
     });
     assert_eq!(bindings, expected);

@@ -130,3 +130,66 @@ impl Running for ModeSpeed {
         judged
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use crate::checks::trace::{Trace, merged};
+
+    const CHECK: &str = "motion/mode-speed";
+
+    /// A drive over one edge of four metres, with the velocity reported half way.
+    fn drive(trace: &mut Trace, mode: &str, seconds: f64, velocity: Option<f64>) {
+        let order = format!("{mode}-{seconds}");
+        let node = |id: &str, sequence: u64| json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [] });
+        let edge = json!({ "edgeId": "e", "sequenceId": 1, "released": true, "actions": [] });
+        trace.sent(
+            "order",
+            &json!({ "orderId": order, "orderUpdateId": 0, "nodes": [node("a", 0), node("b", 2)], "edges": [edge] }),
+        );
+        let on = |velocity: Option<f64>| {
+            let state = json!({
+                "orderId": order, "operatingMode": mode, "lastNodeId": "a", "lastNodeSequenceId": 0, "driving": true,
+                "nodeStates": [node("b", 2)], "edgeStates": [edge],
+            });
+            match velocity {
+                Some(vx) => merged(state, &json!({ "velocity": { "vx": vx, "vy": 0.0, "omega": 0.0 } })),
+                None => state,
+            }
+        };
+        let end: Value = json!({
+            "orderId": order, "operatingMode": mode, "lastNodeId": "b", "lastNodeSequenceId": 2,
+            "nodeStates": [], "edgeStates": [],
+        });
+        let start = velocity.map(|_| 0.0);
+        trace.state(&on(start)).wait(seconds / 2.0).state(&on(velocity));
+        trace.wait(seconds / 2.0).state(&end);
+    }
+
+    fn judge(automatic: (f64, Option<f64>), semiautomatic: (f64, Option<f64>)) -> (Vec<String>, usize) {
+        let mut trace = Trace::subscriber();
+        drive(&mut trace, "AUTOMATIC", automatic.0, automatic.1);
+        drive(&mut trace, "SEMIAUTOMATIC", semiautomatic.0, semiautomatic.1);
+        let outcome = trace.judge(CHECK);
+        (outcome.summary(), outcome.judged)
+    }
+
+    #[test]
+    fn slower_and_as_fast_are_right() {
+        assert_eq!(judge((4.0, Some(1.0)), (8.0, Some(0.5))), (Vec::new(), 1));
+        assert_eq!(judge((4.0, Some(1.0)), (3.9, Some(1.05))), (Vec::new(), 1));
+    }
+
+    #[test]
+    fn one_fast_sample_or_one_slow_drive_before_is_no_proof() {
+        assert_eq!(judge((4.0, Some(0.2)), (4.0, Some(1.0))), (Vec::new(), 1));
+        assert_eq!(judge((9.0, Some(1.0)), (4.0, Some(1.0))), (Vec::new(), 1));
+    }
+
+    #[test]
+    fn faster_is_found() {
+        assert_eq!(judge((4.0, Some(1.0)), (2.0, Some(2.0))).0, ["-"]);
+        assert_eq!(judge((4.0, None), (2.0, None)).0, ["- warning"]);
+    }
+}
