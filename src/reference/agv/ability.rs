@@ -18,9 +18,11 @@ impl Agv {
     /// Where a node is: as the order says, else as the layout knows.
     pub(super) fn place(&self, node: &Node) -> Option<Place> {
         if let Some(position) = &node.position {
+            // With its axes mirrored it reads places it does not know as it reports them.
+            let mirrored = self.faults.has(F::AxesMirrored) && self.config.node(&node.id).is_none();
             return Some(Place {
                 x: position.x,
-                y: position.y,
+                y: if mirrored { -position.y } else { position.y },
                 map_id: position.map_id.clone(),
             });
         }

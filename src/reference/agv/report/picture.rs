@@ -289,12 +289,16 @@ impl Agv {
     }
 
     fn mode_literal(&self) -> String {
+        let next = self.faults.has(F::ModeOffByOne);
         let literal = match self.mode {
+            Mode::Semiautomatic if next => "MANUAL",
+            Mode::Manual if next => "SERVICE",
+            Mode::Service if next => "TEACHIN",
+            Mode::Teachin if next => "SEMIAUTOMATIC",
             Mode::Automatic => "AUTOMATIC",
             Mode::Semiautomatic => "SEMIAUTOMATIC",
             Mode::Manual => "MANUAL",
             Mode::Service => "SERVICE",
-            Mode::Teachin if self.faults.has(F::TeachInAsService) => "SERVICE",
             Mode::Teachin => "TEACHIN",
         };
         if self.faults.has(F::ModeLowerCase) {
