@@ -108,7 +108,7 @@ impl BlockingTypes {
         let all = elements(state, "actionStates").take(ACTIONS);
         all.filter_map(|action| {
             let id = text(action, "actionId");
-            let mut places = self.shown.orders.of(order).flat_map(|sent| {
+            let mut places = self.shown.orders.of(order).filter_map(|sent| {
                 let here = sent.actions.iter().find(|placed| placed.action == id);
                 here.map(|placed| (placed, sent))
             });
@@ -173,7 +173,13 @@ impl BlockingTypes {
             let sequence = || broken("BLOCK-01", seq, text.clone());
             self.keep("BLOCK-01", first, second, sequence, found);
             if first.is_hard() != second.is_hard() {
-                self.keep("BLOCK-06", first, second, || broken("BLOCK-06", seq, text.clone()), found);
+                self.keep(
+                    "BLOCK-06",
+                    first,
+                    second,
+                    || broken("BLOCK-06", seq, text.clone()),
+                    found,
+                );
             }
         }
     }

@@ -40,7 +40,7 @@ fn hundredths(charge: f64) -> Option<i64> {
 }
 
 impl Running for Levels {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, _findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         let charge = state(self.traffic, entry, context)
             .and_then(|state| state.get("batteryState")?.get("batteryCharge")?.as_f64())
@@ -50,12 +50,16 @@ impl Running for Levels {
         };
         self.seen.entry(charge).or_insert(entry.seq());
         self.jumps += usize::from(self.last.replace(charge).is_some_and(|last| last != charge));
-        let _ = findings;
+        // What two charges mean is only known at the end.
         false
     }
 
     fn finish(&mut self, _end: Moment, _context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        let [(low, _), (high, seq)] = self.seen.iter().map(|(charge, seq)| (*charge, *seq)).collect::<Vec<_>>()[..]
+        let [(low, _), (high, seq)] = self
+            .seen
+            .iter()
+            .map(|(charge, seq)| (*charge, *seq))
+            .collect::<Vec<_>>()[..]
         else {
             return;
         };

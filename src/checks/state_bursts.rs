@@ -93,7 +93,9 @@ mod tests {
         for number in 0..8 {
             let speed = f64::from(number);
             let order = if changing { format!("o{number}") } else { "o".to_owned() };
-            trace.wait(gap).state(&json!({ "orderId": order, "velocity": { "vx": speed } }));
+            trace
+                .wait(gap)
+                .state(&json!({ "orderId": order, "velocity": { "vx": speed } }));
         }
         trace
     }

@@ -79,8 +79,7 @@ mod tests {
     fn judge(states: &[Value]) -> Vec<String> {
         let mut trace = Trace::subscriber();
         for state in states {
-            let with =
-                json!({ "paused": false, "actionStates": [{ "actionId": "a", "actionStatus": "PAUSED" }] });
+            let with = json!({ "paused": false, "actionStates": [{ "actionId": "a", "actionStatus": "PAUSED" }] });
             trace.state(&merged(with, state));
         }
         trace.judge("state/paused-actions").summary()

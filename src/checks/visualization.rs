@@ -79,7 +79,9 @@ impl Rate {
 
     /// Whether nothing came for so long that nothing will come.
     fn silence(&mut self, now: Moment, seq: u64, findings: &mut Vec<CheckFinding>) {
-        let Some((since, stated)) = self.since.zip(self.stated) else { return };
+        let Some((since, stated)) = self.since.zip(self.stated) else {
+            return;
+        };
         if self.published || self.found || now.since(since) < stated * SILENT {
             return;
         }
@@ -98,7 +100,8 @@ impl Running for Rate {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         let now = entry.at().moment;
-        let packet = |wanted: fn(&Packet) -> bool| matches!(entry.event(), Event::Packet { packet, .. } if wanted(packet));
+        let packet =
+            |wanted: fn(&Packet) -> bool| matches!(entry.event(), Event::Packet { packet, .. } if wanted(packet));
         let ends = matches!(entry.event(), Event::Closed { .. } | Event::Fault { .. })
             || packet(|packet| matches!(packet, Packet::Disconnect { .. } | Packet::Connect { .. }))
             || outside_influence(entry);
@@ -107,7 +110,11 @@ impl Running for Rate {
             self.since = None;
             self.gaps.clear();
         }
-        let Some(message) = self.traffic.delivered(entry, context).filter(|_| !self.traffic.disturbed) else {
+        let Some(message) = self
+            .traffic
+            .delivered(entry, context)
+            .filter(|_| !self.traffic.disturbed)
+        else {
             return false;
         };
         match message.name {

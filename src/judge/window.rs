@@ -125,7 +125,8 @@ impl CheckWindow {
     /// What it found in the window about one of these requirements, sorted out: for each the worst, if any. `None`
     /// while everything it found concerns whatever the clause is bound to.
     pub(super) fn sorted(&self, bindings: &[Binding]) -> Option<Vec<Option<(u64, Said)>>> {
-        let about = |finding: &&CheckFinding, binding: &Binding| finding.requirement.as_ref() == Some(&binding.requirement);
+        let about =
+            |finding: &&CheckFinding, binding: &Binding| finding.requirement.as_ref() == Some(&binding.requirement);
         let severity = |finding: &&CheckFinding| match finding.verdict {
             Some(Verdict::Warning) => 0,
             Some(Verdict::Inconclusive) => 1,

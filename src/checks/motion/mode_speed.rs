@@ -86,12 +86,11 @@ impl ModeSpeed {
         };
         let sooner = took.as_secs_f64() * SHARE < usually.as_secs_f64();
         match (drive.reported, usual.reported) {
-            (Some(speed), Some(limit)) => {
-                if sooner && speed > limit * SHARE + NOISE {
-                    let text = format!("{speed:.2} m/s in SEMIAUTOMATIC on an edge driven at {limit:.2} m/s in AUTOMATIC");
-                    findings.push(found(now.seq, text));
-                }
+            (Some(speed), Some(limit)) if sooner && speed > limit * SHARE + NOISE => {
+                let text = format!("{speed:.2} m/s in SEMIAUTOMATIC on an edge driven at {limit:.2} m/s in AUTOMATIC");
+                findings.push(found(now.seq, text));
             }
+            (Some(_), Some(_)) => {}
             _ if sooner => {
                 let (took, usually) = (took.as_secs_f64(), usually.as_secs_f64());
                 let text = format!("{took:.2} s in SEMIAUTOMATIC over an edge that took {usually:.2} s in AUTOMATIC");
@@ -120,7 +119,10 @@ impl Running for ModeSpeed {
             drive.saw(now.velocity.speed());
             return false;
         }
-        let went_on = self.present.as_ref().is_some_and(|(entered, was, _)| now.order == entered.order && *was == mode);
+        let went_on = self
+            .present
+            .as_ref()
+            .is_some_and(|(entered, was, _)| now.order == entered.order && *was == mode);
         let judged = went_on && self.driven(&now, findings);
         let drive = Drive {
             reported: now.velocity.speed(),
@@ -142,7 +144,8 @@ mod tests {
     /// A drive over one edge of four metres, with the velocity reported half way.
     fn drive(trace: &mut Trace, mode: &str, seconds: f64, velocity: Option<f64>) {
         let order = format!("{mode}-{seconds}");
-        let node = |id: &str, sequence: u64| json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [] });
+        let node =
+            |id: &str, sequence: u64| json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [] });
         let edge = json!({ "edgeId": "e", "sequenceId": 1, "released": true, "actions": [] });
         trace.sent(
             "order",

@@ -236,7 +236,7 @@ impl Holding {
                 _ if ended => {
                     let why = "the step ended with what was found about another requirement";
                     clause.holds = Holds::Unseen(why.to_owned());
-                    clause.message = why.to_owned();
+                    why.clone_into(&mut clause.message);
                 }
                 _ => {
                     clause.holds = Holds::Yes;

@@ -70,7 +70,11 @@ impl Agv {
         if known || self.faults.has(F::ZoneSetUnchecked) || self.faults.has(F::UnsupportedFieldIgnored) {
             return Ok(());
         }
-        Err(Refusal::at_field(Rule::Unable, "the vehicle does not have the zone set", "zoneSetId"))
+        Err(Refusal::at_field(
+            Rule::Unable,
+            "the vehicle does not have the zone set",
+            "zoneSetId",
+        ))
     }
 
     fn check_memory(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {

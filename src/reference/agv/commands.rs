@@ -214,9 +214,10 @@ impl Agv {
             fatal: !self.faults.has(F::EmergencyStopWarning),
             references: Vec::new(),
             description: "the emergency stop is pressed".into(),
-            life: match self.faults.has(F::OwnErrorKept) {
-                true => Life::Until(self.moment() + KEPT),
-                false => Life::WhileStopped,
+            life: if self.faults.has(F::OwnErrorKept) {
+                Life::Until(self.moment() + KEPT)
+            } else {
+                Life::WhileStopped
             },
         });
     }

@@ -301,6 +301,7 @@ impl Agv {
         let (Some(x), Some(y), Some(theta)) = (number("x"), number("y"), number("theta")) else {
             return invalid("the pose is not complete");
         };
+        let y = if self.faults.has(F::AxesMirrored) { -y } else { y };
         let unchecked = self.faults.has(F::InitPositionUnchecked);
         if !unchecked && (x.abs() > FARTHEST || y.abs() > FARTHEST || theta.abs() > PI + 0.01) {
             return invalid("the pose is on no map");
