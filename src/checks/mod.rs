@@ -7,8 +7,10 @@
 //! not accuse anybody falsely: states coalesce, links break, wills are old by nature, retained messages are
 //! stale, and tests send broken messages on purpose. Memory is bounded whatever a device sends.
 
+mod blocking;
 mod connection;
 mod errors;
+mod errors_ready;
 mod factsheet;
 mod factsheet_actions;
 mod header;
@@ -18,7 +20,10 @@ mod motion;
 mod mqtt;
 mod orders;
 mod state_actions;
+mod state_battery;
+mod state_bursts;
 mod state_maps;
+mod state_paused;
 mod state_period;
 mod state_predefined;
 mod state_route;
@@ -29,6 +34,7 @@ mod topic;
 mod trace;
 mod traffic;
 mod trajectory;
+mod visualization;
 
 use std::time::Duration;
 
@@ -112,7 +118,7 @@ pub struct Check {
 /// Every named check, in the order they are listed and run.
 #[must_use]
 pub fn registry() -> &'static [Check] {
-    &REGISTRY
+    REGISTRY
 }
 
 /// The check of that name.
@@ -137,6 +143,7 @@ static REGISTRY: &[Check] = &[
     connection::VALUES,
     state_period::PERIOD,
     state_period::OWN_LIMITS,
+    state_bursts::BURSTS,
     state_actions::TRANSITIONS,
     state_actions::KEPT,
     state_predefined::STATUSES,
@@ -144,6 +151,8 @@ static REGISTRY: &[Check] = &[
     state_route::REMAINING_ROUTE,
     state_route::LAST_NODE,
     state_triggers::TRIGGERS,
+    blocking::BLOCKING,
+    state_paused::PAUSED,
     state_values::IDLE_EMPTY,
     state_maps::MAPS,
     state_values::POSITION_RANGE,
@@ -152,7 +161,11 @@ static REGISTRY: &[Check] = &[
     trajectory::TRAJECTORY,
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
+    state_battery::LEVELS,
+    visualization::RATE,
+    visualization::PUBLISHED,
     errors::PERSIST,
+    errors_ready::READY,
     factsheet::CONSISTENCY,
     factsheet_actions::PREDEFINED,
     motion::EDGE_SPEED,
@@ -168,6 +181,7 @@ static REGISTRY: &[Check] = &[
     motion::NODE_THETA,
     motion::AXES,
     motion::VELOCITY_SIGN,
+    motion::MODE_SPEED,
 ];
 
 #[cfg(test)]

@@ -59,10 +59,33 @@ pub(super) fn number(message: &Value, name: &str) -> Option<u64> {
     value.as_u64().or_else(|| whole(value.as_f64()?))
 }
 
+/// blockingType.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Blocking {
+    None,
+    Soft,
+    Hard,
+}
+
+impl Blocking {
+    fn read(action: &Value) -> Option<Self> {
+        match text(action, "blockingType") {
+            "NONE" => Some(Self::None),
+            "SOFT" => Some(Self::Soft),
+            "HARD" => Some(Self::Hard),
+            _ => None,
+        }
+    }
+}
+
 /// An action of an order and where it is to be done.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Placed {
     pub action: String,
+    /// actionType.
+    pub kind: String,
+    /// `None` for a type this version does not have.
+    pub blocking: Option<Blocking>,
     /// sequenceId of its node or edge.
     pub sequence: u64,
     pub on_edge: bool,
@@ -73,9 +96,10 @@ fn placed(message: &Value, list: &str, on_edge: bool) -> Vec<Placed> {
     let of_element = |element| {
         let sequence = number(element, "sequenceId");
         elements(element, "actions").filter_map(move |action| {
-            let action = action.get("actionId")?.as_str()?.chars().take(512).collect();
             Some(Placed {
-                action,
+                action: action.get("actionId")?.as_str()?.chars().take(512).collect(),
+                kind: text(action, "actionType").chars().take(512).collect(),
+                blocking: Blocking::read(action),
                 sequence: sequence?,
                 on_edge,
             })

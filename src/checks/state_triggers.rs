@@ -16,7 +16,7 @@ const ACTIONS: usize = 1024;
 /// See the module.
 pub(super) const TRIGGERS: Check = Check {
     name: "state/action-triggers",
-    decides: &["ASTATE-02", "ACT-02", "NODE-05"],
+    decides: &["ASTATE-02", "ASTATE-03", "ACT-02", "NODE-05"],
     doc: "An action of a node does not begin before the node is the last node, one of an edge not before the node in \
           front of it is. Behind its edge an action is over; one state of overlap is tolerated. Not judged after a \
           cancelOrder, a change of mode, a fatal error or a failed action.",
@@ -75,6 +75,9 @@ impl Running for Triggers {
                 );
                 if place.on_edge {
                     findings.push(broken("ACT-02", entry.seq(), message.clone()));
+                }
+                if status == "INITIALIZING" {
+                    findings.push(broken("ASTATE-03", entry.seq(), message.clone()));
                 }
                 findings.push(broken("ASTATE-02", entry.seq(), message));
             }
@@ -158,6 +161,14 @@ mod tests {
         assert_eq!(
             drive(["RUNNING", "RUNNING", "FINISHED", "FINISHED"], NODE),
             ["ACT-02", "ASTATE-02"]
+        );
+    }
+
+    #[test]
+    fn preparation_before_the_trigger_is_found() {
+        assert_eq!(
+            drive(EDGE, ["INITIALIZING", "RUNNING", "FINISHED", "FINISHED"]),
+            ["ASTATE-03", "ASTATE-02"]
         );
     }
 

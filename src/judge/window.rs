@@ -11,7 +11,7 @@ use crate::checks::{self, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::pack::Pack;
 use crate::pattern::Bindings;
-use crate::suite::model::CheckUse;
+use crate::suite::model::{Binding, CheckUse};
 use crate::verdict::Verdict;
 
 /// Everything around a step.
@@ -38,6 +38,8 @@ pub(super) struct CheckWindow {
     running: Box<dyn Running>,
     with: Map<String, Value>,
     findings: Vec<CheckFinding>,
+    /// Those of them that are about the window.
+    told: Vec<CheckFinding>,
     /// How many entries of the test it has seen.
     seen: usize,
 }
@@ -79,6 +81,7 @@ impl CheckWindow {
             running,
             with,
             findings: Vec::new(),
+            told: Vec::new(),
             seen: 0,
         })
     }
@@ -94,6 +97,9 @@ impl CheckWindow {
                 .running
                 .observe(next, &context(scene, &self.with), &mut self.findings);
             if next.seq() == entry.seq() {
+                let here = self.findings.iter().skip(before);
+                self.told
+                    .extend(here.filter(|finding| finding.seq == next.seq()).cloned());
                 said = match self.worst(before, Some(entry.seq())) {
                     Some(found) => found,
                     None if judged => Said::Right,
@@ -116,11 +122,33 @@ impl CheckWindow {
         found.max_by_key(severity).map(Said::of)
     }
 
+    /// What it found in the window about one of these requirements, sorted out: for each the worst, if any. `None`
+    /// while everything it found concerns whatever the clause is bound to.
+    pub(super) fn sorted(&self, bindings: &[Binding]) -> Option<Vec<Option<(u64, Said)>>> {
+        let about =
+            |finding: &&CheckFinding, binding: &Binding| finding.requirement.as_ref() == Some(&binding.requirement);
+        let severity = |finding: &&CheckFinding| match finding.verdict {
+            Some(Verdict::Warning) => 0,
+            Some(Verdict::Inconclusive) => 1,
+            _ => 2,
+        };
+        let named = |finding: &CheckFinding| bindings.iter().any(|binding| about(&finding, binding));
+        if self.told.is_empty() || !self.told.iter().all(named) {
+            return None;
+        }
+        let worst = |binding: &Binding| {
+            let own = self.told.iter().filter(|finding| about(finding, binding));
+            own.max_by_key(severity).map(|finding| (finding.seq, Said::of(finding)))
+        };
+        Some(bindings.iter().map(worst).collect())
+    }
+
     /// The window has ended; returns what was found by that.
     pub(super) fn finish(&mut self, end: crate::clock::Moment, scene: &Scene<'_>) -> Option<(Holds, String)> {
         let before = self.findings.len();
         self.running
             .finish(end, &context(scene, &self.with), &mut self.findings);
+        self.told.extend(self.findings.iter().skip(before).cloned());
         match self.worst(before, None)? {
             Said::Wrong(holds, message) => Some((holds, message)),
             Said::Nothing | Said::Right => None,
@@ -135,5 +163,62 @@ fn context<'a>(scene: &'a Scene<'_>, with: &'a Map<String, Value>) -> CheckConte
         identity: scene.identity,
         with,
         bindings: scene.run_bindings,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::{Source, Span};
+    use crate::pack::RequirementId;
+
+    struct Silent;
+
+    impl Running for Silent {
+        fn observe(&mut self, _: &Entry, _: &CheckContext<'_>, _: &mut Vec<CheckFinding>) -> bool {
+            false
+        }
+    }
+
+    fn finding(requirement: Option<&str>, verdict: Option<Verdict>, seq: u64) -> CheckFinding {
+        CheckFinding {
+            requirement: requirement.map(RequirementId::from),
+            verdict,
+            seq,
+            message: format!("found at {seq}"),
+        }
+    }
+
+    fn sorted(told: Vec<CheckFinding>) -> Option<Vec<Option<(u64, Said)>>> {
+        let window = CheckWindow {
+            running: Box::new(Silent),
+            with: Map::new(),
+            findings: Vec::new(),
+            told,
+            seen: 0,
+        };
+        let source = Source::new("test", "");
+        let bindings = ["BLOCK-01", "BLOCK-05"].map(|id| Binding {
+            requirement: RequirementId::from(id),
+            span: Span::new(&source, 0, 0),
+        });
+        window.sorted(&bindings)
+    }
+
+    #[test]
+    fn each_requirement_gets_the_worst_that_was_found_about_it() {
+        let told = vec![
+            finding(Some("BLOCK-05"), Some(Verdict::Warning), 3),
+            finding(Some("BLOCK-05"), None, 5),
+        ];
+        let expected = Said::Wrong(Holds::No, "found at 5".to_owned());
+        assert_eq!(sorted(told), Some(vec![None, Some((5, expected))]));
+    }
+
+    #[test]
+    fn a_finding_on_whatever_the_clause_is_bound_to_is_not_sorted() {
+        assert_eq!(sorted(vec![finding(None, None, 3)]), None);
+        assert_eq!(sorted(vec![finding(Some("BLOCK-07"), None, 3)]), None);
+        assert_eq!(sorted(Vec::new()), None);
     }
 }

@@ -83,6 +83,10 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "The long action can be done on an edge as well.",
     },
     Statement {
+        name: "instant-actions",
+        doc: "The long action can be sent as an instant action as well.",
+    },
+    Statement {
         name: "line-guided",
         doc: "The vehicle follows a physical or virtual line and may have no coordinates.",
     },
@@ -170,6 +174,12 @@ pub const SAMPLE_ACTIONS: &[SampleKind] = &[
         "longAction",
         Place::Anywhere,
         "An action on a node that runs for some seconds and does no harm.",
+    ),
+    sample(
+        "brief-action",
+        "briefAction",
+        Place::Anywhere,
+        "An action on a node that ends within a second or two and does no harm.",
     ),
     sample(
         "uninterruptible-action",
@@ -291,6 +301,7 @@ pub const KEYS: &[Key] = &[
     key("device.node-bound", Kind::Flag),
     key("device.interruptible-actions", Kind::Flag),
     key("device.edge-actions", Kind::Flag),
+    key("device.instant-actions", Kind::Flag),
     key("device.line-guided", Kind::Flag),
     key("device.free-navigation", Kind::Flag),
     key("device.carries-load", Kind::Flag),
@@ -299,6 +310,7 @@ pub const KEYS: &[Key] = &[
     key("device.charges", Kind::Flag),
     key("device.room-beside-edges", Kind::Flag),
     key("device.long-action", Kind::Action(Place::Anywhere)),
+    key("device.brief-action", Kind::Action(Place::Anywhere)),
     key("device.uninterruptible-action", Kind::Action(Place::Anywhere)),
     key("device.edge-condition", Kind::Action(Place::Shown)),
     key("device.pick", Kind::Action(Place::Node)),

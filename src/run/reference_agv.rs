@@ -47,6 +47,7 @@ fn sample_actions(layout: &Layout) -> SampleActions {
     let edge = format!("D2-{SHELF}");
     let all = [
         ("long-action", "beep", "", json!({ "duration": 0.5 })),
+        ("brief-action", "beep", "", json!({ "duration": 0.05 })),
         ("uninterruptible-action", "calibrate", "", json!({ "duration": 0.5 })),
         ("edge-condition", "warningLights", "warningLights", json!({})),
         ("pick", "pick", SHELF, load.clone()),
@@ -150,6 +151,7 @@ impl ReferenceAgv {
             // Two more fit, which tests rely on.
             map_capacity: 4,
             start_node: first,
+            zone_set: Some("hall-zones".to_owned()),
             maps: [BUILT_IN_MAP, BUILT_IN_UPPER_MAP]
                 .map(|map| OnboardMap {
                     map_id: map.to_owned(),
@@ -227,7 +229,7 @@ impl ReferenceAgv {
     fn without_loads(&mut self) {
         self.actions
             .0
-            .retain(|name, _| matches!(*name, "long-action" | "uninterruptible-action"));
+            .retain(|name, _| matches!(*name, "long-action" | "brief-action" | "uninterruptible-action"));
         let of_stations = [
             "pick",
             "drop",
@@ -255,6 +257,7 @@ impl ReferenceAgv {
             ("interruptible-actions", self.config.interruptible),
             ("uninterruptible-actions", true),
             ("edge-actions", true),
+            ("instant-actions", true),
             ("small-map-storage", true),
             ("carries-load", !self.config.without_actions.contains("pick")),
             ("map-hash", true),
@@ -312,6 +315,10 @@ impl ReferenceAgv {
         "shutdown",
         "start",
         "set-mode",
+        "drive-manually",
+        "move-to",
+        "provoke-error",
+        "clear-error",
         "emergency-stop",
         "release-emergency-stop",
         "trigger",

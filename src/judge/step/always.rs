@@ -189,7 +189,9 @@ impl Holding {
             .as_ref()
             .and_then(|violation| violation.near.as_ref()?.span.clone());
         let span = span.unwrap_or_else(|| self.selector.span.clone());
-        for mut clause in bound_clauses(&self.verb.checks, "checks", &span, &holds, witness, &message) {
+        let mut bound = bound_clauses(&self.verb.checks, "checks", &span, &holds, witness, &message);
+        self.sort_out(&mut bound);
+        for mut clause in bound {
             clause.expected = self.selector.expected();
             clause.nearest = self
                 .violated
@@ -214,6 +216,33 @@ impl Holding {
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+        }
+    }
+
+    /// A check that names the requirement it found broken decides the clause of that requirement; of the others
+    /// nothing was wrong until then.
+    fn sort_out(&self, clauses: &mut [Clause]) {
+        let Some(sorted) = self.check.as_ref().and_then(|check| check.sorted(&self.verb.checks)) else {
+            return;
+        };
+        let ended = self.violated.is_some();
+        for (clause, found) in clauses.iter_mut().zip(sorted) {
+            match found {
+                Some((seq, Said::Wrong(holds, message))) => {
+                    clause.holds = holds;
+                    clause.witness = Some(seq).filter(|seq| *seq > 0);
+                    clause.message = format!("#{seq}: {message}");
+                }
+                _ if ended => {
+                    let why = "the step ended with what was found about another requirement";
+                    clause.holds = Holds::Unseen(why.to_owned());
+                    why.clone_into(&mut clause.message);
+                }
+                _ => {
+                    clause.holds = Holds::Yes;
+                    clause.message = format!("all {} {} messages match", self.seen, self.verb.topic);
+                }
+            }
         }
     }
 

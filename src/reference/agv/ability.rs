@@ -18,9 +18,11 @@ impl Agv {
     /// Where a node is: as the order says, else as the layout knows. A line-guided vehicle only knows its layout.
     pub(super) fn place(&self, node: &Node) -> Option<Place> {
         if let Some(position) = node.position.as_ref().filter(|_| !self.config.line_guided()) {
+            // With its axes mirrored it reads places it does not know as it reports them.
+            let mirrored = self.faults.has(F::AxesMirrored) && self.config.node(&node.id).is_none();
             return Some(Place {
                 x: position.x,
-                y: position.y,
+                y: if mirrored { -position.y } else { position.y },
                 map_id: position.map_id.clone(),
             });
         }
@@ -35,6 +37,7 @@ impl Agv {
     pub(super) fn check_ability(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
         self.check_memory(order, known)?;
         let usable = |path: &&String| path.rsplit('.').next().is_some_and(|field| self.config.uses(field));
+        self.check_zone_set(order)?;
         if let Some(path) = order
             .unsupported
             .iter()
@@ -60,6 +63,20 @@ impl Agv {
             self.check_edge(edge, ends)?;
         }
         self.check_actions(order, known)
+    }
+
+    /// It plans with the zone set it has, or not at all.
+    fn check_zone_set(&self, order: &Order) -> Result<(), Refusal> {
+        let Some(wanted) = &order.zone_set else { return Ok(()) };
+        let known = self.config.zone_set.as_ref() == Some(wanted);
+        if known || self.faults.has(F::ZoneSetUnchecked) || self.faults.has(F::UnsupportedFieldIgnored) {
+            return Ok(());
+        }
+        Err(Refusal::at_field(
+            Rule::Unable,
+            "the vehicle does not have the zone set",
+            "zoneSetId",
+        ))
     }
 
     fn check_memory(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {

@@ -81,7 +81,7 @@ impl Agv {
         }
         let takes_orders = match self.mode {
             super::Mode::Semiautomatic => !self.faults.has(F::SemiautomaticRefused),
-            mode => mode.takes_orders(),
+            mode => mode.takes_orders() || self.faults.has(F::ManualTakesOrders),
         };
         if !takes_orders {
             return Err(Refusal::new(
@@ -219,6 +219,7 @@ impl Agv {
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
         self.book.update_id = order.update_id;
+        self.book.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
         self.linger_on_first_node();
     }

@@ -209,9 +209,12 @@ impl Actions {
         if faults.has(F::ListReversed) {
             triggered.reverse();
         }
+        if faults.has(F::HardFirst) {
+            triggered.sort_by_key(|action| action.request.blocking != Blocking::Hard);
+        }
         for action in triggered {
             let alone = action.request.blocking == Blocking::Hard && !faults.has(F::HardOverlaps);
-            if alone || faults.has(F::AllSequential) {
+            if alone {
                 phases.extend((!parallel.is_empty()).then(|| std::mem::take(&mut parallel)));
                 phases.push_back(vec![action.request.id.clone()]);
             } else {
@@ -263,7 +266,7 @@ impl Actions {
     /// Whether the actions forbid driving (BLOCK-03, BLOCK-04, BLOCK-07).
     pub(super) fn block_driving(&self, faults: Faults) -> bool {
         let stops = |action: &Action| match action.request.blocking {
-            Blocking::None => faults.has(F::NoneStops),
+            Blocking::None => false,
             Blocking::Soft => !faults.has(F::SoftDrives),
             Blocking::Hard => !faults.has(F::HardDrives),
         };
@@ -290,6 +293,16 @@ impl Actions {
                 Status::Waiting => action.end(Status::Failed),
                 status if status.is_active() => action.end(Status::Finished),
                 _ => {}
+            }
+        }
+    }
+
+    /// `none-aborted`: what does not keep the vehicle on its node is broken off when it leaves.
+    pub(super) fn leave_node(&mut self, sequence_id: u32) {
+        let of_node = |action: &&mut Action| action.origin == Origin::Node(sequence_id);
+        for action in self.all.iter_mut().filter(of_node) {
+            if action.request.blocking == Blocking::None && action.status.is_active() {
+                action.end(Status::Failed);
             }
         }
     }

@@ -58,6 +58,8 @@ pub(super) struct Book {
     pub(super) soon: Option<Moment>,
     /// It left the decision point by itself (`horizon-slipped-into` only).
     pub(super) slipped: bool,
+    /// The order names a zone set (`zone-set-invented` only).
+    pub(super) zoned: bool,
 }
 
 impl Book {
@@ -79,6 +81,7 @@ impl Book {
             continued: false,
             soon: None,
             slipped: false,
+            zoned: false,
         }
     }
 

@@ -1,6 +1,8 @@
 //! What people and tests do to the vehicle: buttons, switches, moving it by hand.
 
-use serde_json::Value;
+use std::time::Duration;
+
+use serde_json::{Value, json};
 
 use crate::reference::Output;
 
@@ -14,8 +16,9 @@ use super::{Agv, Mode};
 
 /// The commands of [`crate::reference::Input::Command`]; unknown ones are ignored.
 ///
-/// `place-on {nodeId}`, `move-to {nodeId}` or `{x, y, theta}`, `place-obstacle {edgeId}`, `remove-obstacle {edgeId}`, `set-mode {mode}`, `enable-map {mapId, mapVersion}`,
-/// `place-load {loadId, loadType}`, `trigger {actionId?}`; the others take nothing.
+/// `place-on {nodeId}`, `move-to {nodeId}` or `{x, y, theta}`, `place-obstacle {edgeId}`, `remove-obstacle {edgeId}`,
+/// `set-mode {mode}`, `enable-map {mapId, mapVersion}`, `place-load {loadId, loadType}`,
+/// `provoke-error {errorLevel}`, `trigger {actionId?}`; the others take nothing.
 pub const COMMANDS: &[&str] = &[
     "power-cycle",
     "shutdown",
@@ -27,6 +30,9 @@ pub const COMMANDS: &[&str] = &[
     "push-out",
     "place-obstacle",
     "remove-obstacle",
+    "drive-manually",
+    "provoke-error",
+    "clear-error",
     "emergency-stop",
     "release-emergency-stop",
     "press-pause",
@@ -43,6 +49,8 @@ pub const COMMANDS: &[&str] = &[
 
 /// More things than this do not stand about.
 const MAX_OBSTACLES: usize = 100;
+/// How long a faulty vehicle keeps its errors.
+const KEPT: Duration = Duration::from_secs(60);
 
 impl Agv {
     pub(super) fn command(&mut self, name: &str, arguments: &Value) {
@@ -63,6 +71,9 @@ impl Agv {
             "remove-obstacle" => {
                 self.obstacles.remove(text("edgeId"));
             }
+            "drive-manually" => self.drive_manually(),
+            "provoke-error" => self.provoke_error(text("errorLevel") == "FATAL"),
+            "clear-error" => self.clear_error(),
             "emergency-stop" => self.emergency_stop(),
             "release-emergency-stop" => {
                 self.errors.released();
@@ -139,7 +150,9 @@ impl Agv {
             _ => return,
         };
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
-        if by_hand && mode != self.mode && !self.faults.has(F::ManualKeepsOrder) && self.is_occupied() {
+        let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
+        let keeps = leaves || self.faults.has(F::ManualKeepsOrder);
+        if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             self.give_up_order();
         }
         self.mode = mode;
@@ -173,6 +186,10 @@ impl Agv {
         if self.mode.takes_orders() || self.faults.has(F::ManualPositionStale) {
             return;
         }
+        if let Some(node) = arguments.get("nodeId").and_then(Value::as_str) {
+            self.place_on(node);
+            return;
+        }
         let mut pose = self.motion.pose(self.moment());
         let number = |key: &str| arguments.get(key).and_then(Value::as_f64);
         pose.x = number("x").unwrap_or(pose.x);
@@ -182,6 +199,37 @@ impl Agv {
         self.report.requested = true;
     }
 
+    /// A short way ahead, by hand.
+    fn drive_manually(&mut self) {
+        let pose = self.motion.pose(self.moment());
+        let (x, y) = (pose.x + pose.theta.cos() / 2.0, pose.y + pose.theta.sin() / 2.0);
+        self.move_to(&json!({ "x": x, "y": y }));
+    }
+
+    /// A defect of the vehicle: with a FATAL one it does not run (ERR-03, ERR-04).
+    fn provoke_error(&mut self, fatal: bool) {
+        let name = if fatal { "scannerContaminated" } else { "maintenanceDue" };
+        let life = match () {
+            () if self.faults.has(F::OwnErrorForgotten) => Life::Until(self.moment() + super::cancel::MOMENT),
+            () if self.faults.has(F::OwnErrorKept) => Life::Until(self.moment() + KEPT),
+            () => Life::WhileDefective,
+        };
+        self.errors.raise(ActiveError {
+            error_type: name.to_owned(),
+            fatal: fatal && !self.faults.has(F::OwnErrorMild),
+            references: Vec::new(),
+            description: "a part of the vehicle is not in order".into(),
+            life,
+        });
+        let stops = fatal && !self.faults.has(F::FatalDrives);
+        self.set_holds(|holds| holds.defect |= stops);
+    }
+
+    fn clear_error(&mut self) {
+        self.errors.cleared();
+        self.set_holds(|holds| holds.defect = false);
+    }
+
     fn emergency_stop(&mut self) {
         self.set_holds(|holds| holds.emergency = true);
         self.errors.raise(ActiveError {
@@ -189,7 +237,11 @@ impl Agv {
             fatal: !self.faults.has(F::EmergencyStopWarning),
             references: Vec::new(),
             description: "the emergency stop is pressed".into(),
-            life: Life::WhileStopped,
+            life: if self.faults.has(F::OwnErrorKept) {
+                Life::Until(self.moment() + KEPT)
+            } else {
+                Life::WhileStopped
+            },
         });
     }
 

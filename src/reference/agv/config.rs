@@ -149,6 +149,8 @@ pub struct AgvConfig {
     pub nodes: Vec<LayoutNode>,
     /// The node it stands on when it is switched on for the first time.
     pub start_node: String,
+    /// The zone set it plans with, if it knows zones.
+    pub zone_set: Option<String>,
     /// Driving speed in metres per second. Acceleration is ignored.
     pub speed: f64,
     /// Turning speed in radians per second.
@@ -249,6 +251,7 @@ impl Default for AgvConfig {
             without_actions: BTreeSet::new(),
             nodes,
             start_node: "n1".into(),
+            zone_set: None,
             speed: 2.0,
             rotation_speed: std::f64::consts::PI,
             height: 1.0,

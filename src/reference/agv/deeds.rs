@@ -175,7 +175,9 @@ impl Agv {
             Area::Load => &names.load,
             Area::Charging => &names.charging,
         };
-        self.warn(name.clone(), problem.references.clone(), problem.reason.clone());
+        let mut references = problem.references.clone();
+        references.retain(|(key, _)| key != "actionId" || !self.faults.has(F::FailureUnreferenced));
+        self.warn(name.clone(), references, problem.reason.clone());
     }
 
     fn forget_if_faulty(&mut self, id: &str) {
@@ -320,6 +322,7 @@ impl Agv {
         let (Some(x), Some(y), Some(theta)) = (number("x"), number("y"), number("theta")) else {
             return invalid("the pose is not complete");
         };
+        let y = if self.faults.has(F::AxesMirrored) { -y } else { y };
         let unchecked = self.faults.has(F::InitPositionUnchecked);
         if !unchecked && (x.abs() > FARTHEST || y.abs() > FARTHEST || theta.abs() > PI + 0.01) {
             return invalid("the pose is on no map");

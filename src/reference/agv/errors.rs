@@ -20,6 +20,8 @@ pub(super) enum Life {
     WhileStopped,
     /// While the vehicle is outside its corridor.
     WhileOutside,
+    /// While the vehicle itself has a defect.
+    WhileDefective,
 }
 
 /// One active error.
@@ -53,8 +55,12 @@ impl Errors {
 
     /// A new order was accepted.
     pub(super) fn new_order(&mut self) {
-        self.active
-            .retain(|error| matches!(error.life, Life::WhileStopped | Life::WhileOutside));
+        self.active.retain(|error| {
+            matches!(
+                error.life,
+                Life::WhileStopped | Life::WhileOutside | Life::WhileDefective
+            )
+        });
     }
 
     /// The emergency stop was released.
@@ -65,6 +71,11 @@ impl Errors {
     /// The vehicle is where it belongs again.
     pub(super) fn back_inside(&mut self) {
         self.active.retain(|error| error.life != Life::WhileOutside);
+    }
+
+    /// The defect was put right.
+    pub(super) fn cleared(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileDefective);
     }
 
     /// Drops what has run out.

@@ -179,9 +179,11 @@ impl Agv {
             .iter()
             .filter(|(field, _)| self.config.uses(field))
             .map(|(_, name)| name);
+        let zones = self.config.zone_set.is_some().then_some(&"order.zoneSetId");
         let parameters: Vec<Value> = usual
             .iter()
             .chain(special)
+            .chain(zones)
             .map(|name| json!({ "parameter": name, "support": support }))
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
@@ -215,6 +217,7 @@ impl Agv {
             })
             .collect();
         let renamed = kind.deed == Deed::Pick && self.faults.has(F::PickParameterRenamed);
+        let unknown = self.faults.has(F::ParameterTypeUnknown);
         let mut picture = Map::new();
         let capital = matches!(kind.deed, Deed::StartPause | Deed::StopPause) && self.faults.has(F::VendorPauseListed);
         let name = if capital {
@@ -232,7 +235,7 @@ impl Agv {
                         "stationType" if renamed => "station_type",
                         key => key,
                     },
-                    "valueDataType": parameter.data_type,
+                    "valueDataType": if unknown { "DOUBLE" } else { parameter.data_type },
                     "isOptional": parameter.optional,
                 })
             });

@@ -97,6 +97,7 @@ faults! {
     FactsheetActionMissing "factsheet-action-missing" ["FACT-07"] "Offers cancelOrder but does not list it.";
     PolygonCrossed "polygon-crossed" ["FACT-08"] "Draws its contour as a polygon that crosses itself.";
     LoadSetTwice "load-set-twice" ["FACT-09"] "Uses one name for two load sets.";
+    ParameterTypeUnknown "parameter-type-unknown" ["BP-05", "FACT-07"] "Calls the type of its parameters DOUBLE.";
     VersionsNumeric "versions-numeric" ["FACT-10"] "Gives its software version as a number.";
     OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
     MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
@@ -123,7 +124,7 @@ faults! {
     RunningActionIgnored "running-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs.";
     HorizonNotBusy "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point.";
     FarOrderAccepted "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is.";
-    StartErrorMisnamed "start-error-misnamed" ["ORD-FLOW-04"] "Calls the first node out of reach an error of its own name.";
+    StartRefusalSilent "start-refusal-silent" ["ORD-REJ-17"] "Raises no error when the first node of an order is out of reach.";
     OldActionStatesKept "old-action-states-kept" ["ORD-FLOW-05", "STATE-MSG-11"] "Keeps the action states of the old order.";
     HorizonNotReported "horizon-not-reported" ["ORD-FLOW-06", "STATE-12"] "Leaves the horizon out of its node and edge states.";
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
@@ -210,7 +211,8 @@ faults! {
     PlannedPathWithoutEnds "planned-path-without-ends" ["ORD-MSG-30"] "Reports control points that are not those of its own curve.";
     KnotsTooFew "knots-too-few" ["ORD-MSG-29"] "Leaves the last knot out of the trajectory it reports.";
     TrajectoryWithoutPoints "trajectory-without-points" ["ORD-MSG-28"] "Reports the trajectory it planned without control points.";
-    ZoneSetInvented "zone-set-invented" ["STATE-MSG-03"] "Reports a zone set no order named.";
+    ZoneSetInvented "zone-set-invented" ["ORD-MSG-04", "STATE-MSG-03"] "Goes over to a zone set of its own when an order names one.";
+    ZoneSetUnchecked "zone-set-unchecked" ["STATE-MSG-03"] "Takes over orders with zone sets it does not have, and goes on with its own.";
 
     // Maps
     MapListedTwice "map-listed-twice" ["MAP-07"] "Lists the map it uses twice.";
@@ -297,7 +299,6 @@ faults! {
     InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09"] "Performs instant actions without an action state.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
-    UnknownInstantSilent "unknown-instant-silent" ["IACT-06"] "Raises no error for an instant action it does not know.";
     UnknownInstantFinished "unknown-instant-finished" ["IACT-06"] "Reports an instant action it does not know as FINISHED.";
     OnlyFirstInstantAction "only-first-instant-action" ["IACT-07", "IACT-03"] "Performs only the first action of an instantActions message.";
 
@@ -322,6 +323,7 @@ faults! {
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02"] "Empties the orderId when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
     LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
+    OrderIdForgottenOnRequest "order-id-forgotten-on-request" ["STATE-MSG-02"] "Answers a stateRequest without its orderId.";
     LastNodeUnknownOnRequest "last-node-unknown-on-request" ["STATE-MSG-04"] "Answers a stateRequest without its last node.";
     RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
     PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06"] "Reports its coordinates as strings.";
@@ -338,6 +340,7 @@ faults! {
     HorizonReportedReleased "horizon-reported-released" ["STATE-MSG-13"] "Reports the nodes and edges of the horizon as released.";
     DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
     StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05"] "Says DONE where FINISHED is meant.";
+    ChargeGoodBad "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent.";
     ChargeMissing "charge-missing" ["STATE-MSG-15"] "Leaves the charge out of its battery state.";
     EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
     EmergencyStopUnreported "emergency-stop-unreported" ["STATE-MSG-17"] "Does not report an emergency stop.";
@@ -360,26 +363,35 @@ faults! {
     PauseToWaiting "pause-to-waiting" ["ASTATE-05"] "Puts running actions back to WAITING in a pause.";
     FailsAfterFinished "fails-after-finished" ["ASTATE-06"] "Reports finished actions FAILED when their order is cancelled.";
     ListReversed "list-reversed" ["BLOCK-01"] "Performs the actions of a node from the last to the first.";
-    NoneStops "none-stops" ["BLOCK-02"] "Does not drive while an action of type NONE runs.";
+    NoneAborted "none-aborted" ["ACT-01", "BLOCK-02"] "Breaks off the actions of type NONE of a node when it drives on.";
     SoftDrives "soft-drives" ["BLOCK-03"] "Drives while a SOFT action runs.";
     HardDrives "hard-drives" ["BLOCK-04"] "Drives while a HARD action runs.";
     HardOverlaps "hard-overlaps" ["BLOCK-05"] "Performs HARD actions beside others.";
-    AllSequential "all-sequential" ["BLOCK-06"] "Performs one action after the other, whatever their type.";
-    StuckAfterBlocking "stuck-after-blocking" ["BLOCK-07"] "Does not drive on after a blocking action.";
+    HardFirst "hard-first" ["BLOCK-01", "BLOCK-06"] "Performs the HARD actions of a node before all others.";
+    StuckAfterBlocking "stuck-after-blocking" ["BLOCK-07", "ORD-06", "NODE-07"] "Does not drive on after a blocking action.";
 
     // Errors and modes
     ErrorsOmitted "errors-omitted" ["STATE-MSG-01", "ERR-01"] "Leaves the errors array out when there is no error.";
     ErrorLevelUnknown "error-level-unknown" ["ERR-02"] "Reports warnings with the level ERROR.";
-    WarningBlocks "warning-blocks" ["ERR-03"] "Does not drive while it reports a warning.";
+    WarningBlocks "warning-blocks" ["ERR-03", "ORD-06", "ORD-FLOW-12"] "Does not drive while it reports a warning.";
     EmergencyStopWarning "emergency-stop-warning" ["ERR-04"] "Reports the emergency stop as a WARNING.";
     ReferenceValueNumeric "reference-value-numeric" ["ERR-05"] "Gives numbers as reference values of errors.";
-    ReferencesAsMap "references-as-map" ["BP-04", "ERR-05"] "Gives the references of errors as one object.";
+    ErrorsOmittedOnRequest "errors-omitted-on-request" ["ORD-REJ-03", "ORD-REJ-08", "ERR-01"] "Answers a stateRequest without its errors.";
+    OwnErrorForgotten "own-error-forgotten" ["ERR-04", "ERR-01"] "Forgets an error of its own a moment later, although its cause is still there.";
+    OwnErrorKept "own-error-kept" ["ERR-01", "ERR-04"] "Keeps its errors for a minute, also when their cause is gone.";
+    FatalDrives "fatal-drives" ["ERR-04"] "Drives on with a FATAL error.";
+    OwnErrorMild "own-error-mild" ["ERR-04"] "Reports defects that keep it from running as a WARNING.";
+    ReferencesOfLastOrder "references-of-last-order" ["ORD-REJ-14", "BP-02"] "Names the order and update it has, and not those it refuses.";
+    ReferencesAsMap "references-as-map" ["BP-04", "ERR-05", "ORD-CANCEL-20"] "Gives the references of errors as one object.";
     InfoLevelWarning "info-level-warning" ["INFO-01"] "Reports an information with the level WARNING.";
     SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
+    ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
+    ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
     ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";
     SemiautomaticFaster "semiautomatic-faster" ["MODE-03"] "Drives faster in SEMIAUTOMATIC.";
     VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";
+    VisualizationMissing "visualization-missing" ["VIS-02", "TOPIC-12"] "States a visualization interval and publishes none.";
 }
 
 /// The fault of that name.

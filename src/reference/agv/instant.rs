@@ -92,8 +92,7 @@ impl Agv {
             Some(_) if self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
             Some(reason) => {
                 self.take_map_anyway(&action);
-                let silent = self.faults.has(F::UnknownInstantSilent);
-                self.fail(&id, &Problem::unable(&action, &reason).silent_if(silent));
+                self.fail(&id, &Problem::unable(&action, &reason));
             }
             None if self.faults.has(F::InstantActionDeferred) && action.request.action_type != "cancelOrder" => {}
             None => self.begin_instant(&id),

@@ -90,13 +90,15 @@ struct Holds {
     field: bool,
     /// It is outside its corridor.
     outside: bool,
+    /// A defect that keeps it from running.
+    defect: bool,
     /// Nothing at all (`pause-not-lifted` only).
     stuck: bool,
 }
 
 impl Holds {
     fn any(self) -> bool {
-        self.pause || self.button || self.emergency || self.field || self.outside || self.stuck
+        self.pause || self.button || self.emergency || self.field || self.outside || self.defect || self.stuck
     }
 }
 

@@ -198,6 +198,8 @@ pub(super) struct Order {
     pub(super) update_id: u32,
     pub(super) nodes: Vec<Node>,
     pub(super) edges: Vec<Edge>,
+    /// zoneSetId.
+    pub(super) zone_set: Option<String>,
     /// Paths of optional fields that not every vehicle has a use for (OPT-02).
     pub(super) unsupported: Vec<String>,
 }
@@ -211,9 +213,7 @@ impl Order {
         let fields = Fields::open(message, "")?;
         read_header(&fields)?;
         let mut unsupported = Vec::new();
-        if fields.optional("zoneSetId", Fields::text)?.is_some() {
-            unsupported.push("zoneSetId".to_owned());
-        }
+        let zone_set = fields.optional("zoneSetId", Fields::text)?.map(str::to_owned);
         let nodes = fields
             .objects("nodes")?
             .iter()
@@ -229,6 +229,7 @@ impl Order {
             update_id: fields.uint32("orderUpdateId")?,
             nodes,
             edges,
+            zone_set,
             unsupported,
         })
     }

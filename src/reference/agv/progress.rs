@@ -167,6 +167,9 @@ impl Agv {
     /// Enters an edge; its actions are triggered, at once if they do not stop the vehicle (NODE-06, NODE-07).
     fn enter(&mut self, edge: &Edge, stop: &Stop) {
         self.book.entered = true;
+        if self.faults.has(F::NoneAborted) {
+            self.actions.leave_node(self.book.last_sequence);
+        }
         if !self.actions.edge_stops(edge.sequence_id) && !self.faults.has(F::EdgeActionsLate) {
             self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
         }

@@ -64,7 +64,8 @@ impl Agv {
     pub(super) fn refuse(&mut self, message: &Value, refusal: Refusal) {
         self.refusal_side_effects(message, refusal.rule);
         self.locked |= refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorLocks);
-        if self.faults.has(F::RejectionSilent) {
+        let silent = refusal.rule == Rule::StartOutOfRange && self.faults.has(F::StartRefusalSilent);
+        if silent || self.faults.has(F::RejectionSilent) {
             return;
         }
         let names = &self.config.errors;
@@ -76,7 +77,6 @@ impl Agv {
             Rule::Memory => &names.memory,
             Rule::UnknownMap => &names.unknown_map,
             Rule::OtherOrderActive => &names.other_order_active,
-            Rule::StartOutOfRange if self.faults.has(F::StartErrorMisnamed) => "tooFarAway",
             Rule::StartOutOfRange => &names.start_out_of_range,
             Rule::Outdated if self.faults.has(F::OutdatedUpdateMisnamed) => &names.validation,
             Rule::Outdated | Rule::Duplicate => &names.outdated_update,
@@ -100,6 +100,15 @@ impl Agv {
             _ => Life::UntilNewOrder,
         };
         let mut references = message_references(message);
+        if self.faults.has(F::ReferencesOfLastOrder) {
+            for (key, value) in &mut references {
+                match key.as_str() {
+                    "orderId" => value.clone_from(&self.book.order_id),
+                    "orderUpdateId" => *value = self.book.update_id.to_string(),
+                    _ => {}
+                }
+            }
+        }
         references.extend(refusal.culprits);
         if self.faults.has(F::UpdateIdUnreferenced) {
             references.retain(|(key, _)| key != "orderUpdateId");

@@ -201,6 +201,12 @@ impl Agv {
         if !self.report.requested || self.report.last.is_none() {
             return;
         }
+        if self.faults.has(F::OrderIdForgottenOnRequest) {
+            body.insert("orderId".into(), json!(""));
+        }
+        if self.faults.has(F::ErrorsOmittedOnRequest) {
+            body.insert("errors".into(), json!([]));
+        }
         if self.faults.has(F::LastNodeUnknownOnRequest) {
             body.insert("lastNodeId".into(), json!(""));
         }
@@ -280,6 +286,9 @@ impl Agv {
     }
 
     fn publish_visualization(&mut self) {
+        if self.faults.has(F::VisualizationMissing) {
+            return;
+        }
         let mut body = Map::new();
         if !self.config.line_guided() {
             body.insert("agvPosition".into(), self.position_picture());

@@ -31,8 +31,9 @@ impl Agv {
         }
         set("orderId", json!(order_id));
         set("orderUpdateId", json!(self.book.update_id));
-        if has(F::ZoneSetInvented) {
-            set("zoneSetId", json!("factory"));
+        if let Some(zones) = &self.config.zone_set {
+            let invented = has(F::ZoneSetInvented) && self.book.zoned;
+            set("zoneSetId", json!(if invented { "factory" } else { zones }));
         }
         if self.config.line_guided() {
             set("distanceSinceLastNode", json!(self.distance_made()));
@@ -279,7 +280,11 @@ impl Agv {
     fn battery(&self) -> Value {
         let mut battery = Map::new();
         if !self.faults.has(F::ChargeMissing) {
-            battery.insert("batteryCharge".into(), json!(87.5));
+            let charge = match self.motion.is_moving() {
+                moving if self.faults.has(F::ChargeGoodBad) => json!(if moving { 0.0 } else { 100.0 }),
+                _ => json!(87.5),
+            };
+            battery.insert("batteryCharge".into(), charge);
         }
         battery.insert("batteryVoltage".into(), json!(48.2));
         battery.insert("batteryHealth".into(), json!(96));
@@ -301,7 +306,12 @@ impl Agv {
     }
 
     fn mode_literal(&self) -> String {
+        let next = self.faults.has(F::ModeOffByOne);
         let literal = match self.mode {
+            Mode::Semiautomatic if next => "MANUAL",
+            Mode::Manual if next => "SERVICE",
+            Mode::Service if next => "TEACHIN",
+            Mode::Teachin if next => "SEMIAUTOMATIC",
             Mode::Automatic => "AUTOMATIC",
             Mode::Semiautomatic => "SEMIAUTOMATIC",
             Mode::Manual => "MANUAL",

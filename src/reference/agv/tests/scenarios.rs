@@ -22,6 +22,10 @@ pub(super) fn all() -> Vec<Scenario> {
         max_nodes: 3,
         ..config()
     };
+    let zoned = AgvConfig {
+        zone_set: Some("zones".into()),
+        ..config()
+    };
     vec![
         (seen, day),
         (config(), updates),
@@ -41,6 +45,9 @@ pub(super) fn all() -> Vec<Scenario> {
         (config(), held_by_hand),
         (stations(), at_stations),
         (config(), modes),
+        (config(), out_of_command),
+        (config(), defects),
+        (zoned, zones),
         (config(), broken_link),
         (many_maps(), asked_afterwards),
     ]
@@ -351,6 +358,29 @@ fn modes(bench: &mut Bench) {
     bench.command("set-mode", json!({ "mode": "MANUAL" }));
     bench.command("move-to", json!({ "x": 1.0 }));
     bench.wait(5.0);
+}
+
+fn out_of_command(bench: &mut Bench) {
+    bench.command("set-mode", json!({ "mode": "TEACHIN" }));
+    bench.order(order("o1", 0, 0, "n1 n2"));
+    bench.command("set-mode", json!({ "mode": "AUTOMATIC" }));
+    bench.wait(5.0);
+}
+
+fn defects(bench: &mut Bench) {
+    bench.order(order("o1", 0, 0, "n1 n2"));
+    bench.wait(0.2);
+    bench.command("provoke-error", json!({ "errorLevel": "FATAL" }));
+    bench.wait(1.0);
+    bench.instant("stateRequest", "r", json!({}));
+    bench.command("clear-error", json!({}));
+    bench.wait(5.0);
+}
+
+fn zones(bench: &mut Bench) {
+    let with_zones = |id: &str, zones: &str| with(order(id, 0, 0, "n1"), "/zoneSetId", json!(zones));
+    bench.order(with_zones("o1", "zones"));
+    bench.order(with_zones("o2", "other zones"));
 }
 
 fn asked_afterwards(bench: &mut Bench) {
