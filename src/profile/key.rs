@@ -117,6 +117,9 @@ pub const STATEMENTS: &[Statement] = &[
     },
 ];
 
+/// What the harness finds out by itself at the beginning of a run; tests ask for it as for a statement.
+pub const FOUND: &[&str] = &["active-map"];
+
 /// Where a sample action can be performed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {

@@ -27,7 +27,8 @@ pub use claim::Claim;
 pub use effective::Effective;
 pub use hooks::{HOOKS, Hook, HookAction, HookInfo, RESTART_DEVICE, fill, find as find_hook, placeholders};
 pub use key::{
-    COMMON_PLACEHOLDERS, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind, Statement,
+    COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
+    Statement,
 };
 pub use layer::{Surroundings, check, load};
 pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};

@@ -23,7 +23,7 @@ use crate::course::is_station;
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
 use crate::pack::{RequirementId, Role, VersionRange};
 use crate::pattern::Pattern;
-use crate::profile::{SAMPLE_ACTIONS, STATEMENTS};
+use crate::profile::{FOUND, SAMPLE_ACTIONS, STATEMENTS};
 
 /// Where the header keys of a file are written.
 pub(super) struct HeaderPlaces {
@@ -218,7 +218,12 @@ impl Linter<'_> {
                 self.exists_somewhere("factsheet", &names, path, at);
             }
             Need::Profile(name) => {
-                let samples = || SAMPLE_ACTIONS.iter().map(|sample| sample.name);
+                let samples = || {
+                    SAMPLE_ACTIONS
+                        .iter()
+                        .map(|sample| sample.name)
+                        .chain(FOUND.iter().copied())
+                };
                 let known = || STATEMENTS.iter().map(|statement| statement.name).chain(samples());
                 if !known().any(|other| other == name) {
                     self.problems
