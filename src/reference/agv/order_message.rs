@@ -200,6 +200,8 @@ pub(super) struct Order {
     pub(super) edges: Vec<Edge>,
     /// Paths of optional fields that not every vehicle has a use for (OPT-02).
     pub(super) unsupported: Vec<String>,
+    /// What is wrong with these fields, for a vehicle that has a use for them.
+    pub(super) defects: Vec<Defect>,
 }
 
 /// Optional fields of an edge that not every vehicle can use.
@@ -211,6 +213,7 @@ impl Order {
         let fields = Fields::open(message, "")?;
         read_header(&fields)?;
         let mut unsupported = Vec::new();
+        let mut defects = Vec::new();
         if fields.optional("zoneSetId", Fields::text)?.is_some() {
             unsupported.push("zoneSetId".to_owned());
         }
@@ -222,7 +225,7 @@ impl Order {
         let edges = fields
             .objects("edges")?
             .iter()
-            .map(|edge| read_edge(edge, &mut unsupported))
+            .map(|edge| read_edge(edge, &mut unsupported, &mut defects))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             id: fields.id("orderId")?,
@@ -230,6 +233,7 @@ impl Order {
             nodes,
             edges,
             unsupported,
+            defects,
         })
     }
 
@@ -307,7 +311,7 @@ fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
     })
 }
 
-fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge, Defect> {
+fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>, defects: &mut Vec<Defect>) -> Result<Edge, Defect> {
     fields.optional("edgeDescription", Fields::prose)?;
     fields.optional("length", Fields::number)?;
     for key in SPECIAL_EDGE_FIELDS {
@@ -334,15 +338,20 @@ fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge,
         orientation: fields.optional("orientation", Fields::number)?,
         global,
         rotation_allowed: fields.optional("rotationAllowed", Fields::boolean)?,
-        trajectory: part(fields, "trajectory", Trajectory::read)?,
-        corridor: part(fields, "corridor", Corridor::read)?,
+        trajectory: part(fields, "trajectory", Trajectory::read, defects),
+        corridor: part(fields, "corridor", Corridor::read, defects),
         direction: fields.optional("direction", Fields::text)?.map(str::to_owned),
         actions: read_actions(fields)?,
     })
 }
 
 /// An optional object of an edge.
-fn part<T>(fields: &Fields<'_>, key: &str, read: fn(&Value, &str) -> Result<T, Defect>) -> Result<Option<T>, Defect> {
-    let value = fields.raw(key).filter(|value| !value.is_null());
-    value.map(|value| read(value, &fields.at(key))).transpose()
+fn part<T>(
+    fields: &Fields<'_>,
+    key: &str,
+    read: fn(&Value, &str) -> Result<T, Defect>,
+    defects: &mut Vec<Defect>,
+) -> Option<T> {
+    let value = fields.raw(key)?;
+    read(value, &fields.at(key)).map_err(|defect| defects.push(defect)).ok()
 }
