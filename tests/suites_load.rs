@@ -11,6 +11,10 @@ use vda5050_tck::suite::{CheckInfo, HookFacts, Suites};
 
 /// The hooks these suites use, with their parameters.
 const HOOKS: &[(&str, &[&str])] = &[
+    ("move-to", &["nodeId"]),
+    ("place-obstacle", &["edgeId"]),
+    ("push-out", &[]),
+    ("remove-obstacle", &["edgeId"]),
     ("power-cycle", &[]),
     ("shutdown", &[]),
     ("start", &[]),

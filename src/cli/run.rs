@@ -209,6 +209,7 @@ impl Job {
 
     async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
         let mut device = ReferenceAgv::of(arguments.vehicle, &self.pack);
+        device.hurry();
         tolerate(&mut device, &arguments.tolerance)?;
         let mut options = BenchOptions::loopback(device.subject.published(&self.pack));
         let bench = &self.effective.profile.bench;

@@ -358,10 +358,8 @@ impl RunJudge {
         if let Decided::NotTestable { reason } = decided {
             return format!("not testable: {reason}");
         }
-        let deciding = |test: &&Arc<Test>| {
-            test.device == self.role && test.requirements().iter().any(|other| other.as_str() == id)
-        };
-        let with_test: Vec<&Arc<Test>> = self.rules.suites.tests.iter().filter(deciding).collect();
+        let deciding = self.rules.suites.deciding(id).iter();
+        let with_test: Vec<&Arc<Test>> = deciding.filter(|test| test.device == self.role).collect();
         if with_test.is_empty() {
             let monitored = self
                 .monitors

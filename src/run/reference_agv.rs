@@ -281,6 +281,23 @@ impl ReferenceAgv {
         self.actions.bindings()
     }
 
+    /// The same vehicle in a hurry, for runs over real sockets, where every metre costs time: as fast as tests that
+    /// have to catch it between two nodes allow.
+    pub fn hurry(&mut self) {
+        const TIMES: f64 = 2.5;
+        self.config.speed *= TIMES;
+        self.config.rotation_speed *= TIMES;
+        self.config.action_duration = self.config.action_duration.div_f64(TIMES);
+        self.config.state_interval = Duration::from_secs(2);
+        for name in ["long-action", "uninterruptible-action"] {
+            if let Some(action) = self.actions.0.get_mut(name) {
+                action.parameters.insert("duration".to_owned(), json!(0.3));
+            }
+        }
+        self.time.quiet = Duration::from_millis(100);
+        self.time.settle = Duration::from_millis(150);
+    }
+
     /// Lets it take a liberty, and gives it the time it then needs.
     ///
     /// # Errors

@@ -19,7 +19,8 @@ mod terms;
 mod tests;
 mod visit;
 
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
 
 pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
 
@@ -55,9 +56,25 @@ pub struct Suites {
     pub tests: Vec<Arc<Test>>,
     /// The monitors.
     pub monitors: Vec<Arc<Monitor>>,
+    /// The tests by requirement, once somebody has asked for them.
+    deciding: OnceLock<HashMap<String, Vec<Arc<Test>>>>,
 }
 
 impl Suites {
+    /// The tests with a clause that decides a requirement, by id.
+    pub fn deciding(&self, requirement: &str) -> &[Arc<Test>] {
+        let all = self.deciding.get_or_init(|| {
+            let mut all: HashMap<String, Vec<Arc<Test>>> = HashMap::new();
+            for test in &self.tests {
+                for id in test.requirements() {
+                    all.entry(id.to_string()).or_default().push(Arc::clone(test));
+                }
+            }
+            all
+        });
+        all.get(requirement).map_or(&[], Vec::as_slice)
+    }
+
     /// Loads every suite of `assets`. `checks` are the named checks there are, `hooks` the hooks a profile can have.
     ///
     /// # Errors

@@ -57,4 +57,6 @@ fn softly(seq: u64, message: String) -> CheckFinding {
 }
 
 #[cfg(test)]
+mod curved;
+#[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::checks::trace::{Trace, merged};
 
 /// A drive from n1 (0, 0) over n2 (4, 0) to n3 (4, 4) as it is seen.
-struct Drive {
+pub(super) struct Drive {
     trace: Trace,
     order: Value,
     /// What the next states have otherwise.
@@ -14,7 +14,7 @@ struct Drive {
 
 impl Drive {
     /// Orders it, with the nodes and edges changed as given.
-    fn ordered(nodes: [Value; 3], edges: [Value; 2]) -> Self {
+    pub fn ordered(nodes: [Value; 3], edges: [Value; 2]) -> Self {
         let places = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0)];
         let nodes: Vec<Value> = (1..)
             .zip(places)
@@ -47,12 +47,12 @@ impl Drive {
         }
     }
 
-    fn with_edge(edge: &Value) -> Self {
+    pub fn with_edge(edge: &Value) -> Self {
         Self::ordered([json!({}), json!({}), json!({})], [edge.clone(), json!({})])
     }
 
     /// After `seconds` a state comes: last node `n`, pose, and velocity (vx, omega) if it is reported.
-    fn seen(
+    pub fn seen(
         &mut self,
         seconds: f64,
         last: usize,
@@ -83,16 +83,16 @@ impl Drive {
         (outcome.summary(), outcome.judged)
     }
 
-    fn right(&self, check: &str) {
+    pub fn right(&self, check: &str) {
         let (summary, judged) = self.judged(check);
         assert!(summary.is_empty() && judged > 0, "{summary:?}, {judged} judged");
     }
 
-    fn wrong(&self, check: &str, summary: &[&str]) {
+    pub fn wrong(&self, check: &str, summary: &[&str]) {
         assert_eq!(self.judged(check).0, summary);
     }
 
-    fn not_judged(&self, check: &str) {
+    pub fn not_judged(&self, check: &str) {
         assert_eq!(self.judged(check), (Vec::new(), 0));
     }
 }

@@ -50,6 +50,9 @@ impl Agv {
                 path,
             ));
         }
+        if let Some(defect) = order.defects.first().filter(|_| self.config.trajectories) {
+            return Err(defect.clone().into());
+        }
         for node in &order.nodes {
             let Some(place) = self.place(node) else {
                 let path = format!("{}.nodePosition", node.path);

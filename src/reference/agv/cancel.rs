@@ -108,6 +108,9 @@ impl Agv {
         self.book.cancelled = true;
         if !self.faults.has(F::CancelLeavesNodes) {
             self.book.drop_route();
+        } else if cancel.to_node {
+            // All that was left was this node.
+            self.book.nodes.extend(self.book.left.0.clone());
         }
         if self.faults.has(F::CancelClearsOrderId) {
             self.book.order_id.clear();

@@ -202,6 +202,8 @@ pub(super) struct Order {
     pub(super) zone_set: Option<String>,
     /// Paths of optional fields that not every vehicle has a use for (OPT-02).
     pub(super) unsupported: Vec<String>,
+    /// What is wrong with these fields, for a vehicle that has a use for them.
+    pub(super) defects: Vec<Defect>,
 }
 
 /// Optional fields of an edge that not every vehicle can use.
@@ -213,6 +215,7 @@ impl Order {
         let fields = Fields::open(message, "")?;
         read_header(&fields)?;
         let mut unsupported = Vec::new();
+        let mut defects = Vec::new();
         let zone_set = fields.optional("zoneSetId", Fields::text)?.map(str::to_owned);
         let nodes = fields
             .objects("nodes")?
@@ -222,7 +225,7 @@ impl Order {
         let edges = fields
             .objects("edges")?
             .iter()
-            .map(|edge| read_edge(edge, &mut unsupported))
+            .map(|edge| read_edge(edge, &mut unsupported, &mut defects))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             id: fields.id("orderId")?,
@@ -231,6 +234,7 @@ impl Order {
             edges,
             zone_set,
             unsupported,
+            defects,
         })
     }
 
@@ -308,7 +312,7 @@ fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
     })
 }
 
-fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge, Defect> {
+fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>, defects: &mut Vec<Defect>) -> Result<Edge, Defect> {
     fields.optional("edgeDescription", Fields::prose)?;
     fields.optional("length", Fields::number)?;
     for key in SPECIAL_EDGE_FIELDS {
@@ -335,15 +339,20 @@ fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>) -> Result<Edge,
         orientation: fields.optional("orientation", Fields::number)?,
         global,
         rotation_allowed: fields.optional("rotationAllowed", Fields::boolean)?,
-        trajectory: part(fields, "trajectory", Trajectory::read)?,
-        corridor: part(fields, "corridor", Corridor::read)?,
+        trajectory: part(fields, "trajectory", Trajectory::read, defects),
+        corridor: part(fields, "corridor", Corridor::read, defects),
         direction: fields.optional("direction", Fields::text)?.map(str::to_owned),
         actions: read_actions(fields)?,
     })
 }
 
 /// An optional object of an edge.
-fn part<T>(fields: &Fields<'_>, key: &str, read: fn(&Value, &str) -> Result<T, Defect>) -> Result<Option<T>, Defect> {
-    let value = fields.raw(key).filter(|value| !value.is_null());
-    value.map(|value| read(value, &fields.at(key))).transpose()
+fn part<T>(
+    fields: &Fields<'_>,
+    key: &str,
+    read: fn(&Value, &str) -> Result<T, Defect>,
+    defects: &mut Vec<Defect>,
+) -> Option<T> {
+    let value = fields.raw(key)?;
+    read(value, &fields.at(key)).map_err(|defect| defects.push(defect)).ok()
 }

@@ -235,7 +235,10 @@ impl Agv {
         let mut points = vec![from, to];
         let entered = self.book.entered && self.book.edge_ahead() == Some(edge);
         if entered && self.faults.has(F::PlannedPathChanges) {
-            points.insert(1, ((from.0 + to.0) / 2.0 + 1.0, (from.1 + to.1) / 2.0 + 1.0));
+            points.insert(
+                1,
+                (f64::midpoint(from.0, to.0) + 1.0, f64::midpoint(from.1, to.1) + 1.0),
+            );
         }
         if self.faults.has(F::PlannedPathWithoutEnds) {
             let part = |share: f64| (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share);

@@ -2,6 +2,7 @@
 
 mod actions;
 mod cancelling;
+mod curves;
 mod driving;
 mod faulty;
 mod hostile;

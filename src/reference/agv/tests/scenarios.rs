@@ -1,6 +1,7 @@
 //! Short scripts that between them make every fault show.
 
 use super::*;
+use crate::reference::agv::tests::curves;
 
 type Scenario = (AgvConfig, fn(&mut Bench));
 
@@ -40,6 +41,8 @@ pub(super) fn all() -> Vec<Scenario> {
         (many_maps(), orders_on_maps),
         (many_maps(), maps_on_board),
         (config(), ways),
+        (curves::free(), curves::curved_ways),
+        (curves::line_guided(), curves::branches),
         (config(), node_actions),
         (config(), instant_actions),
         (config(), held_by_hand),
