@@ -10,7 +10,7 @@ use bytes::Bytes;
 pub use server::MapServer;
 
 /// How long a `slow` transfer takes.
-pub const SLOW_TRANSFER: Duration = Duration::from_secs(2);
+pub const SLOW_TRANSFER: Duration = Duration::from_secs(1);
 /// How long a device of ours waits for a server that says nothing.
 pub const FETCH_TIMEOUT: Duration = Duration::from_secs(10);
 

@@ -288,12 +288,17 @@ impl ReferenceAgv {
         self.config.speed *= TIMES;
         self.config.rotation_speed *= TIMES;
         self.config.action_duration = self.config.action_duration.div_f64(TIMES);
-        self.config.state_interval = Duration::from_secs(2);
-        for name in ["long-action", "uninterruptible-action"] {
+        self.config.state_interval = Duration::from_secs(1);
+        for (name, seconds) in [
+            ("long-action", 0.3),
+            ("uninterruptible-action", 0.3),
+            ("brief-action", 0.02),
+        ] {
             if let Some(action) = self.actions.0.get_mut(name) {
-                action.parameters.insert("duration".to_owned(), json!(0.3));
+                action.parameters.insert("duration".to_owned(), json!(seconds));
             }
         }
+        self.time.drive = Duration::from_millis(2_500);
         self.time.quiet = Duration::from_millis(100);
         self.time.settle = Duration::from_millis(150);
     }
