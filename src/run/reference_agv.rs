@@ -30,9 +30,9 @@ pub struct ReferenceAgv {
 
 /// Nodes of the built-in floor: a shelf with a load, a shelf that is taken, a lift, a charger.
 const SHELF: &str = "E1";
-const TAKEN_SHELF: &str = "E4";
+const TAKEN_SHELF: &str = "E2";
 const LIFT: &str = "E3";
-const CHARGER: &str = "E2";
+const CHARGER: &str = "E4";
 /// Where the vehicle comes out of the lift on the other floor.
 const UPPER_LIFT: &str = "U3";
 
@@ -54,7 +54,7 @@ fn sample_actions(layout: &Layout) -> SampleActions {
         ("drop", "drop", SHELF, load.clone()),
         ("edge-pick", "pick", &edge, load.clone()),
         ("edge-drop", "drop", &edge, load.clone()),
-        ("failing-pick", "pick", CHARGER, load.clone()),
+        ("failing-pick", "pick", LIFT, load.clone()),
         ("failing-drop", "drop", TAKEN_SHELF, load),
         ("detect-object", "detectObject", SHELF, object.clone()),
         ("edge-detect-object", "detectObject", &edge, object.clone()),
