@@ -554,7 +554,7 @@ impl Operator for Commands {
         if !ReferenceAgv::HOOKS.contains(&hook) {
             return HookOutcome::Missing;
         }
-        if self.0.command(hook, serde_json::Value::Object(parameters)) {
+        if self.0.command(hook, serde_json::Value::Object(parameters)).await {
             HookOutcome::Done("done by the built-in device".to_owned())
         } else {
             HookOutcome::Failed("the built-in device is not running any more".to_owned())

@@ -66,7 +66,7 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         );
         let _ = tokio::signal::ctrl_c().await;
         for device in running {
-            device.command("shutdown", serde_json::Value::Null);
+            device.command("shutdown", serde_json::Value::Null).await;
             device.stop().await;
         }
         Ok(Exit::Conforms)

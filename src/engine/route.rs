@@ -215,3 +215,73 @@ fn members(value: &Value, names: &[&str]) -> Map<String, Value> {
         .filter_map(|name| Some(((*name).to_owned(), value.get(name)?.clone())))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::{Source, Span};
+
+    /// n1, n2 and n3 in a row; the places are on n3, and on the edge from n2 to it.
+    fn course() -> Value {
+        let node = |id: &str| json!({ "id": id, "mapId": "m", "x": 0.0, "y": 0.0 });
+        let edge = |id: &str| json!({ "id": id });
+        json!({
+            "nodes": { "a": node("n1"), "a>pick.1": node("n2"), "pick": node("n3"), "drop": node("n3"), "edgePick": node("n3"),
+                       "a>edgePick.1": node("n2") },
+            "edges": { "a-a>pick.1": edge("e1"), "a>pick.1-pick": edge("e2"),
+                       "a-a>edgePick.1": edge("e1"), "a>edgePick.1-edgePick": edge("e2") },
+            "ways": { "a-pick": ["a>pick.1", "pick"], "pick-drop": [], "a-edgePick": ["a>edgePick.1", "edgePick"] },
+        })
+    }
+
+    fn built(base: &[&str], horizon: &[&str], place: &str) -> (Value, Value) {
+        let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        let route = Route {
+            base: own(base),
+            horizon: own(horizon),
+            from: None,
+            actions: Vec::new(),
+            span: Span::new(&Source::new("test", ""), 0, 0),
+        };
+        let builder = RouteBuilder {
+            course: Some(&course()),
+            route: &route,
+            actions: vec![(RoutePlace::Node(place.to_owned()), vec![json!("work")])],
+        };
+        builder.build("o", &mut SentOrders::default()).expect("a way")
+    }
+
+    fn of(list: &Value, member: &str) -> Vec<Value> {
+        list.as_array()
+            .expect("a list")
+            .iter()
+            .map(|one| one[member].clone())
+            .collect()
+    }
+
+    #[test]
+    fn a_way_to_a_station_has_all_its_nodes_and_the_action_at_its_end() {
+        let (nodes, edges) = built(&["a", "pick"], &[], "pick");
+        assert_eq!(of(&nodes, "nodeId"), ["n1", "n2", "n3"]);
+        assert_eq!(of(&nodes, "sequenceId"), [0, 2, 4]);
+        assert_eq!(of(&edges, "edgeId"), ["e1", "e2"]);
+        assert_eq!(of(&nodes, "actions"), [json!([]), json!([]), json!(["work"])]);
+        let (nodes, _) = built(&["a"], &["pick"], "pick");
+        assert_eq!(of(&nodes, "released"), [true, false, false]);
+    }
+
+    #[test]
+    fn the_action_of_a_station_on_an_edge_stands_there() {
+        let (nodes, edges) = built(&["a", "edgePick"], &[], "edgePick");
+        assert_eq!(of(&edges, "actions"), [json!([]), json!(["work"])]);
+        assert_eq!(of(&nodes, "actions"), [json!([]), json!([]), json!([])]);
+    }
+
+    #[test]
+    fn a_vehicle_that_is_there_already_gets_one_node_with_the_action() {
+        let (nodes, edges) = built(&["pick", "drop"], &[], "drop");
+        assert_eq!(of(&nodes, "nodeId"), ["n3"]);
+        assert_eq!(of(&nodes, "actions"), [json!(["work"])]);
+        assert_eq!(edges, json!([]));
+    }
+}

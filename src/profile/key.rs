@@ -104,7 +104,7 @@ pub const STATEMENTS: &[Statement] = &[
     },
     Statement {
         name: "small-map-storage",
-        doc: "At most two more maps fit into the vehicle.",
+        doc: "At most six more maps fit into the vehicle.",
     },
     Statement {
         name: "charges",

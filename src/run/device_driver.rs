@@ -10,7 +10,7 @@ use bytes::Bytes;
 use serde_json::Value;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep_until};
 
@@ -30,8 +30,14 @@ const LARGEST_FILE: u64 = 256 << 20;
 /// How long a file may take once its first byte is here.
 const TRANSFER_LIMIT: Duration = Duration::from_secs(120);
 
-/// A command for a running device: name and parameter.
-pub type Command = (String, Value);
+/// A command for a running device.
+#[derive(Debug)]
+pub struct Command {
+    name: String,
+    parameter: Value,
+    /// Told when the device has it, so that what is sent next comes after it.
+    done: oneshot::Sender<()>,
+}
 
 /// A device that runs in a task of its own.
 pub struct RunningDevice {
@@ -53,9 +59,15 @@ impl RunningDevice {
         Self { commands, running }
     }
 
-    /// Does something to the device. `false` when it is not running any more.
-    pub fn command(&self, name: &str, value: Value) -> bool {
-        self.commands.send((name.to_owned(), value)).is_ok()
+    /// Does something to the device, and waits until that is done. `false` when it is not running any more.
+    pub async fn command(&self, name: &str, parameter: Value) -> bool {
+        let (done, heard) = oneshot::channel();
+        let command = Command {
+            name: name.to_owned(),
+            parameter,
+            done,
+        };
+        self.commands.send(command).is_ok() && heard.await.is_ok()
     }
 
     /// Ends the device with DISCONNECT.
@@ -128,7 +140,11 @@ impl<D: Device> Driver<D> {
                 event = next_event(&mut self.connection) => self.happened(event).await,
                 Some((token, progress)) = progress.recv() => self.give(Input::Download { token, progress }).await,
                 command = commands.recv() => match command {
-                    Some((name, value)) => self.give(Input::Command(name, value)).await,
+                    Some(command) => {
+                        self.give(Input::Command(command.name, command.parameter)).await;
+                        // Whoever asked may have stopped waiting.
+                        let _ = command.done.send(());
+                    }
                     None => break,
                 },
                 () = sleep_until(alarm), if wake_up.is_some() => {}

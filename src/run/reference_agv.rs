@@ -28,10 +28,10 @@ pub struct ReferenceAgv {
 }
 
 /// Nodes of the built-in floor: a shelf with a load, a shelf that is taken, a lift, a charger.
-const SHELF: &str = "E2";
-const TAKEN_SHELF: &str = "E4";
+const SHELF: &str = "E1";
+const TAKEN_SHELF: &str = "E2";
 const LIFT: &str = "E3";
-const CHARGER: &str = "E1";
+const CHARGER: &str = "E4";
 /// Where the vehicle comes out of the lift on the other floor.
 const UPPER_LIFT: &str = "U3";
 
@@ -44,7 +44,7 @@ fn sample_actions(layout: &Layout) -> SampleActions {
         "x": lift.map(|node| node.x), "y": lift.map(|node| node.y), "theta": 0.0,
         "mapId": lift.map(|node| node.map_id.as_str()), "lastNodeId": UPPER_LIFT,
     });
-    let edge = format!("D2-{SHELF}");
+    let edge = format!("D1-{SHELF}");
     let all = [
         ("long-action", "beep", "", json!({ "duration": 0.5 })),
         ("brief-action", "beep", "", json!({ "duration": 0.05 })),
@@ -54,7 +54,7 @@ fn sample_actions(layout: &Layout) -> SampleActions {
         ("drop", "drop", SHELF, load.clone()),
         ("edge-pick", "pick", &edge, load.clone()),
         ("edge-drop", "drop", &edge, load.clone()),
-        ("failing-pick", "pick", CHARGER, load.clone()),
+        ("failing-pick", "pick", LIFT, load.clone()),
         ("failing-drop", "drop", TAKEN_SHELF, load),
         ("detect-object", "detectObject", SHELF, object.clone()),
         ("edge-detect-object", "detectObject", &edge, object.clone()),
@@ -148,8 +148,8 @@ impl ReferenceAgv {
             nodes,
             chargers: BTreeSet::from([CHARGER.to_owned()]),
             stations: [SHELF, TAKEN_SHELF].map(|node| (node.to_owned(), true)).into(),
-            // Two more fit, which tests rely on.
-            map_capacity: 4,
+            // Six more fit, which tests rely on.
+            map_capacity: 8,
             start_node: first,
             zone_set: Some("hall-zones".to_owned()),
             maps: [BUILT_IN_MAP, BUILT_IN_UPPER_MAP]

@@ -102,17 +102,17 @@ async fn a_reference_device_runs_over_tcp() {
             behaviour,
         };
         let url = rig.link.serve(offer).await.unwrap();
-        assert!(device.command("fetch", url.into()));
+        assert!(device.command("fetch", url.into()).await);
         rig.until(
             wanted,
             |o| matches!(&o.event, Event::Message { payload, .. } if payload.bytes().starts_with(wanted.as_bytes())),
         )
         .await;
     }
-    device.command("raw", serde_json::Value::Null);
+    assert!(device.command("raw", serde_json::Value::Null).await);
     rig.until("raw bytes", |o| matches!(o.event, Event::Undecodable { .. }))
         .await;
-    device.command("drop", serde_json::Value::Null);
+    assert!(device.command("drop", serde_json::Value::Null).await);
     rig.until("will", |o| is_message(o, "broken")).await;
     rig.until("online again", |o| is_message(o, "online")).await;
     rig.fault(LinkFault::Cut { reset: true }).await;
