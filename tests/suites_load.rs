@@ -76,11 +76,13 @@ fn every_suite_loads_without_a_complaint() {
 }
 
 #[test]
-fn every_named_check_has_a_monitor() {
+fn every_named_check_has_a_monitor_or_a_test() {
     let (suites, _) = load();
     for check in checks::registry() {
+        let line = format!("check: {}\n", check.name);
         assert!(
-            suites.monitors.iter().any(|monitor| monitor.id == check.name),
+            suites.monitors.iter().any(|monitor| monitor.id == check.name)
+                || suites.tests.iter().any(|test| test.source.text.contains(&line)),
             "{} is never run",
             check.name
         );

@@ -13,8 +13,9 @@ pub(super) const READY: Check = Check {
     name: "errors/ready-under-warning",
     decides: &["ERR-03"],
     doc: "A vehicle that reports warnings and no worse error, and that nothing else holds, sets out when it is given \
-          an order. One that stands until the end of the window is remarked on, by the ruling of the catalogue.",
-    arguments: &[],
+          an order. One that stands until the end of the window is remarked on, by the ruling of the catalogue: if it \
+          has taken the order over, and the order named `order` also if it has not.",
+    arguments: &["order"],
     start: |_| Box::new(Ready::default()),
 };
 
@@ -23,7 +24,7 @@ struct Ready {
     traffic: Traffic,
     /// orderId of the last order sent.
     order: Option<String>,
-    /// The last state in which it could have set out and had not.
+    /// The last state, if the vehicle could have set out and had not.
     waits: Option<u64>,
     started_at: Option<(String, u64)>,
     set_out: bool,
@@ -60,10 +61,12 @@ impl Running for Ready {
         }
         self.set_out |= moved || state.get("driving").and_then(Value::as_bool) == Some(true);
         let warns = only_warns(state);
-        if warns && !self.set_out {
-            self.waits = Some(entry.seq());
-        }
-        warns
+        let order = self.order.as_deref();
+        let ahead = elements(state, "nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
+        let asked = context.with.get("order").and_then(Value::as_str) == order;
+        let taken = Some(text(state, "orderId")) == order && ahead;
+        self.waits = (warns && !self.set_out && (asked || taken)).then_some(entry.seq());
+        warns && self.set_out
     }
 
     fn finish(&mut self, _end: Moment, _context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
@@ -82,6 +85,7 @@ mod tests {
 
     fn judge(level: &str, last: &Value) -> Vec<String> {
         let mut trace = Trace::subscriber();
+        trace.with.insert("order".into(), json!("o"));
         let errors = json!({ "errors": [{ "errorType": "x", "errorLevel": level }] });
         trace.state(&errors).sent("order", &json!({ "orderId": "o" }));
         trace.state(&errors).state(&merged(errors.clone(), last));
@@ -97,6 +101,17 @@ mod tests {
     #[test]
     fn a_vehicle_that_stands_under_a_warning_is_remarked_on() {
         assert_eq!(judge("WARNING", &json!({})), ["ERR-03 warning"]);
+    }
+
+    #[test]
+    fn an_order_it_refused_is_not_waited_for_unless_asked_to() {
+        let mut trace = Trace::subscriber();
+        let warning = json!({ "errors": [{ "errorType": "x", "errorLevel": "WARNING" }] });
+        trace.sent("order", &json!({ "orderId": "o" })).state(&warning);
+        assert!(trace.judge("errors/ready-under-warning").findings.is_empty());
+        let node = json!({ "nodeId": "n2", "sequenceId": 2, "released": true });
+        trace.state(&merged(warning, &json!({ "orderId": "o", "nodeStates": [node] })));
+        assert_eq!(trace.judge("errors/ready-under-warning").summary(), ["ERR-03 warning"]);
     }
 
     #[test]

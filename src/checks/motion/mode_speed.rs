@@ -15,8 +15,9 @@ pub(in crate::checks) const MODE_SPEED: Check = Check {
     decides: &["MODE-03"],
     doc: "On an edge that was driven in both modes, the vehicle reports no higher velocity in SEMIAUTOMATIC than in \
           AUTOMATIC, with a margin of a tenth, if it was also over the edge in less time: states are samples, and \
-          either alone can be chance. Without reported velocities a shorter time is a warning.",
-    arguments: &[],
+          either alone can be chance. Without reported velocities, and unless `alike` says that the drives differ in \
+          nothing else, it is a warning. Edges are compared under the same maxSpeed.",
+    arguments: &["alike"],
     start: |_| Box::new(ModeSpeed::default()),
 };
 
@@ -43,8 +44,8 @@ impl Drive {
     }
 }
 
-/// Names of the nodes an edge leads from and to.
-type Ends = (String, String);
+/// Names of the nodes an edge leads from and to, and the speed it permits, in mm/s.
+type Ends = (String, String, Option<i64>);
 
 #[derive(Default)]
 struct ModeSpeed {
@@ -57,12 +58,14 @@ struct ModeSpeed {
 
 fn ends(view: &View) -> Option<Ends> {
     let lane = view.lane.as_ref()?;
-    Some((lane.from.id.clone(), lane.to.id.clone()))
+    #[expect(clippy::cast_possible_truncation, reason = "read below 1e9")]
+    let permitted = lane.demands.max_speed.map(|speed| (speed * 1000.0) as i64);
+    Some((lane.from.id.clone(), lane.to.id.clone(), permitted))
 }
 
 impl ModeSpeed {
     /// The present edge was driven to its end.
-    fn driven(&mut self, now: &View, findings: &mut Vec<CheckFinding>) -> bool {
+    fn driven(&mut self, now: &View, alike: bool, findings: &mut Vec<CheckFinding>) -> bool {
         let Some((entered, mode, mut drive)) = self.present.take() else {
             return false;
         };
@@ -88,7 +91,11 @@ impl ModeSpeed {
         match (drive.reported, usual.reported) {
             (Some(speed), Some(limit)) if sooner && speed > limit * SHARE + NOISE => {
                 let text = format!("{speed:.2} m/s in SEMIAUTOMATIC on an edge driven at {limit:.2} m/s in AUTOMATIC");
-                findings.push(found(now.seq, text));
+                findings.push(if alike {
+                    found(now.seq, text)
+                } else {
+                    softly(now.seq, text)
+                });
             }
             (Some(_), Some(_)) => {}
             _ if sooner => {
@@ -123,7 +130,8 @@ impl Running for ModeSpeed {
             .present
             .as_ref()
             .is_some_and(|(entered, was, _)| now.order == entered.order && *was == mode);
-        let judged = went_on && self.driven(&now, findings);
+        let alike = context.with.get("alike") == Some(&serde_json::Value::Bool(true));
+        let judged = went_on && self.driven(&now, alike, findings);
         let drive = Drive {
             reported: now.velocity.speed(),
             took: None,
@@ -172,6 +180,7 @@ mod tests {
 
     fn judge(automatic: (f64, Option<f64>), semiautomatic: (f64, Option<f64>)) -> (Vec<String>, usize) {
         let mut trace = Trace::subscriber();
+        trace.with.insert("alike".into(), json!(true));
         drive(&mut trace, "AUTOMATIC", automatic.0, automatic.1);
         drive(&mut trace, "SEMIAUTOMATIC", semiautomatic.0, semiautomatic.1);
         let outcome = trace.judge(CHECK);

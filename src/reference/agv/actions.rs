@@ -209,6 +209,9 @@ impl Actions {
         if faults.has(F::ListReversed) {
             triggered.reverse();
         }
+        if faults.has(F::LastActionForgotten) && triggered.len() > 1 {
+            triggered.pop();
+        }
         if faults.has(F::HardFirst) {
             triggered.sort_by_key(|action| action.request.blocking != Blocking::Hard);
         }

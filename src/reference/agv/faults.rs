@@ -367,6 +367,7 @@ faults! {
     SoftDrives "soft-drives" ["BLOCK-03"] "Drives while a SOFT action runs.";
     HardDrives "hard-drives" ["BLOCK-04"] "Drives while a HARD action runs.";
     HardOverlaps "hard-overlaps" ["BLOCK-05"] "Performs HARD actions beside others.";
+    LastActionForgotten "last-action-forgotten" ["ACT-01"] "Never begins the last of several actions of a node.";
     HardFirst "hard-first" ["BLOCK-01", "BLOCK-06"] "Performs the HARD actions of a node before all others.";
     StuckAfterBlocking "stuck-after-blocking" ["BLOCK-07", "ORD-06", "NODE-07"] "Does not drive on after a blocking action.";
 
