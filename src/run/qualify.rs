@@ -1,8 +1,8 @@
 //! Proof of every check: it passes on the faultless reference device, and a named fault makes it fail.
 //!
-//! Qualification runs everything in virtual time, once without and once with each fault, and draws up the
-//! kill matrix: which clause and which monitor is failed by which fault. A clause no fault can fail is
-//! unproven, and is said so by name.
+//! Qualification runs everything in virtual time without a fault, then with each fault the tests that decide what the
+//! fault breaks, and draws up the kill matrix: which clause and which monitor is failed by which fault. What is still
+//! unproven is tried with every fault. A clause no fault can fail is said so by name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -199,16 +199,70 @@ pub fn qualify_tests(
         });
         deciders.extend(own);
     }
+    // A few faults are tried on everything; all of them would take minutes.
+    let selected = |fault: &Fault, test: &Test| faults.len() <= FEW || concerns(fault, test);
+    let mut kills = each(faults, |fault| {
+        told(fault.name);
+        kill(library, pack, &vehicles, fault, &|test| selected(fault, test))
+    })?;
+    if faults.len() > FEW {
+        // What no test it names has found is tried on everything.
+        let missed: Vec<Fault> = kills
+            .iter()
+            .filter(|kill| !kill.named())
+            .map(|kill| kill.fault)
+            .collect();
+        merge(
+            &mut kills,
+            each(&missed, |fault| kill(library, pack, &vehicles, fault, &|_| true))?,
+        );
+        // What is still unproven may be failed by a fault that is about something else.
+        let outcome = Qualification {
+            blemishes: Vec::new(),
+            deciders: deciders.clone(),
+            kills: kills.clone(),
+        };
+        let places: BTreeSet<&str> = outcome
+            .unproven()
+            .iter()
+            .filter_map(|decider| decider.place.split(' ').next())
+            .collect();
+        let more = each(faults, |fault| {
+            let open = |test: &Test| places.contains(test.id.as_str());
+            kill(library, pack, &vehicles, fault, &open)
+        })?;
+        merge(&mut kills, more);
+    }
+    Ok(Qualification {
+        blemishes,
+        deciders,
+        kills,
+    })
+}
+
+/// So many faults are tried on every test.
+const FEW: usize = 5;
+
+/// Whether a test decides something the fault breaks.
+fn concerns(fault: &Fault, test: &Test) -> bool {
+    test.requirements().iter().any(|id| fault.breaks.contains(&id.as_str()))
+}
+
+/// Tries every fault, on all cores; in their order.
+fn each(
+    faults: &[Fault],
+    attempt: impl Fn(&Fault) -> Result<Kill, EngineError> + Sync,
+) -> Result<Vec<Kill>, EngineError> {
     let next = AtomicUsize::new(0);
     let kills: Mutex<Vec<(usize, Result<Kill, EngineError>)>> = Mutex::new(Vec::new());
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {
-                while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    told(fault.name);
-                    let at = faults.iter().position(|other| other == fault).unwrap_or_default();
-                    let kill = kill(library, pack, &vehicles, *fault);
+                loop {
+                    let at = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(fault) = faults.get(at) else { break };
+                    let kill = attempt(fault);
                     if let Ok(mut all) = kills.lock() {
                         all.push((at, kill));
                     }
@@ -218,11 +272,23 @@ pub fn qualify_tests(
     });
     let mut kills = kills.into_inner().unwrap_or_default();
     kills.sort_by_key(|(at, _)| *at);
-    Ok(Qualification {
-        blemishes,
-        deciders,
-        kills: kills.into_iter().map(|(_, kill)| kill).collect::<Result<_, _>>()?,
-    })
+    kills.into_iter().map(|(_, kill)| kill).collect()
+}
+
+/// Adds what more was found with the same faults.
+fn merge(kills: &mut [Kill], more: Vec<Kill>) {
+    for other in more {
+        let Some(kill) = kills.iter_mut().find(|kill| kill.fault == other.fault) else {
+            continue;
+        };
+        kill.deciders.extend(other.deciders);
+        for requirement in other.requirements {
+            if !kill.requirements.contains(&requirement) {
+                kill.requirements.push(requirement);
+            }
+        }
+        kill.verdict = kill.verdict.max(other.verdict);
+    }
 }
 
 /// What is not a pass.
@@ -250,20 +316,29 @@ struct Vehicle {
     requirements: BTreeSet<String>,
 }
 
-/// Runs with a fault: on the usual vehicle, and on the others where they alone decide what the fault breaks.
-fn kill(library: &Library, pack: &Pack, vehicles: &[Vehicle], fault: Fault) -> Result<Kill, EngineError> {
+/// Runs these tests with a fault: on the usual vehicle, and on the others where they alone decide what the fault
+/// breaks.
+fn kill(
+    library: &Library,
+    pack: &Pack,
+    vehicles: &[Vehicle],
+    fault: &Fault,
+    selected: &dyn Fn(&Test) -> bool,
+) -> Result<Kill, EngineError> {
     let mut kill = Kill {
-        fault,
+        fault: *fault,
         deciders: BTreeSet::new(),
         requirements: Vec::new(),
         verdict: None,
     };
     for (at, vehicle) in vehicles.iter().enumerate() {
         let concerned = fault.breaks.iter().any(|id| vehicle.requirements.contains(*id));
-        if vehicle.request.tests.is_empty() || (at > 0 && !concerned) {
+        let mut request = vehicle.request.clone();
+        request.tests.retain(|test| selected(test));
+        if request.tests.is_empty() || (at > 0 && !concerned) {
             continue;
         }
-        let mut request = vehicle.request.clone();
+        request.complete = false;
         request.faults = vec![fault.name.to_owned()];
         let finished = run_silently(library, pack, request)?;
         for (decider, verdict) in decided(&finished.result) {

@@ -191,7 +191,7 @@ faults! {
     EdgeOrientationIgnored "edge-orientation-ignored" ["ORD-MSG-22", "OPT-01"] "Drives forwards whatever orientation the edge asks for.";
     MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
     TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there.";
-    AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with x the wrong way round.";
+    AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
     DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05"] "Reports its orientation in degrees.";
     VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 

@@ -216,10 +216,10 @@ impl Agv {
         } else {
             pose.theta
         };
-        let x = if self.faults.has(F::AxesMirrored) {
-            -pose.x
+        let y = if self.faults.has(F::AxesMirrored) {
+            -pose.y
         } else {
-            pose.x
+            pose.y
         };
         let map_id = match () {
             () if self.faults.has(F::PositionMapStale) => "factory-default".to_owned(),
@@ -236,8 +236,8 @@ impl Agv {
         json!({
             "positionInitialized": !self.lost,
             "localizationScore": 0.98,
-            "x": number(x),
-            "y": number(pose.y),
+            "x": number(pose.x),
+            "y": number(y),
             "theta": theta,
             "mapId": map_id,
         })
