@@ -15,13 +15,23 @@ use vda5050_tck::run::{Library, VirtualRun, decided, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 /// Liberties that exclude another one: of each pair the second is left out where all are taken at once.
-const EXCLUDED: [&str; 6] = [
+const EXCLUDED: [&str; 10] = [
+    "answers-slowly",
     "answers-very-slowly",
+    "drives-slowly",
+    "states-often",
+    "visualization-often",
     "states-seldom",
     "actions-at-once",
     "visualization-off",
     "optional-omitted",
     "pretty-printed",
+];
+
+/// What cannot be seen of a vehicle with such a liberty, so that inconclusive is the right word.
+const UNSEEN: [(&str, &str); 2] = [
+    ("optional-omitted", "order-content/velocity-sign"), // It does not say how fast it drives.
+    ("vendor-warning", "errors/listed-while-it-lasts[warning]"), // Which of two warnings is meant is not told.
 ];
 
 /// Runs everything on all cores; the results come in the order of the requests.
@@ -54,13 +64,18 @@ fn with(library: &Library, pack: &Pack, tolerances: &[&str]) -> VirtualRun {
 }
 
 /// What is worse than a pass, one line each; `Err` when anything is worse than a warning.
-fn blemishes(result: &RunResult) -> Result<BTreeSet<String>, String> {
+fn blemishes(result: &RunResult, tolerances: &[&str]) -> Result<BTreeSet<String>, String> {
+    let unseen = |place: &str| {
+        let mut known = UNSEEN.iter();
+        known.any(|(name, test)| tolerances.contains(name) && place.split(' ').next() == Some(*test))
+    };
     let mut warnings = BTreeSet::new();
     let mut worse = String::new();
     for (decider, verdict) in decided(result) {
         let line = format!("{} {}", decider.requirement, decider.place);
         match verdict {
             Verdict::Pass => {}
+            Verdict::Inconclusive if unseen(&decider.place) => {}
             Verdict::Warning => {
                 warnings.insert(line);
             }
@@ -76,25 +91,23 @@ fn blemishes(result: &RunResult) -> Result<BTreeSet<String>, String> {
     if worse.is_empty() { Ok(warnings) } else { Err(worse) }
 }
 
-#[test]
-fn with_each_tolerance_everything_is_decided_and_nothing_fails() {
+/// Runs with each of these sets of tolerances; gives the warnings. Nothing may be worse.
+fn warnings(sets: &[Vec<&str>]) -> String {
     let library = Library::load(None).unwrap();
     let pack = library.rules.packs.latest();
-    let requests = TOLERANCES
-        .iter()
-        .map(|tolerance| with(&library, pack, &[tolerance.name]))
-        .collect();
+    let requests = sets.iter().map(|set| with(&library, pack, set)).collect();
     let mut worse = String::new();
     let mut warned = String::new();
-    for (tolerance, result) in TOLERANCES.iter().zip(run_all(&library, pack, requests)) {
-        match blemishes(&result) {
+    for (set, result) in sets.iter().zip(run_all(&library, pack, requests)) {
+        let name = set.join(" + ");
+        match blemishes(&result, set) {
             Ok(warnings) => {
                 for line in warnings {
-                    let _ = writeln!(warned, "{}: {line}", tolerance.name);
+                    let _ = writeln!(warned, "{name}: {line}");
                 }
             }
             Err(lines) => {
-                let _ = write!(worse, "{}:\n{lines}", tolerance.name);
+                let _ = write!(worse, "{name}:\n{lines}");
             }
         }
     }
@@ -102,11 +115,41 @@ fn with_each_tolerance_everything_is_decided_and_nothing_fails() {
         worse.is_empty(),
         "a vehicle is accused that does nothing wrong\n{worse}"
     );
-    insta::assert_snapshot!(warned);
+    warned
+}
+
+/// So many sets hold all tolerances; those that exclude each other stand side by side in the registry, and so never
+/// meet in one set.
+const SETS: usize = 8;
+
+#[test]
+fn whatever_liberties_it_takes_everything_is_decided_and_nothing_fails() {
+    let mut sets = vec![Vec::new(); SETS];
+    for (at, tolerance) in TOLERANCES.iter().enumerate() {
+        sets[at % SETS].push(tolerance.name);
+    }
+    warnings(&sets);
+}
+
+#[test]
+#[ignore = "takes a minute; CI runs it"]
+fn with_each_tolerance_everything_is_decided_and_nothing_fails() {
+    let sets: Vec<Vec<&str>> = TOLERANCES.iter().map(|tolerance| vec![tolerance.name]).collect();
+    insta::assert_snapshot!(warnings(&sets));
 }
 
 #[test]
 fn whatever_the_seed_the_verdicts_are_the_same() {
+    same_verdicts(0..6);
+}
+
+#[test]
+#[ignore = "takes a minute; CI runs it"]
+fn with_fifty_seeds_the_verdicts_are_the_same() {
+    same_verdicts(0..50);
+}
+
+fn same_verdicts(seeds: std::ops::Range<u64>) {
     let library = Library::load(None).unwrap();
     let pack = library.rules.packs.latest();
     let together: Vec<&str> = TOLERANCES
@@ -114,7 +157,7 @@ fn whatever_the_seed_the_verdicts_are_the_same() {
         .map(|tolerance| tolerance.name)
         .filter(|name| !EXCLUDED.contains(name))
         .collect();
-    let requests = (0..50)
+    let requests = seeds
         .map(|seed| {
             // One of two runs is of a vehicle with its own manners, under the weather of a busy network.
             let mut request = with(&library, pack, if seed % 2 == 0 { &[] } else { &together });
@@ -127,7 +170,8 @@ fn whatever_the_seed_the_verdicts_are_the_same() {
     let verdicts = |result: &RunResult| -> Vec<String> {
         let tests = result.tests.iter().map(|test| {
             let good = test.verdict.is_none_or(|verdict| verdict <= Verdict::Warning);
-            format!("{} {}", test.id, if good { "ok" } else { "bad" })
+            let unseen = UNSEEN.iter().any(|(_, other)| *other == test.id);
+            format!("{} {}", test.id, if good || unseen { "ok" } else { "bad" })
         });
         let requirements = result.requirements.iter().map(|one| {
             let decided = one.verdict.is_some();
@@ -137,7 +181,7 @@ fn whatever_the_seed_the_verdicts_are_the_same() {
     };
     let mut first: Option<Vec<String>> = None;
     for (seed, result) in run_all(&library, pack, requests).iter().enumerate() {
-        if let Err(worse) = blemishes(result) {
+        if let Err(worse) = blemishes(result, &together) {
             panic!("seed {seed}:\n{worse}");
         }
         let verdicts = verdicts(result);

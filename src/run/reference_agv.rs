@@ -311,6 +311,8 @@ impl ReferenceAgv {
         let speed = self.config.speed;
         self.config.tolerate(name)?;
         self.time.drive = self.time.drive.mul_f64((speed / self.config.speed).max(1.0));
+        let latency = self.config.answers_after + self.config.min_state_interval;
+        self.time.quiet = self.time.quiet.max(latency * 2);
         // Long enough for what a test does meanwhile.
         let seconds = 0.5 + 3.0 * (self.config.answers_after + self.config.min_state_interval).as_secs_f64();
         for name in ["long-action", "uninterruptible-action"] {

@@ -147,8 +147,8 @@ pub struct Agv {
     claimed_map: Option<String>,
     connection: Connection,
     report: Report,
-    /// Messages that were not looked at yet, and when they will be.
-    inbox: VecDeque<(Moment, String, bytes::Bytes)>,
+    /// What has come and was not looked at yet, and when it will be: messages, and what people do.
+    inbox: VecDeque<(Moment, Input)>,
     /// It stands still on a node until then (`stops-on-nodes`, `first-node-listed` only).
     lingers_until: Option<Moment>,
     /// Counts states.
@@ -249,7 +249,7 @@ impl Agv {
             self.connection.online_at,
             self.book.soon,
             self.lingers_until,
-            self.inbox.front().map(|(due, ..)| *due),
+            self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
             self.next_report(),
         ];
@@ -280,9 +280,11 @@ impl Agv {
         }
         self.errors.expire(moment);
         self.lingers_until = self.lingers_until.filter(|until| *until > moment);
-        while self.inbox.front().is_some_and(|(due, ..)| *due <= moment) {
-            if let Some((_, topic, payload)) = self.inbox.pop_front() {
-                self.message(&topic, &payload);
+        while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
+            match self.inbox.pop_front() {
+                Some((_, Input::Message { topic, payload })) => self.message(&topic, &payload),
+                Some((_, Input::Command(name, arguments))) => self.command(&name, &arguments),
+                _ => {}
             }
         }
         self.shadow.take_if(|(end, _)| *end <= moment);
@@ -303,13 +305,11 @@ impl Device for Agv {
         match input {
             Input::Connected => self.connected(),
             Input::ConnectionLost => self.connection_lost(),
-            Input::Message { topic, payload } => {
-                let due = now.moment + self.config.answers_after;
-                self.inbox.push_back((due, topic, payload));
+            Input::Message { .. } | Input::Command(..) => {
+                self.inbox.push_back((now.moment + self.config.answers_after, input));
             }
             Input::Time => {}
             Input::Download { token, progress } => self.download_progress(token, progress),
-            Input::Command(name, arguments) => self.command(&name, &arguments),
         }
         self.step();
         out.append(&mut self.pending);

@@ -25,8 +25,16 @@ pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
         T::VisualizationOff => config.visualization_interval = None,
         T::VisualizationOften => config.visualization_interval = Some(Duration::from_millis(50)),
         T::DrivesSlowly => slower(config, 4.0),
-        T::ActionsLast => config.action_duration = Duration::from_secs(1),
-        T::ActionsAtOnce => config.action_duration = Duration::ZERO,
+        T::ActionsLast => config.action_duration = config.action_duration.max(Duration::from_secs(1)),
+        T::ActionsAtOnce => {
+            // What happens at a station takes the time it takes.
+            for action in ["pick", "drop", "finePositioning", "detectObject"] {
+                config
+                    .action_durations
+                    .insert(action.to_owned(), config.action_duration);
+            }
+            config.action_duration = Duration::ZERO;
+        }
         T::ReconnectsLate => config.reconnect_delay = Duration::from_secs(8),
         T::KeepAliveTwenty => config.keep_alive = Duration::from_secs(20),
         T::ErrorsStay => config.error_duration = Duration::from_secs(30),
@@ -37,4 +45,5 @@ pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
 fn slower(config: &mut AgvConfig, times: f64) {
     config.speed /= times;
     config.rotation_speed /= times;
+    config.action_duration = config.action_duration.mul_f64(times);
 }

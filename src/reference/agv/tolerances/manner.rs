@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::{ToleranceName as T, Tolerances};
 
 /// Members of a state a vehicle need not send.
-const OPTIONAL: [&str; 3] = ["velocity", "information", "zoneSetId"];
+const OPTIONAL: [&str; 2] = ["velocity", "distanceSinceLastNode"];
 
 /// Words the message `name` otherwise. `even` changes with every state.
 pub(in crate::reference::agv) fn reworded(
