@@ -80,7 +80,12 @@ fn blemishes(result: &RunResult, tolerances: &[&str]) -> Result<BTreeSet<String>
                 warnings.insert(line);
             }
             _ => {
-                let _ = writeln!(worse, "  {} {line}", verdict.word());
+                let test = result
+                    .tests
+                    .iter()
+                    .find(|test| decider.place.split(' ').next() == Some(&test.id));
+                let reason = test.and_then(|test| test.reason.as_deref()).unwrap_or_default();
+                let _ = writeln!(worse, "  {} {line}: {reason}", verdict.word());
             }
         }
     }
