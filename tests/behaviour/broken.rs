@@ -50,7 +50,7 @@ fn a_device_that_sends_no_state_fails_and_leaves_a_partial_report() {
 fn a_device_killed_in_the_middle_of_a_test_leaves_the_rest_undecided() {
     let bench = Bench::new();
     let (mut run, port) = bench.start(
-        &Profile::default().with(&[("quiet", "2 s"), ("drive", "1 s")]),
+        &Profile::default().with(&[("quiet", "2 s"), ("drive", "1 s"), ("react", "3 s"), ("slow", "1 s")]),
         &[WATCHING.0, LATER],
     );
     let mut agv = bench.agv(port, &[]);
