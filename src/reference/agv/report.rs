@@ -280,7 +280,7 @@ impl Agv {
             ..Report::default()
         };
         self.states_sent += 1;
-        if self.takes(T::FactsheetAgain) && self.states_sent % 10 == 0 {
+        if self.takes(T::FactsheetAgain) && self.states_sent.is_multiple_of(10) {
             self.publish_factsheet();
         }
     }

@@ -70,7 +70,9 @@ fn state(tolerances: Tolerances, state: &mut Map<String, Value>, even: bool) {
         add_optional(state);
     }
     if has(T::OptionalOmitted) {
-        OPTIONAL.iter().for_each(|key| drop(state.remove(*key)));
+        for key in OPTIONAL {
+            state.remove(key);
+        }
     }
 }
 
@@ -168,7 +170,9 @@ mod tests {
     /// The message as a vehicle with these liberties sends it.
     fn sent(names: &[&str]) -> Vec<u8> {
         let mut config = AgvConfig::default();
-        names.iter().for_each(|name| config.tolerate(name).unwrap_or_default());
+        for name in names {
+            config.tolerate(name).unwrap_or_default();
+        }
         written(config.tolerances, reworded(config.tolerances, "state", message(), true))
     }
 
