@@ -7,7 +7,7 @@
     reason = "a test may fail by panicking"
 )]
 
-use vda5050_tck::reference::agv::FAULTS;
+use vda5050_tck::reference::agv::{FAULTS, lapse};
 use vda5050_tck::run::{Decider, Library, Qualification, qualify};
 use vda5050_tck::verdict::Verdict;
 
@@ -79,7 +79,25 @@ fn every_check_passes_without_a_fault_and_is_failed_by_one() {
         "these are found by now; take them out of unfound.tsv:\n{old:#?}"
     );
 
+    hold_to_failing(&outcome);
     insta::assert_snapshot!("kill_matrix", outcome.matrix());
+}
+
+/// A fault ends in a fail, and a lapse in no more than a warning, or undecided.
+fn hold_to_failing(outcome: &Qualification) {
+    let named = |fails: bool| {
+        let kills = outcome.kills.iter();
+        let wrong = kills.filter(move |kill| {
+            (kill.verdict == Some(Verdict::Fail)) == fails && lapse(kill.fault.name).is_some() == fails
+        });
+        wrong.map(|kill| kill.fault.name).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        named(false),
+        [""; 0],
+        "these faults fail nothing, and are not among the lapses"
+    );
+    assert_eq!(named(true), [""; 0], "these lapses fail something: they are faults");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::checks;
 use crate::diagnostic::{self, Diagnostic};
 use crate::pack::{Pack, Requirement, Role};
 use crate::profile::HOOKS;
-use crate::reference::agv::{FAULTS, TOLERANCES};
+use crate::reference::agv::{FAULTS, TOLERANCES, lapse};
 use crate::report::coverage;
 use crate::run::{Library, sources};
 use crate::suite::model::{Monitor, Rule, Test, Verb};
@@ -69,7 +69,7 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         }
         (Listing::Faults, Format::Text) => ui::faults(FAULTS),
         (Listing::Faults, Format::Json) => {
-            lines(FAULTS.iter().map(|fault| json!({ "name": fault.name, "breaks": fault.breaks, "wrong": fault.wrong })))
+            lines(FAULTS.iter().map(|fault| json!({ "name": fault.name, "breaks": fault.breaks, "wrong": fault.wrong, "lapse": lapse(fault.name) })))
         }
         (Listing::Tolerances, Format::Text) => ui::tolerances(TOLERANCES),
         (Listing::Tolerances, Format::Json) => lines(

@@ -207,11 +207,8 @@ pub fn qualify_tests(
     })?;
     if faults.len() > FEW {
         // What no test it names has found is tried on everything.
-        let missed: Vec<Fault> = kills
-            .iter()
-            .filter(|kill| !kill.named())
-            .map(|kill| kill.fault)
-            .collect();
+        let missed = kills.iter().filter(|kill| !kill.named());
+        let missed: Vec<Fault> = missed.map(|kill| kill.fault).collect();
         merge(
             &mut kills,
             each(&missed, |fault| kill(library, pack, &vehicles, fault, &|_| true))?,

@@ -284,22 +284,23 @@ impl ReferenceAgv {
     /// The same vehicle in a hurry, for runs over real sockets, where every metre costs time: as fast as tests that
     /// have to catch it between two nodes allow.
     pub fn hurry(&mut self) {
-        const TIMES: f64 = 2.5;
+        const TIMES: f64 = 3.2;
         self.config.speed *= TIMES;
         self.config.rotation_speed *= TIMES;
         self.config.action_duration = self.config.action_duration.div_f64(TIMES);
         self.config.state_interval = Duration::from_secs(1);
+        self.config.reconnect_delay = Duration::from_millis(100);
         for (name, seconds) in [
-            ("long-action", 0.3),
-            ("uninterruptible-action", 0.3),
+            ("long-action", 0.2),
+            ("uninterruptible-action", 0.2),
             ("brief-action", 0.02),
         ] {
             if let Some(action) = self.actions.0.get_mut(name) {
                 action.parameters.insert("duration".to_owned(), json!(seconds));
             }
         }
-        self.time.drive = Duration::from_millis(2_500);
-        self.time.quiet = Duration::from_millis(100);
+        self.time.drive = Duration::from_secs(2);
+        self.time.quiet = Duration::from_millis(50);
         self.time.settle = Duration::from_millis(150);
     }
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::pack::Role;
 use crate::profile::HookInfo;
 use crate::reference::Fault;
-use crate::reference::agv::Tolerance;
+use crate::reference::agv::{Tolerance, lapse};
 
 /// Every hook with its parameters, by role.
 #[must_use]
@@ -36,15 +36,25 @@ pub fn hooks(hooks: &[HookInfo]) -> String {
     text
 }
 
-/// Every fault with what is wrong and the requirements it breaks.
+/// Every fault with what is wrong and the requirements it breaks; those that end in a warning stand apart.
 #[must_use]
 pub fn faults(faults: &[Fault]) -> String {
     let width = faults.iter().map(|fault| fault.name.len()).max().unwrap_or(0);
-    faults.iter().fold(String::new(), |mut text, fault| {
+    let mut text = String::new();
+    let (lapses, faults): (Vec<&Fault>, Vec<&Fault>) = faults.iter().partition(|fault| lapse(fault.name).is_some());
+    for fault in faults {
         let breaks = fault.breaks.join(", ");
         let _ = writeln!(text, "{:<width$}  {} ({breaks})", fault.name, fault.wrong);
-        text
-    })
+    }
+    if !lapses.is_empty() {
+        text.push_str("\nLapses: no vehicle is failed for these\n\n");
+    }
+    for fault in lapses {
+        let breaks = fault.breaks.join(", ");
+        let why = lapse(fault.name).unwrap_or_default();
+        let _ = writeln!(text, "{:<width$}  {} ({breaks}) {why}", fault.name, fault.wrong);
+    }
+    text
 }
 
 /// Every tolerance with what the vehicle does and the requirements that leave it the liberty.

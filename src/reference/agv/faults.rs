@@ -308,7 +308,7 @@ faults! {
     StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
     SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
     OrderWithoutState "order-without-state" ["STATE-03"] "Does not send a state when an order arrives.";
-    LoadWithoutState "load-without-state" ["STATE-04"] "Does not send a state when its load changes.";
+    LoadWithoutState "load-without-state" ["STATE-04", "ACT-28"] "Does not send a state when its load changes.";
     ErrorWithoutState "error-without-state" ["STATE-05"] "Does not send a state when an error appears.";
     NodeWithoutState "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node.";
     ModeWithoutState "mode-without-state" ["STATE-07"] "Does not send a state when its operating mode changes.";

@@ -21,6 +21,7 @@ mod errors;
 mod factsheet;
 pub mod faults;
 mod instant;
+pub mod lapses;
 mod maps;
 mod motion;
 mod order_message;
@@ -43,6 +44,7 @@ use crate::reference::{ConnectOptions, Device, Input, Output};
 pub use commands::COMMANDS;
 pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
 pub use faults::{FAULTS, FaultName, find};
+pub use lapses::{LAPSES, lapse};
 pub use tolerances::{TOLERANCES, Tolerance, ToleranceName};
 
 use actions::Actions;

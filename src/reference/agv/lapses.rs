@@ -1,0 +1,107 @@
+//! Faults that end in a warning, and why.
+//!
+//! They prove clauses like the others. But the text, or a ruling of the catalogue, makes what they break less than an
+//! obligation: no vehicle is failed for it.
+
+/// Name of a fault, and why it is no more than a lapse.
+pub const LAPSES: &[(&str, &str)] = &[
+    (
+        "state-qos-1",
+        "A higher QoS delivers the state as well; the ruling of MQTT-06 and MQTT-07 is a warning.",
+    ),
+    (
+        "factsheet-qos-2",
+        "A higher QoS delivers the factsheet as well; the ruling of MQTT-06 and MQTT-07 is a warning.",
+    ),
+    (
+        "other-serial-number",
+        "Which of topic and header is wrong cannot be told; TOPIC-04, that they agree, is a recommendation.",
+    ),
+    ("other-major-version", "It breaks a recommendation only."),
+    (
+        "duplicate-key",
+        "JSON leaves open what a repeated key means; the check of JSON-10 remarks on it.",
+    ),
+    ("keep-alive-off", "It breaks a recommendation only."),
+    ("keep-alive-long", "It breaks a recommendation only."),
+    (
+        "speed-min-above-max",
+        "A contradiction within the factsheet is remarked on; no sentence forbids it.",
+    ),
+    (
+        "factsheet-action-missing",
+        "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
+    ),
+    (
+        "min-state-interval-ignored",
+        "FACT-14 contradicts the sending on events; its ruling leaves a warning.",
+    ),
+    ("horizon-actions-stay", "It breaks a recommendation only."),
+    ("cancel-lets-run", "It breaks a recommendation only."),
+    ("cancel-fails-early", "It breaks a recommendation only."),
+    (
+        "validation-error-lingers",
+        "That the error goes with the next order is implied only; the ruling of ORD-REJ-03 is a warning.",
+    ),
+    (
+        "order-error-as-validation",
+        "The name within the family is a preference by the ruling of ORD-REJ-06, and what follows is not reached.",
+    ),
+    (
+        "max-rotation-speed-ignored",
+        "The turn takes place while the edge is entered; whether it belongs to the edge yet is a matter of reading.",
+    ),
+    ("trajectory-cut", "It breaks a recommendation only."),
+    (
+        "corridor-contour-ignored",
+        "CORR-03 is a recommendation, and by the kinematic centre CORR-01 is kept.",
+    ),
+    (
+        "download-failure-silent",
+        "FAILED tells it; the error beside it is a preference of MAP-19.",
+    ),
+    (
+        "storage-full-silent",
+        "FAILED tells it; to say why is the recommendation MAP-30.",
+    ),
+    (
+        "delete-unknown-finished",
+        "The action is marked idempotent; the ruling of MAP-33 is a warning.",
+    ),
+    ("hash-ignored", "It breaks a recommendation only."),
+    ("undescribed-status", "It breaks a recommendation only."),
+    ("field-does-not-pause", "It breaks a recommendation only."),
+    (
+        "state-request-unanswered",
+        "The next periodic state comes within the hard limit; what needs many states is not reached.",
+    ),
+    (
+        "log-name-missing",
+        "The ruling of ACT-27 and STATE-MSG-12 is a warning.",
+    ),
+    ("failure-unreferenced", "It breaks a recommendation only."),
+    (
+        "detection-undescribed",
+        "To leave the result out is a warning by the ruling of STATE-MSG-12.",
+    ),
+    ("failure-silent", "It breaks a recommendation only."),
+    (
+        "state-interval-exceeded",
+        "The interval of the factsheet is no limit of the text; below 30 s a warning is all.",
+    ),
+    ("state-bursts", "It breaks a recommendation only."),
+    ("new-base-request-always", "It breaks a recommendation only."),
+    ("distance-negative", "It breaks a recommendation only."),
+    (
+        "traversal-split",
+        "Two states of one moment are remarked on; tests that look at single states are not reached.",
+    ),
+    ("visualization-slow", "It breaks a recommendation only."),
+    ("visualization-missing", "It breaks a recommendation only."),
+];
+
+/// Why this fault is a lapse; `None` for one that fails.
+#[must_use]
+pub fn lapse(fault: &str) -> Option<&'static str> {
+    LAPSES.iter().find(|(name, _)| *name == fault).map(|(_, why)| *why)
+}
