@@ -300,7 +300,8 @@ impl ReferenceAgv {
             }
         }
         self.time.drive = Duration::from_secs(2);
-        self.time.quiet = Duration::from_millis(50);
+        // Longer than the moment after which some faults show.
+        self.time.quiet = Duration::from_millis(80);
         self.time.settle = Duration::from_millis(150);
     }
 
