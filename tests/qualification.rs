@@ -8,7 +8,7 @@
 )]
 
 use vda5050_tck::reference::agv::{FAULTS, lapse};
-use vda5050_tck::run::{Decider, Library, Qualification, qualify};
+use vda5050_tck::run::{Decider, Kill, Library, Qualification, qualify};
 use vda5050_tck::verdict::Verdict;
 
 /// Clauses and monitors no fault can fail yet: place, requirement, and why not.
@@ -80,7 +80,25 @@ fn every_check_passes_without_a_fault_and_is_failed_by_one() {
     );
 
     hold_to_failing(&outcome);
+    assert_eq!(
+        accused_first(&outcome),
+        "",
+        "what the report names first is not what the fault breaks"
+    );
     insta::assert_snapshot!("kill_matrix", outcome.matrix());
+}
+
+/// Faults with which something else is reported first than what they break.
+fn accused_first(outcome: &Qualification) -> String {
+    let wrong = outcome.kills.iter().filter(|kill| !kill.named_first());
+    let line = |kill: &Kill| {
+        let first = kill.first.as_ref();
+        let first = first.map_or_else(String::new, |(decider, _)| {
+            format!("{} {}", decider.requirement, decider.place)
+        });
+        format!("{} breaks {}: {first}\n", kill.fault.name, kill.fault.breaks.join(", "))
+    };
+    wrong.map(line).collect()
 }
 
 /// A fault ends in a fail, and a lapse in no more than a warning, or undecided.

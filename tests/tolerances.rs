@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use vda5050_tck::pack::Pack;
-use vda5050_tck::reference::agv::TOLERANCES;
+use vda5050_tck::reference::agv::{FAULTS, TOLERANCES};
 use vda5050_tck::report::result::RunResult;
-use vda5050_tck::run::{Library, VirtualRun, decided, run_silently};
+use vda5050_tck::run::{Decider, Library, VirtualRun, decided, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 /// Liberties that exclude another one: of each pair the second is left out where all are taken at once.
@@ -29,9 +29,11 @@ const EXCLUDED: [&str; 10] = [
 ];
 
 /// What cannot be seen of a vehicle with such a liberty, so that inconclusive is the right word.
-const UNSEEN: [(&str, &str); 2] = [
+const UNSEEN: [(&str, &str); 3] = [
     ("optional-omitted", "order-content/velocity-sign"), // It does not say how fast it drives.
-    ("vendor-warning", "errors/listed-while-it-lasts[warning]"), // Which of two warnings is meant is not told.
+    // Which of two warnings is meant is not told.
+    ("vendor-warning", "errors/listed-while-it-lasts[warning]"),
+    ("warning-comes-and-goes", "errors/listed-while-it-lasts[warning]"),
 ];
 
 /// Runs everything on all cores; the results come in the order of the requests.
@@ -135,6 +137,88 @@ fn whatever_liberties_it_takes_everything_is_decided_and_nothing_fails() {
     }
     warnings(&sets);
 }
+
+/// Liberties that were once taken for defects only together: what a slow or talkative vehicle reports of its own
+/// falls into the time of an answer.
+const TOGETHER: [&[&str]; 8] = [
+    &["answers-slowly", "states-often", "warning-comes-and-goes"],
+    &["answers-very-slowly", "every-state-twice", "warning-comes-and-goes"],
+    &[
+        "answers-slowly",
+        "states-coalesced",
+        "warning-comes-and-goes",
+        "vendor-warning",
+    ],
+    &["answers-very-slowly", "states-often", "vendor-warning"],
+    &[
+        "answers-slowly",
+        "states-seldom",
+        "warning-comes-and-goes",
+        "errors-stay",
+    ],
+    &[
+        "drives-slowly",
+        "states-often",
+        "warning-comes-and-goes",
+        "actions-last",
+    ],
+    &["answers-slowly", "drives-slowly", "states-often", "visualization-often"],
+    &[
+        "stops-on-nodes",
+        "prepares-everything",
+        "every-state-twice",
+        "warning-comes-and-goes",
+    ],
+];
+
+#[test]
+fn liberties_that_meet_in_time_accuse_nobody() {
+    let sets: Vec<Vec<&str>> = TOGETHER.iter().map(|set| set.to_vec()).collect();
+    warnings(&sets);
+}
+
+/// What a vehicle reports of its own hides no wrong refusal.
+#[test]
+fn a_warning_that_comes_and_goes_hides_no_fault() {
+    let library = Library::load(None).unwrap();
+    let pack = library.rules.packs.latest();
+    let faults = FAULTS
+        .iter()
+        .filter(|fault| fault.breaks.iter().any(|id| REFUSALS.contains(id)));
+    let faults: Vec<_> = faults.collect();
+    let requests = faults.iter().map(|fault| {
+        let mut request = with(&library, pack, TOGETHER[0]);
+        request
+            .tests
+            .retain(|test| test.requirements().iter().any(|id| fault.breaks.contains(&id.as_str())));
+        request.faults = vec![fault.name.to_owned()];
+        request.complete = false;
+        request
+    });
+    let results = run_all(&library, pack, requests.collect());
+    let missed = faults.iter().zip(&results).filter(|(fault, result)| {
+        let all = decided(result);
+        let broken = |(decider, verdict): &(Decider, Verdict)| {
+            fault.breaks.contains(&decider.requirement.as_str()) && matches!(verdict, Verdict::Fail | Verdict::Warning)
+        };
+        !all.iter().any(broken)
+    });
+    let missed: Vec<&str> = missed.map(|(fault, _)| fault.name).collect();
+    assert!(faults.len() > 10, "only {} faults are about refusals", faults.len());
+    assert_eq!(missed, [""; 0], "found without the warning, and not with it");
+}
+
+/// The type, level and references of a refusal.
+const REFUSALS: [&str; 8] = [
+    "ORD-REJ-02",
+    "ORD-REJ-06",
+    "ORD-REJ-07",
+    "ORD-REJ-12",
+    "ORD-REJ-14",
+    "ORD-11",
+    "ORD-FLOW-01",
+    "ORD-FLOW-04",
+];
 
 #[test]
 #[ignore = "takes a minute; CI runs it"]

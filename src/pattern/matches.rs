@@ -71,6 +71,32 @@ impl Bound {
         self.accepts(Some(message), &Baseline::new(self, baseline))
     }
 
+    /// The elements a `$hasNew` looks at that were not there before, whatever they show.
+    #[must_use]
+    pub fn newcomers<'a>(&self, message: &'a Value, baseline: Option<&Value>) -> Vec<&'a Value> {
+        let mut found = Vec::new();
+        self.gather_new(&[message], &Baseline::new(self, baseline), &mut found);
+        found
+    }
+
+    fn gather_new<'a>(&self, values: &[&'a Value], baseline: &Baseline, found: &mut Vec<&'a Value>) {
+        let elements = || values.iter().filter_map(|value| value.as_array()).flatten();
+        match &self.kind {
+            BoundKind::Object(members) => {
+                for (name, member) in members {
+                    let inside: Vec<_> = values.iter().filter_map(|value| value.get(name)).collect();
+                    member.gather_new(&inside, baseline, found);
+                }
+            }
+            BoundKind::All(parts) => parts.iter().for_each(|part| part.gather_new(values, baseline, found)),
+            BoundKind::Not(inner) => inner.gather_new(values, baseline, found),
+            BoundKind::Elements(Element::HasNew, _) => {
+                found.extend(elements().filter(|element| baseline.is_new(self, element)));
+            }
+            _ => {}
+        }
+    }
+
     /// Whether a `$hasNew` stands anywhere in the pattern, so that the baseline matters.
     #[must_use]
     pub fn looks_back(&self) -> bool {

@@ -36,11 +36,26 @@ pub struct Kill {
     pub deciders: BTreeSet<Decider>,
     /// The requirements that failed or warned, in the order they were decided.
     pub requirements: Vec<String>,
+    /// What the report names first: the first fail, or where nothing fails the first warning.
+    pub first: Option<(Decider, Verdict)>,
     /// The verdict of the run.
     pub verdict: Option<Verdict>,
 }
 
 impl Kill {
+    /// Whether what the report names first is a requirement the fault names.
+    #[must_use]
+    pub fn named_first(&self) -> bool {
+        let first = self.first.as_ref();
+        first.is_some_and(|(decider, _)| self.fault.breaks.contains(&decider.requirement.as_str()))
+    }
+
+    fn report(&mut self, decider: &Decider, verdict: Verdict) {
+        if self.first.as_ref().is_none_or(|(_, before)| verdict > *before) {
+            self.first = Some((decider.clone(), verdict));
+        }
+    }
+
     /// Whether a requirement the fault names was reported.
     #[must_use]
     pub fn named(&self) -> bool {
@@ -284,6 +299,9 @@ fn merge(kills: &mut [Kill], more: Vec<Kill>) {
                 kill.requirements.push(requirement);
             }
         }
+        if let (None, Some((decider, verdict))) = (&kill.first, &other.first) {
+            kill.report(decider, *verdict);
+        }
         kill.verdict = kill.verdict.max(other.verdict);
     }
 }
@@ -326,6 +344,7 @@ fn kill(
         fault: *fault,
         deciders: BTreeSet::new(),
         requirements: Vec::new(),
+        first: None,
         verdict: None,
     };
     for (at, vehicle) in vehicles.iter().enumerate() {
@@ -340,6 +359,7 @@ fn kill(
         let finished = run_silently(library, pack, request)?;
         for (decider, verdict) in decided(&finished.result) {
             if matches!(verdict, Verdict::Fail | Verdict::Warning) {
+                kill.report(&decider, verdict);
                 if !kill.requirements.contains(&decider.requirement) {
                     kill.requirements.push(decider.requirement.clone());
                 }

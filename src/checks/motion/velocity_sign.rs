@@ -2,7 +2,7 @@
 
 use super::found;
 use super::lane::apart;
-use super::way::Way;
+use super::way::{View, Way};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -25,6 +25,8 @@ const MOVING: f64 = 0.05;
 #[derive(Default)]
 struct VelocitySign {
     way: Way,
+    /// Where the way began that is looked at: some states before, where they come faster than the vehicle moves.
+    start: Option<View>,
     suspicious: bool,
 }
 
@@ -34,11 +36,12 @@ impl Running for VelocitySign {
             return false;
         };
         let now = &step.now;
-        let Some(before) = step.before.as_ref().filter(|before| now.same_lane(before)) else {
+        let start = self.start.replace(now.clone());
+        let Some(start) = start.filter(|start| now.same_lane(start)) else {
             self.suspicious = false;
             return false;
         };
-        let (Some(lane), Some(then), Some(pose), Some(vx)) = (&now.lane, &before.pose, &now.pose, now.velocity.vx)
+        let (Some(lane), Some(then), Some(pose), Some(vx)) = (&now.lane, &start.pose, &now.pose, now.velocity.vx)
         else {
             return false;
         };
@@ -49,8 +52,14 @@ impl Running for VelocitySign {
         let (x, y) = (pose.x - then.x, pose.y - then.y);
         let forwards = x * pose.theta.cos() + y * pose.theta.sin();
         let made = x.hypot(y);
+        if made < WAY {
+            // So little is looked at together with what follows, if the vehicle goes on in the same direction.
+            let turned = start.velocity.vx.is_some_and(|then| then * vx < 0.0);
+            self.start = Some(if turned { now.clone() } else { start });
+            return false;
+        }
         // Sideways it says nothing about forwards.
-        if made < WAY || forwards.abs() < 0.7 * made {
+        if forwards.abs() < 0.7 * made {
             return false;
         }
         let disagrees = (forwards > 0.0) != (vx > 0.0);

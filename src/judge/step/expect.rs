@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use super::weigh::Weighing;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, assertion_clause, backlog, bound_clauses,
-    keep_nearest, limit, seconds,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit,
+    seconds, weighed_clause,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -22,6 +23,7 @@ pub(crate) struct Expecting {
     seen: u64,
     late: Option<u64>,
     taken: Option<StepOutcome>,
+    weighing: Weighing,
 }
 
 impl Expecting {
@@ -37,6 +39,7 @@ impl Expecting {
             seen: 0,
             late: None,
             taken: None,
+            weighing: Weighing::of(verb, position, scene),
         };
         if verb.from == From::Latest {
             // What is already known counts, however old it is; after that only what is new.
@@ -101,37 +104,46 @@ impl Expecting {
             clause.expected = self.selector.expected();
         }
         let judged = [("assert", &self.verb.assert), ("prefer", &self.verb.prefer)];
+        let mut shares = vec![1.0; clauses.len()];
         for (word, assertions) in judged {
-            clauses.extend(
-                assertions
-                    .iter()
-                    .map(|assertion| assertion_clause(assertion, word, entry, &self.verb.topic, self.position, scene)),
-            );
+            for assertion in assertions {
+                let topic = &self.verb.topic;
+                let (clause, share) = weighed_clause(assertion, word, entry, topic, self.position, scene);
+                clauses.push(clause);
+                shares.push(share);
+            }
         }
         let message = entry.subject();
         let saves = self.verb.save.iter().filter_map(|(name, path)| {
             let value = path.of(message.as_deref()?)?;
             Some((name.clone(), value.clone()))
         });
-        self.taken = Some(StepOutcome {
+        let outcome = StepOutcome {
             reached: Some(Ok(())),
             took: Some(entry.seq()),
             saves: saves.collect(),
             clauses,
             seen: self.seen,
-        });
+        };
+        self.taken = self.weighing.weigh(outcome, &shares, entry, &self.selector, scene);
     }
 
     pub(super) fn progress(&self) -> Progress {
         match self.taken {
             Some(_) => Progress::Decided,
+            None if self.weighing.is_settled() => {
+                Progress::Pending(self.deadline.min(self.position.base + self.limit.soft))
+            }
             None => Progress::Pending(self.deadline),
         }
     }
 
-    pub(super) fn end(self, at: Moment, cut_short: Option<&str>) -> StepOutcome {
+    pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>) -> StepOutcome {
         if let Some(taken) = self.taken {
             return taken;
+        }
+        if let Some(best) = self.weighing.best(self.seen, cut_short) {
+            return best;
         }
         let waited = at.since(self.position.base);
         let (holds, message) = match cut_short {

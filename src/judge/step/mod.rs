@@ -9,6 +9,7 @@ mod always;
 mod expect;
 mod never;
 mod retained;
+mod weigh;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -353,6 +354,18 @@ pub(super) fn assertion_clause(
     position: Position,
     scene: &Scene<'_>,
 ) -> Clause {
+    weighed_clause(assertion, word, entry, subject, position, scene).0
+}
+
+/// The same, with how much of the picture the message shows.
+fn weighed_clause(
+    assertion: &Assertion,
+    word: &'static str,
+    entry: &Entry,
+    subject: &str,
+    position: Position,
+    scene: &Scene<'_>,
+) -> (Clause, f64) {
     let mut clause = Clause {
         requirement: assertion.requirement.clone(),
         word,
@@ -369,7 +382,7 @@ pub(super) fn assertion_clause(
         Err(why) => {
             clause.holds = Holds::Unseen(why.clone());
             clause.message = why;
-            return clause;
+            return (clause, 0.0);
         }
     };
     clause.expected = selector.expected();
@@ -380,11 +393,13 @@ pub(super) fn assertion_clause(
             clause.holds = Holds::Unseen(why.clone());
             clause.message = why;
         }
-        return clause;
+        return (clause, 1.0);
     }
+    let mut share = 0.0;
     clause.holds = if word == "prefer" { Holds::Softly } else { Holds::No };
     match selector.closeness(entry).filter(|near| near.miss.is_some()) {
         Some(near) => {
+            share = near.share;
             if let Some(span) = near.span {
                 clause.span = span;
             }
@@ -412,7 +427,7 @@ pub(super) fn assertion_clause(
             clause.message = format!("#{}: {found}", entry.seq());
         }
     }
-    clause
+    (clause, share)
 }
 
 pub(super) fn shown_path(path: &str) -> &str {
