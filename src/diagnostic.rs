@@ -173,7 +173,8 @@ pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     candidates
         .into_iter()
         .map(|candidate| {
-            let same_but_for_case = candidate.eq_ignore_ascii_case(word);
+            let same_but_for_case =
+                candidate.eq_ignore_ascii_case(word) || unpadded(candidate).eq_ignore_ascii_case(&unpadded(word));
             (
                 candidate,
                 if same_but_for_case {
@@ -186,6 +187,13 @@ pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .filter(|(_, likeness)| *likeness > 0.8)
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(candidate, _)| candidate)
+}
+
+/// Without the leading zeros of its last number: `ORD-REJ-3` for `ORD-REJ-03`.
+fn unpadded(word: &str) -> String {
+    let start = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    let number = word.strip_prefix(start).unwrap_or_default();
+    format!("{start}{}", number.trim_start_matches('0'))
 }
 
 /// "did you mean `x`?", or the list of what is allowed.

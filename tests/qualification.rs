@@ -46,6 +46,12 @@ fn every_check_passes_without_a_fault_and_is_failed_by_one() {
     let outcome = qualify(&library, &pack, FAULTS).expect("qualified");
     assert_eq!(blemishes(&outcome), "", "not a pass on the faultless reference AGV");
 
+    assert_eq!(
+        accused_first(&outcome),
+        "",
+        "what the report names first is not what the fault breaks"
+    );
+
     let excused = table(UNPROVEN);
     let unproven: Vec<String> = outcome
         .unproven()

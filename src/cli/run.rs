@@ -79,7 +79,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
     let altered = !arguments.fault.is_empty()
         || !arguments.tolerance.is_empty()
-        || arguments.vehicle != crate::run::Vehicle::default();
+        || arguments.vehicle.0 != crate::run::Vehicle::default();
     if !built_in && altered {
         let title = "`--fault`, `--tolerance` and `--vehicle` are for the built-in reference AGV, and another device is \
                      tested here";
@@ -120,18 +120,16 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
 /// `certify`: the same with nothing left to choose.
 pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
-    if let Some(profile) = &arguments.profile {
-        let effective = profile::load(Some(profile), &[], &surroundings)?;
-        let contract = effective.profile.time.contract();
-        if let Some(changed) = contract.first() {
-            let diagnostic = Diagnostic::whole(
-                "certify",
-                format!("a certificate is given for default timings, and {changed}"),
-            );
-            return Err(diagnostic
-                .hint("take the section [time] out of the profile, or use `run`")
-                .into());
-        }
+    let effective = profile::load(arguments.profile.as_deref(), &[], &surroundings)?;
+    let contract = effective.profile.time.contract();
+    if let Some(changed) = contract.first() {
+        let diagnostic = Diagnostic::whole(
+            "certify",
+            format!("a certificate is given for default timings, and {changed}"),
+        );
+        return Err(diagnostic
+            .hint("take it out of the section [time] of the profile, or wherever `run -v` says it comes from, or use `run`")
+            .into());
     }
     run_command(&args::Run {
         device: args::DeviceArgs {
@@ -174,7 +172,7 @@ impl Job {
     }
 
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let mut device = ReferenceAgv::of(arguments.vehicle, &self.pack);
+        let mut device = ReferenceAgv::of(arguments.vehicle.0, &self.pack);
         tolerate(&mut device, &arguments.tolerance)?;
         let utc = WallClock::start().now().utc;
         let bundle = self.bundle(&device.subject, utc)?;
@@ -208,7 +206,7 @@ impl Job {
     }
 
     async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let mut device = ReferenceAgv::of(arguments.vehicle, &self.pack);
+        let mut device = ReferenceAgv::of(arguments.vehicle.0, &self.pack);
         device.hurry();
         tolerate(&mut device, &arguments.tolerance)?;
         let mut options = BenchOptions::loopback(device.subject.published(&self.pack));

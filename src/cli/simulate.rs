@@ -43,7 +43,7 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         let clock = WallClock::start();
         let mut running = Vec::new();
         for number in 1..=device.count {
-            let mut reference = ReferenceAgv::new(&pack);
+            let mut reference = ReferenceAgv::of(device.vehicle.0, &pack);
             tolerate(&mut reference, &device.tolerance)?;
             let serial = if device.count == 1 {
                 device.serial.clone()

@@ -169,7 +169,7 @@ impl MonitorJudge {
                 .find(|known| known.requirement == id.as_str() && known.verdict == verdict);
             if let Some(known) = known {
                 known.count += 1;
-                if known.first.len() < FIRST {
+                if known.first.len() < FIRST && !known.first.contains(&finding.seq) {
                     known.first.push(finding.seq);
                 }
             } else if self.findings.len() < DIFFERENT {

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use super::pace::Pace;
 use crate::course::Layout;
 use crate::journal::event::LinkFault;
 use crate::pattern::TermKind;
@@ -24,18 +25,17 @@ const SPEED: f64 = 1.0;
 const EDGE: f64 = 2.0;
 
 /// What is known of device and floor.
-pub(super) struct Pace<'a> {
+pub(super) struct Estimate<'a> {
     /// `time.*`, in milliseconds.
     pub(super) time: Option<&'a Value>,
     /// Mean time from one node to the next.
     pub(super) edge: Duration,
 }
 
-impl<'a> Pace<'a> {
+impl<'a> Estimate<'a> {
     /// From the time limits, the factsheet and the floor.
     pub(super) fn of(time: Option<&'a Value>, factsheet: Option<&Value>, layout: Option<&Layout>) -> Self {
-        let stated = factsheet.and_then(|sheet| sheet.pointer("/physicalParameters/speedMax")?.as_f64());
-        let fastest = stated.filter(|speed| *speed > 0.0).unwrap_or(SPEED);
+        let fastest = Pace::of(factsheet).fastest().unwrap_or(SPEED);
         let mut seconds = Vec::new();
         for edge in layout.into_iter().flat_map(Layout::edges) {
             let ends = layout.and_then(|layout| Some((layout.node(&edge.start)?, layout.node(&edge.end)?)));
@@ -55,7 +55,7 @@ impl<'a> Pace<'a> {
     }
 
     /// How long these tests take.
-    pub(super) fn estimate<'t>(&self, tests: impl Iterator<Item = &'t Test>) -> Duration {
+    pub(super) fn of_tests<'t>(&self, tests: impl Iterator<Item = &'t Test>) -> Duration {
         tests
             .flat_map(|test| test.sections().map(|(_, steps)| steps))
             .flatten()
@@ -120,8 +120,8 @@ mod tests {
         let time = json!({ "quiet": 200 });
         let of = |speed: f64, moving: bool| {
             let sheet = json!({ "physicalParameters": { "speedMax": speed } });
-            let pace = Pace::of(Some(&time), Some(&sheet), Some(&layout));
-            pace.estimate(tests.iter().map(|test| &**test).filter(|test| test.moves == moving))
+            let estimate = Estimate::of(Some(&time), Some(&sheet), Some(&layout));
+            estimate.of_tests(tests.iter().map(|test| &**test).filter(|test| test.moves == moving))
         };
         assert!(of(0.5, true) > of(2.0, true) * 2);
         assert!(of(2.0, true) > Duration::from_secs(30));

@@ -44,6 +44,11 @@ impl Pace {
         }
     }
 
+    /// The highest speed, in metres per second.
+    pub(super) fn fastest(self) -> Option<f64> {
+        self.speed.1
+    }
+
     /// The speed to ask for on an edge where `cap` is permitted anyhow, in metres per second.
     fn speed(self, cap: Option<f64>) -> f64 {
         let (least, most) = self.speed;

@@ -228,22 +228,7 @@ pub fn qualify_tests(
             &mut kills,
             each(&missed, |fault| kill(library, pack, &vehicles, fault, &|_| true))?,
         );
-        // What is still unproven may be failed by a fault that is about something else.
-        let outcome = Qualification {
-            blemishes: Vec::new(),
-            deciders: deciders.clone(),
-            kills: kills.clone(),
-        };
-        let places: BTreeSet<&str> = outcome
-            .unproven()
-            .iter()
-            .filter_map(|decider| decider.place.split(' ').next())
-            .collect();
-        let more = each(faults, |fault| {
-            let open = |test: &Test| places.contains(test.id.as_str());
-            kill(library, pack, &vehicles, fault, &open)
-        })?;
-        merge(&mut kills, more);
+        prove_the_rest(library, pack, &vehicles, faults, &deciders, &mut kills)?;
     }
     Ok(Qualification {
         blemishes,
@@ -254,6 +239,86 @@ pub fn qualify_tests(
 
 /// So many faults are tried on every test.
 const FEW: usize = 5;
+
+/// So many faults are tried before it is looked again what is still unproven.
+const CHUNK: usize = 12;
+
+/// What is still unproven may be failed by a fault that is about something else: the tests that decide it are tried
+/// with every fault, those about similar requirements first, until all of it is proven.
+fn prove_the_rest(
+    library: &Library,
+    pack: &Pack,
+    vehicles: &[Vehicle],
+    faults: &[Fault],
+    deciders: &BTreeSet<Decider>,
+    kills: &mut [Kill],
+) -> Result<(), EngineError> {
+    let unproven = |kills: &[Kill]| -> Vec<Decider> {
+        let killed: BTreeSet<&Decider> = kills.iter().flat_map(|kill| &kill.deciders).collect();
+        let open = deciders.iter().filter(|decider| !killed.contains(decider));
+        open.cloned().collect()
+    };
+    // A monitor may need other tests than those that decide the same: the faults that are about its requirement, or
+    // failed it elsewhere, are tried on everything.
+    let tests = &vehicles.first().map_or(&[][..], |vehicle| &vehicle.request.tests);
+    let is_monitor =
+        |decider: &&Decider| !decider.place.contains(' ') && !tests.iter().any(|test| test.id == decider.place);
+    let monitored = |kills: &[Kill]| -> BTreeSet<String> {
+        let open = unproven(kills);
+        open.iter()
+            .filter(is_monitor)
+            .map(|decider| decider.requirement.clone())
+            .collect()
+    };
+    let related: Vec<Fault> = {
+        let open = monitored(kills);
+        let about = |kill: &&Kill| {
+            let named = kill.fault.breaks.iter().any(|id| open.contains(*id));
+            named || kill.requirements.iter().any(|id| open.contains(id))
+        };
+        kills.iter().filter(about).map(|kill| kill.fault).collect()
+    };
+    for some in related.chunks(CHUNK) {
+        let open = monitored(kills);
+        let about = |fault: &&Fault| {
+            let kill = kills.iter().find(|kill| kill.fault == **fault);
+            let found = kill.is_some_and(|kill| kill.requirements.iter().any(|id| open.contains(id)));
+            found || fault.breaks.iter().any(|id| open.contains(*id))
+        };
+        let some: Vec<Fault> = some.iter().filter(about).copied().collect();
+        let more = each(&some, |fault| kill(library, pack, vehicles, fault, &|_| true))?;
+        merge(kills, more);
+    }
+    let group = |id: &str| id.rsplit_once('-').map_or(id, |(group, _)| group).to_owned();
+    let groups: BTreeSet<String> = unproven(kills)
+        .iter()
+        .map(|decider| group(&decider.requirement))
+        .collect();
+    let mut order = faults.to_vec();
+    order.sort_by_key(|fault| !fault.breaks.iter().any(|id| groups.contains(&group(id))));
+    for some in order.chunks(CHUNK) {
+        let open = unproven(kills);
+        let places: BTreeSet<&str> = open
+            .iter()
+            .filter_map(|decider| decider.place.split(' ').next())
+            .collect();
+        let is_open = |test: &Test| places.contains(test.id.as_str());
+        if !vehicles
+            .iter()
+            .any(|vehicle| vehicle.request.tests.iter().any(|test| is_open(test)))
+        {
+            break;
+        }
+        let more = each(some, |fault| {
+            // What it breaks was tried before.
+            kill(library, pack, vehicles, fault, &|test| {
+                is_open(test) && !concerns(fault, test)
+            })
+        })?;
+        merge(kills, more);
+    }
+    Ok(())
+}
 
 /// Whether a test decides something the fault breaks.
 fn concerns(fault: &Fault, test: &Test) -> bool {

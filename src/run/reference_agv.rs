@@ -82,7 +82,7 @@ fn sample_actions(layout: &Layout) -> SampleActions {
 }
 
 /// Kinds of reference AGVs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Vehicle {
     /// On virtual lines, as most vehicles are
     #[default]
@@ -109,6 +109,25 @@ impl Vehicle {
         Self::WithoutMaps,
         Self::Terse,
     ];
+
+    /// Its name, and what it is in one line.
+    #[must_use]
+    pub fn named(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Usual => ("usual", "On virtual lines, as most vehicles are"),
+            Self::LineGuided => (
+                "line-guided",
+                "Follows a line on the floor, knows no coordinates, and stops on nodes only",
+            ),
+            Self::Free => (
+                "free",
+                "Plans its own way, follows trajectories, and keeps to corridors",
+            ),
+            Self::WithoutLoads => ("without-loads", "Carries no load, and does not charge on the course"),
+            Self::WithoutMaps => ("without-maps", "Knows nothing of maps"),
+            Self::Terse => ("terse", "Says as little as it may in its factsheet"),
+        }
+    }
 }
 
 impl ReferenceAgv {

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::between::{Presence, recover, revive, says_online, settle_link};
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
-use super::estimate::{self, Pace};
+use super::estimate::{self, Estimate};
 use crate::course::Layout;
 use crate::engine::vehicle::is_idle;
 use crate::engine::{Engine, EngineError, Operator, Watcher};
@@ -179,14 +179,14 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             return;
         }
         let times = self.engine.recorder.judge().ground().bindings.get("time");
-        let pace = Pace::of(
+        let estimate = Estimate::of(
             times,
             self.setup.capabilities.factsheet.as_ref(),
             self.setup.layout.as_ref(),
         );
         let planned = self.setup.tests.iter().zip(&plan.tests);
         let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);
-        let estimate = pace.estimate(running.map(|(test, _)| &**test));
+        let estimate = estimate.of_tests(running.map(|(test, _)| &**test));
         self.progress.note(&format!(
             "this takes {}, if the device keeps nobody waiting",
             estimate::in_words(estimate)

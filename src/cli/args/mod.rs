@@ -8,6 +8,7 @@ mod run;
 mod simulate;
 #[cfg(test)]
 mod tests;
+mod vehicle;
 
 use std::path::PathBuf;
 

@@ -60,7 +60,7 @@ pub struct Run {
         help_heading = "Reference AGV",
         conflicts_with = "profile"
     )]
-    pub vehicle: crate::run::Vehicle,
+    pub vehicle: super::vehicle::VehicleKind,
     /// Run against the reference AGV in memory and in virtual time, without a network
     #[arg(long = "virtual", help_heading = "Reference AGV", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
     pub in_virtual_time: bool,

@@ -2,6 +2,8 @@
 
 use clap::{Args, Subcommand};
 
+use super::vehicle::VehicleKind;
+
 /// `simulate`.
 #[derive(Clone, Debug, Args)]
 pub struct Simulate {
@@ -58,6 +60,9 @@ pub struct SimulatedAgv {
     /// How many of them
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub count: u32,
+    /// Which kind of vehicle it is
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub vehicle: VehicleKind,
     /// Give it a defect; may be repeated (see `list faults`)
     #[arg(long, value_name = "NAME")]
     pub fault: Vec<String>,

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::weigh::convinces;
 use super::{
     Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit,
     seconds, shown_path,
@@ -33,6 +34,8 @@ struct Goal {
     limit: Limit,
     nearest: Option<Near>,
     reached: Option<(u64, Moment)>,
+    /// What may be the goal, or something of the vehicle's own: it is watched a little longer.
+    doubtful: Option<(u64, Moment)>,
     seen: u64,
 }
 
@@ -61,6 +64,7 @@ impl Holding {
                     limit,
                     nearest: None,
                     reached: None,
+                    doubtful: None,
                     seen: 0,
                 };
                 (Some(goal), position.base + limit.hard)
@@ -109,7 +113,12 @@ impl Holding {
         {
             goal.seen += 1;
             if goal.selector.takes(entry, scene) {
-                goal.reached = Some((entry.seq(), entry.at().moment));
+                let found = Some((entry.seq(), entry.at().moment));
+                if convinces(entry, &goal.until.topic, self.position.mark, &goal.selector, scene) {
+                    goal.reached = found;
+                } else {
+                    goal.doubtful = goal.doubtful.or(found);
+                }
             } else {
                 keep_nearest(&mut goal.nearest, goal.selector.closeness(entry));
             }
@@ -165,10 +174,11 @@ impl Holding {
     }
 
     pub(super) fn progress(&self) -> Progress {
-        if self.decided() {
-            Progress::Decided
-        } else {
-            Progress::Pending(self.ends)
+        let doubtful = self.until.as_ref().filter(|goal| goal.doubtful.is_some());
+        match doubtful {
+            _ if self.decided() => Progress::Decided,
+            Some(goal) => Progress::Pending(self.ends.min(self.position.base + goal.limit.soft)),
+            None => Progress::Pending(self.ends),
         }
     }
 
@@ -283,7 +293,7 @@ impl Goal {
         violated: bool,
     ) -> (Vec<Clause>, Result<(), String>, Option<u64>) {
         let waited = at.since(position.base);
-        let (holds, message, witness) = match (self.reached, cut_short) {
+        let (holds, message, witness) = match (self.reached.or(self.doubtful), cut_short) {
             (Some((seq, moment)), _) => {
                 let took = moment.since(position.base);
                 let holds = if took > self.limit.soft {

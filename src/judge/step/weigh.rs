@@ -3,7 +3,8 @@
 //! An assertion about a new element (`$hasNew`) is about what the stimulus brought. A vehicle may report something of
 //! its own in the meantime, so a message without the right element decides nothing yet: the step goes on looking
 //! until its limit, and takes the first message that shows everything. If there is none, each assertion is judged
-//! by the message that came closest.
+//! by the message that came closest. Where nothing is asserted of it, what the vehicle has reported before, without
+//! this stimulus, is taken for the answer only if nothing better comes in good time.
 
 use std::collections::BTreeSet;
 
@@ -13,6 +14,7 @@ use super::{Clause, Holds, Position, Selector, StepOutcome, bind_pattern};
 use crate::journal::Entry;
 use crate::journal::event::Event;
 use crate::judge::window::Scene;
+use crate::pattern::Bound;
 use crate::suite::model::Expect;
 
 /// So many earlier messages are asked whether an element was there before.
@@ -22,7 +24,8 @@ pub(super) struct Weighing {
     /// Topic, and first journal number of what came after the stimulus.
     topic: String,
     mark: u64,
-    /// Whether a later message may be the one that is meant.
+    /// Whether there are assertions, and whether a later message may be the one they mean.
+    judges: bool,
     patient: bool,
     best: Option<Candidate>,
     /// An element names what was sent, so that it is the answer.
@@ -46,6 +49,7 @@ impl Weighing {
         Self {
             topic: verb.topic.clone(),
             mark: position.mark,
+            judges: !verb.assert.is_empty(),
             patient: looks_back,
             best: None,
             settled: false,
@@ -62,11 +66,18 @@ impl Weighing {
         scene: &Scene<'_>,
     ) -> Option<StepOutcome> {
         let missing = |clause: &Clause| clause.word == "assert" && clause.holds == Holds::No;
-        if !self.patient || !outcome.clauses.iter().any(missing) {
+        if self.judges && (!self.patient || !outcome.clauses.iter().any(missing)) {
             return Some(outcome);
         }
-        let novel = self.is_novel(entry, selector, scene);
-        self.settled |= self.names_what_was_sent(entry, selector, scene);
+        if !self.judges {
+            if convinces(entry, &self.topic, self.mark, selector, scene) {
+                return Some(outcome);
+            }
+            // It may be something of the vehicle's own; a moment will tell.
+            self.settled = true;
+        }
+        let novel = is_novel(entry, &self.topic, self.mark, selector, scene);
+        self.settled |= names_what_was_sent(entry, self.mark, selector, scene);
         let held = outcome.clauses.iter().filter(|clause| !missing(clause)).count();
         let weights: Vec<(bool, bool, f64)> = outcome
             .clauses
@@ -121,51 +132,57 @@ impl Weighing {
         }
         Some(outcome)
     }
+}
 
-    /// Whether the message shows an element that none of those before the stimulus showed.
-    fn is_novel(&self, entry: &Entry, selector: &Selector, scene: &Scene<'_>) -> bool {
-        let (Some(pattern), Some(message)) = (&selector.pattern, entry.subject()) else {
-            return false;
-        };
-        let all = scene.timeline.of(&self.topic);
-        let before = &all[..all.partition_point(|entry| entry.seq() < self.mark)];
-        before
-            .iter()
-            .rev()
-            .take(LOOK_BACK)
-            .all(|older| pattern.matches(&message, older.json()))
+/// Whether what is new in a message is more than what the vehicle reports from time to time: it was never there before,
+/// or it names what was sent. True where nothing new is looked for.
+pub(super) fn convinces(entry: &Entry, topic: &str, mark: u64, selector: &Selector, scene: &Scene<'_>) -> bool {
+    let looks_back = selector.pattern.as_ref().is_some_and(Bound::looks_back);
+    !looks_back || is_novel(entry, topic, mark, selector, scene) || names_what_was_sent(entry, mark, selector, scene)
+}
+
+/// Whether the message shows an element that none of those before the stimulus showed.
+fn is_novel(entry: &Entry, topic: &str, mark: u64, selector: &Selector, scene: &Scene<'_>) -> bool {
+    let (Some(pattern), Some(message)) = (&selector.pattern, entry.subject()) else {
+        return false;
+    };
+    let all = scene.timeline.of(topic);
+    let before = &all[..all.partition_point(|entry| entry.seq() < mark)];
+    before
+        .iter()
+        .rev()
+        .take(LOOK_BACK)
+        .all(|older| pattern.matches(&message, older.json()))
+}
+
+/// Whether a new element repeats a text of what was sent that was in no state before: the identifier of an order or of
+/// an action.
+fn names_what_was_sent(entry: &Entry, mark: u64, selector: &Selector, scene: &Scene<'_>) -> bool {
+    let (Some(pattern), Some(message)) = (&selector.pattern, entry.subject()) else {
+        return false;
+    };
+    let newcomers = pattern.newcomers(&message, selector.baseline.as_ref());
+    if newcomers.is_empty() {
+        return false;
     }
-
-    /// Whether a new element repeats a text of what was sent that was in no state before: the identifier of an order
-    /// or of an action.
-    fn names_what_was_sent(&self, entry: &Entry, selector: &Selector, scene: &Scene<'_>) -> bool {
-        let (Some(pattern), Some(message)) = (&selector.pattern, entry.subject()) else {
-            return false;
-        };
-        let newcomers = pattern.newcomers(&message, selector.baseline.as_ref());
-        if newcomers.is_empty() {
-            return false;
-        }
-        let mut sent = BTreeSet::new();
-        let stimuli = scene.entries.iter().rev().take_while(|entry| entry.seq() >= self.mark);
-        for stimulus in stimuli {
-            if let (Event::Sent { .. }, Some(message)) = (stimulus.event(), stimulus.json()) {
-                texts(message, &mut |text| {
-                    sent.insert(text.to_owned());
-                });
-            }
-        }
-        if let Some(before) = &selector.baseline {
-            texts(before, &mut |text| {
-                sent.remove(text);
+    let mut sent = BTreeSet::new();
+    for stimulus in scene.entries.iter().rev().take_while(|entry| entry.seq() >= mark) {
+        if let (Event::Sent { .. }, Some(message)) = (stimulus.event(), stimulus.json()) {
+            texts(message, &mut |text| {
+                sent.insert(text.to_owned());
             });
         }
-        let mut named = false;
-        for element in newcomers {
-            texts(element, &mut |text| named |= sent.contains(text));
-        }
-        named
     }
+    if let Some(before) = &selector.baseline {
+        texts(before, &mut |text| {
+            sent.remove(text);
+        });
+    }
+    let mut named = false;
+    for element in newcomers {
+        texts(element, &mut |text| named |= sent.contains(text));
+    }
+    named
 }
 
 /// All texts of a value.

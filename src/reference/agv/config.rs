@@ -153,6 +153,8 @@ pub struct AgvConfig {
     pub zone_set: Option<String>,
     /// Driving speed in metres per second. Acceleration is ignored.
     pub speed: f64,
+    /// How many times slower than usual it is by its tolerances.
+    pub slowness: f64,
     /// Turning speed in radians per second.
     pub rotation_speed: f64,
     /// Height of the vehicle in metres, against edge.maxHeight.
@@ -253,6 +255,7 @@ impl Default for AgvConfig {
             start_node: "n1".into(),
             zone_set: None,
             speed: 2.0,
+            slowness: 1.0,
             rotation_speed: std::f64::consts::PI,
             height: 1.0,
             tolerance: 0.1,

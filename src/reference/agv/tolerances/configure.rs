@@ -42,8 +42,14 @@ pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
     }
 }
 
+/// Slows it down to this share of its usual pace. Of several reasons the slowest counts: a vehicle a hundred times
+/// slower than usual is no good vehicle.
 fn slower(config: &mut AgvConfig, times: f64) {
-    config.speed /= times;
-    config.rotation_speed /= times;
-    config.action_duration = config.action_duration.mul_f64(times);
+    let more = times / config.slowness;
+    if more > 1.0 {
+        config.slowness = times;
+        config.speed /= more;
+        config.rotation_speed /= more;
+        config.action_duration = config.action_duration.mul_f64(more);
+    }
 }
