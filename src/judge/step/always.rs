@@ -99,7 +99,9 @@ impl Holding {
         if self.decided() || entry.at().moment > self.ends {
             return;
         }
-        if subject == Some(self.verb.topic.as_str()) {
+        // What cannot be read shows nothing; that it cannot is another requirement, judged by a monitor.
+        let readable = entry.subject().is_some();
+        if readable && subject == Some(self.verb.topic.as_str()) {
             self.seen += 1;
             self.judge(entry, scene);
         }

@@ -57,7 +57,7 @@ faults! {
     BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15"] "Sends charging as a word in quotes.";
     NanVelocity "nan-velocity" ["JSON-08", "MQTT-02"] "Writes NaN as turning speed into its periodic states.";
     NanAsText "nan-as-text" ["JSON-08", "STATE-MSG-05"] "Writes the word NaN as turning speed into its periodic states.";
-    ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15"] "Estimates its reach in fractions of a metre.";
+    ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15", "JSON-06"] "Estimates its reach in fractions of a metre.";
     DuplicateKey "duplicate-key" ["JSON-10"] "Repeats the key driving in its periodic states, with another value.";
     IdWithSpace "id-with-space" ["JSON-04"] "Reports the id of its map with a space.";
 
@@ -75,7 +75,7 @@ faults! {
     NoOffline "no-offline" ["CONN-07"] "Disconnects without saying OFFLINE.";
     NoDisconnect "no-disconnect" ["CONN-08"] "Closes the socket after OFFLINE without a DISCONNECT.";
     ConnectionStateUnderscore "connection-state-underscore" ["CONN-02", "CONN-10", "JSON-02"] "Spells CONNECTIONBROKEN with an underscore.";
-    ConnectionStateConnected "connection-state-connected" ["CONN-10", "CONN-05"] "Says CONNECTED instead of ONLINE.";
+    ConnectionStateConnected "connection-state-connected" ["CONN-10", "CONN-05", "JSON-02"] "Says CONNECTED instead of ONLINE.";
     NoOnlineAfterReconnect "no-online-after-reconnect" ["CONN-11"] "Says ONLINE only the first time it connects.";
 
     OnlineLate "online-late" ["CONN-05", "CONN-11"] "Says ONLINE only 25 seconds after it reconnected.";
@@ -84,12 +84,12 @@ faults! {
     // Factsheet
     FactsheetNotRetained "factsheet-not-retained" ["FACT-01"] "Publishes the factsheet without the retain flag.";
     FactsheetWithoutLimits "factsheet-without-limits" ["FACT-02", "FACT-05"] "Leaves protocolLimits out of the factsheet.";
-    FactsheetKinematicsUnknown "factsheet-kinematics-unknown" ["FACT-03"] "Gives DIFFERENTIAL as its kinematics.";
-    FactsheetWithoutSize "factsheet-without-size" ["FACT-04"] "Leaves width and length out of the factsheet.";
+    FactsheetKinematicsUnknown "factsheet-kinematics-unknown" ["FACT-03", "JSON-02"] "Gives DIFFERENTIAL as its kinematics.";
+    FactsheetWithoutSize "factsheet-without-size" ["FACT-04", "JSON-10"] "Leaves width and length out of the factsheet.";
     SpeedMinAboveMax "speed-min-above-max" ["FACT-04"] "States a lowest speed above its highest.";
-    WheelWithoutType "wheel-without-type" ["FACT-08"] "Leaves the type of its wheels out of the factsheet.";
-    LoadSetWithoutType "load-set-without-type" ["FACT-09"] "Leaves the type of the load out of its load sets.";
-    FactsheetWithoutTiming "factsheet-without-timing" ["FACT-05"] "Leaves the timing out of its limits.";
+    WheelWithoutType "wheel-without-type" ["FACT-08", "JSON-10"] "Leaves the type of its wheels out of the factsheet.";
+    LoadSetWithoutType "load-set-without-type" ["FACT-09", "JSON-10"] "Leaves the type of the load out of its load sets.";
+    FactsheetWithoutTiming "factsheet-without-timing" ["FACT-05", "JSON-10"] "Leaves the timing out of its limits.";
     FactsheetSupportYes "factsheet-support-yes" ["FACT-06"] "Says YES where the support of a parameter is asked for.";
     OptionalParametersMissing "optional-parameters-missing" ["OPT-04", "FACT-06"] "Leaves optionalParameters out of the factsheet.";
     FactsheetScopeLowerCase "factsheet-scope-lower-case" ["FACT-07", "JSON-02"] "Spells the scopes of its actions in lower case.";
@@ -97,8 +97,8 @@ faults! {
     FactsheetActionMissing "factsheet-action-missing" ["FACT-07"] "Offers cancelOrder but does not list it.";
     PolygonCrossed "polygon-crossed" ["FACT-08"] "Draws its contour as a polygon that crosses itself.";
     LoadSetTwice "load-set-twice" ["FACT-09"] "Uses one name for two load sets.";
-    ParameterTypeUnknown "parameter-type-unknown" ["BP-05", "FACT-07"] "Calls the type of its parameters DOUBLE.";
-    VersionsNumeric "versions-numeric" ["FACT-10"] "Gives its software version as a number.";
+    ParameterTypeUnknown "parameter-type-unknown" ["BP-05", "FACT-07", "JSON-02"] "Calls the type of its parameters DOUBLE.";
+    VersionsNumeric "versions-numeric" ["FACT-10", "JSON-06"] "Gives its software version as a number.";
     OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
     MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
     StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
@@ -210,7 +210,7 @@ faults! {
     PlannedPathChanges "planned-path-changes" ["STATE-15"] "Plans anew when it enters an edge.";
     PlannedPathWithoutEnds "planned-path-without-ends" ["ORD-MSG-30"] "Reports control points that are not those of its own curve.";
     KnotsTooFew "knots-too-few" ["ORD-MSG-29"] "Leaves the last knot out of the trajectory it reports.";
-    TrajectoryWithoutPoints "trajectory-without-points" ["ORD-MSG-28"] "Reports the trajectory it planned without control points.";
+    TrajectoryWithoutPoints "trajectory-without-points" ["ORD-MSG-28", "JSON-10"] "Reports the trajectory it planned without control points.";
     ZoneSetInvented "zone-set-invented" ["ORD-MSG-04", "STATE-MSG-03"] "Goes over to a zone set of its own when an order names one.";
     ZoneSetUnchecked "zone-set-unchecked" ["STATE-MSG-03"] "Takes over orders with zone sets it does not have, and goes on with its own.";
 
@@ -341,7 +341,7 @@ faults! {
     DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
     StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05"] "Says DONE where FINISHED is meant.";
     ChargeGoodBad "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent.";
-    ChargeMissing "charge-missing" ["STATE-MSG-15"] "Leaves the charge out of its battery state.";
+    ChargeMissing "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state.";
     EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
     EmergencyStopUnreported "emergency-stop-unreported" ["STATE-MSG-17"] "Does not report an emergency stop.";
 
@@ -372,7 +372,7 @@ faults! {
     StuckAfterBlocking "stuck-after-blocking" ["BLOCK-07", "ORD-06", "NODE-07"] "Does not drive on after a blocking action.";
 
     // Errors and modes
-    ErrorsOmitted "errors-omitted" ["STATE-MSG-01", "ERR-01"] "Leaves the errors array out when there is no error.";
+    ErrorsOmitted "errors-omitted" ["STATE-MSG-01", "ERR-01", "JSON-10"] "Leaves the errors array out when there is no error.";
     ErrorLevelUnknown "error-level-unknown" ["ERR-02"] "Reports warnings with the level ERROR.";
     WarningBlocks "warning-blocks" ["ERR-03", "ORD-06", "ORD-FLOW-12"] "Does not drive while it reports a warning.";
     EmergencyStopWarning "emergency-stop-warning" ["ERR-04"] "Reports the emergency stop as a WARNING.";
@@ -384,7 +384,7 @@ faults! {
     OwnErrorMild "own-error-mild" ["ERR-04"] "Reports defects that keep it from running as a WARNING.";
     ReferencesOfLastOrder "references-of-last-order" ["ORD-REJ-14", "BP-02"] "Names the order and update it has, and not those it refuses.";
     ReferencesAsMap "references-as-map" ["BP-04", "ERR-05", "ORD-CANCEL-20"] "Gives the references of errors as one object.";
-    InfoLevelWarning "info-level-warning" ["INFO-01"] "Reports an information with the level WARNING.";
+    InfoLevelWarning "info-level-warning" ["INFO-01", "JSON-02"] "Reports an information with the level WARNING.";
     SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
     ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
