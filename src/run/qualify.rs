@@ -317,6 +317,18 @@ fn prove_the_rest(
         })?;
         merge(kills, more);
     }
+    // A test may not have come to its end for what a fault did to the vehicle in another one: it is tried by itself.
+    for decider in unproven(kills) {
+        let place = decider.place.split(' ').next().unwrap_or_default();
+        let about = faults
+            .iter()
+            .filter(|fault| fault.breaks.contains(&decider.requirement.as_str()));
+        let about: Vec<Fault> = about.copied().collect();
+        let more = each(&about, |fault| {
+            kill(library, pack, vehicles, fault, &|test| test.id == place)
+        })?;
+        merge(kills, more);
+    }
     Ok(())
 }
 

@@ -323,7 +323,7 @@ faults! {
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02"] "Empties the orderId when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
     LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
-    OrderIdForgottenOnRequest "order-id-forgotten-on-request" ["STATE-MSG-02"] "Answers a stateRequest without its orderId.";
+    OrderIdForgottenOnRequest "order-id-forgotten-on-request" ["STATE-MSG-02", "STATE-13"] "Answers a stateRequest without its orderId.";
     LastNodeUnknownOnRequest "last-node-unknown-on-request" ["STATE-MSG-04"] "Answers a stateRequest without its last node.";
     RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
     PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06"] "Reports its coordinates as strings.";
