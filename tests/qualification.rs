@@ -7,6 +7,7 @@
     reason = "a test may fail by panicking"
 )]
 
+use vda5050_tck::pack::Pack;
 use vda5050_tck::reference::agv::{FAULTS, lapse};
 use vda5050_tck::run::{Decider, Library, Qualification, qualify};
 use vda5050_tck::verdict::Verdict;
@@ -82,6 +83,7 @@ fn every_check_passes_without_a_fault_and_is_failed_by_one() {
         "these are found by now; take them out of unfound.tsv:\n{old:#?}"
     );
 
+    let outcome = retried(&library, &pack, outcome);
     hold_to_failing(&outcome);
     hold_to_what_is_first(&outcome);
     insta::assert_snapshot!("kill_matrix", outcome.matrix());
@@ -112,6 +114,17 @@ fn hold_to_what_is_first(outcome: &Qualification) {
         .filter(|(known, _)| !wrong.iter().any(|(key, _)| key == known))
         .collect();
     assert!(old.is_empty(), "take these out of first.tsv:\n{old:#?}");
+}
+
+/// A fault that only brought a warning where it was tried is tried on everything.
+fn retried(library: &Library, pack: &Pack, mut outcome: Qualification) -> Qualification {
+    for kill in &mut outcome.kills {
+        if kill.verdict != Some(Verdict::Fail) && lapse(kill.fault.name).is_none() {
+            let alone = qualify(library, pack, &[kill.fault]).expect("qualified");
+            kill.verdict = alone.kills[0].verdict;
+        }
+    }
+    outcome
 }
 
 /// A fault ends in a fail, and a lapse in no more than a warning, or undecided.
