@@ -196,6 +196,8 @@ fn incoming_messages_stay_values() {
             if content.contains("derive(")
                 && content.contains("Deserialize")
                 && !allowed.contains(&module(&path).as_str())
+                // A master control reads of a state what it needs; it judges nothing.
+                && below_src(&path) != "reference/master_control/seen.rs"
             {
                 wrong.push(format!("{}:{line}: {}", below_src(&path), content.trim()));
             }

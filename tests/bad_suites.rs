@@ -2,7 +2,8 @@
 //!
 //! The first line of a file names the code it expects. The file is read as if it lay at
 //! `suites/agv/bad/<name>.yaml`, a `monitor-…` below `suites/monitors/`, a `state-…` below `suites/states/` with
-//! a test that uses it. Every other mistake in it would be a second diagnostic, and the test would fail.
+//! a test that uses it, a `master-control-…` below `suites/master-control/`. Every other mistake in it would be a
+//! second diagnostic, and the test would fail.
 
 #![allow(clippy::expect_used, clippy::panic)]
 
@@ -51,6 +52,8 @@ fn files(name: &str, text: &str) -> Vec<(String, String)> {
         files.push(("suites/agv/bad/user.yaml".to_owned(), user.join("\n")));
     } else if name.starts_with("monitor-") {
         files.push((format!("suites/monitors/bad/{name}.yaml"), text.to_owned()));
+    } else if name.starts_with("master-control-") {
+        files.push((format!("suites/master-control/bad/{name}.yaml"), text.to_owned()));
     } else {
         files.push((format!("suites/agv/bad/{name}.yaml"), text.to_owned()));
     }

@@ -1,8 +1,8 @@
-//! A vehicle nobody of this project wrote: the AGV of the npm package vda-5050-lib, as it is shipped and with one
-//! obstacle removed. The harness must find exactly what stands in its list of expected findings, each traced to a
-//! place in the library, and must accuse it of nothing else.
+//! Devices nobody of this project wrote: the AGV and the master control of the npm package vda-5050-lib, each as it is
+//! shipped and with one obstacle removed. The harness must find exactly what stands in their lists of expected findings,
+//! each traced to a place in the library, and must accuse them of nothing else.
 //!
-//! Both vehicles are run at once, each on several benches (`--shard`), because most of the time is waiting.
+//! Both variants of a device are run at once, each on several benches (`--shard`), because most of the time is waiting.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -10,15 +10,36 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 
-const FOLDER: &str = "fixtures/devices/vda-5050-lib-agv";
-/// Name in the list, profile, and number of benches.
-const VEHICLES: [(&str, &str, usize); 2] = [
-    ("as-shipped", "device.toml", 10),
-    ("translated", "device-translated.toml", 6),
-];
+/// A foreign device.
+struct Device {
+    /// Where it is, with its profiles and its list of expected findings.
+    folder: &'static str,
+    /// Name in the list, profile, and number of benches.
+    variants: [(&'static str, &'static str, usize); 2],
+}
+
+const AGV: Device = Device {
+    folder: "fixtures/devices/vda-5050-lib-agv",
+    variants: [
+        ("as-shipped", "device.toml", 10),
+        ("translated", "device-translated.toml", 6),
+    ],
+};
+
+const MASTER_CONTROL: Device = Device {
+    folder: "fixtures/devices/vda-5050-lib-master",
+    variants: [
+        ("as-shipped", "device.toml", 6),
+        ("translated", "device-translated.toml", 6),
+    ],
+};
+
+/// One device at a time: more benches than these make a machine too busy for their limits of time.
+static TURN: Mutex<()> = Mutex::new(());
 
 /// Verdict by requirement.
 type Verdicts = BTreeMap<String, String>;
@@ -52,9 +73,28 @@ impl Found {
         );
         self.explanations.entry(requirement.to_owned()).or_default().push(line);
     }
+
+    /// Adds what a result has; a test that is an error is reported.
+    fn read(&mut self, result: &Value, variant: &str, report: &mut String) {
+        for test in list(result, "tests") {
+            if test["verdict"] == "error" {
+                let _ = writeln!(report, "{variant}: {} is an error: {}", test["id"], test["reason"]);
+            }
+            for decision in list(test, "decisions") {
+                let (requirement, verdict) = (&decision["requirement"], &decision["verdict"]);
+                self.add(requirement, verdict, &test["id"], &decision["message"]);
+            }
+        }
+        for monitor in list(result, "monitors") {
+            for finding in list(monitor, "findings") {
+                let (requirement, verdict) = (&finding["requirement"], &finding["verdict"]);
+                self.add(requirement, verdict, &monitor["id"], &finding["message"]);
+            }
+        }
+    }
 }
 
-/// One bench: a harness that starts its own broker and its own vehicle.
+/// One bench: a harness that starts its own broker and its own device.
 struct Bench {
     name: String,
     out: PathBuf,
@@ -62,15 +102,16 @@ struct Bench {
 }
 
 impl Bench {
-    fn start(vehicle: &str, profile: &str, shard: usize, of: usize) -> Self {
-        let name = format!("{vehicle}, bench {shard} of {of}");
-        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("foreign-{vehicle}-{shard}"));
+    fn start(folder: &str, variant: &str, profile: &str, shard: usize, of: usize) -> Self {
+        let name = format!("{variant}, bench {shard} of {of}");
+        let device = Path::new(folder).file_name().unwrap().to_string_lossy();
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{device}-{variant}-{shard}"));
         let _ = std::fs::remove_dir_all(&out);
         let process = Command::new(env!("CARGO_BIN_EXE_vda5050-tck"))
             .args([
                 "run",
                 "--profile",
-                &format!("{FOLDER}/{profile}"),
+                &format!("{folder}/{profile}"),
                 "--shard",
                 &format!("{shard}/{of}"),
             ])
@@ -125,23 +166,17 @@ fn list<'v>(value: &'v Value, name: &str) -> impl Iterator<Item = &'v Value> {
 }
 
 /// The list that is checked in.
-fn expected(vehicle: &str) -> Vec<toml::Table> {
-    let text = std::fs::read_to_string(format!("{FOLDER}/expected-findings.toml")).unwrap();
+fn expected(folder: &str, variant: &str) -> Vec<toml::Table> {
+    let text = std::fs::read_to_string(format!("{folder}/expected-findings.toml")).unwrap();
     let table: toml::Table = text.parse().unwrap();
-    let findings = table["finding"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|finding| finding.as_table().unwrap().clone());
-    findings
-        .filter(|finding| {
-            finding["vehicles"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .any(|name| name.as_str() == Some(vehicle))
-        })
-        .collect()
+    let all = table["finding"].as_array().unwrap().iter();
+    let findings = all.map(|finding| finding.as_table().unwrap().clone());
+    let about = |finding: &toml::Table| {
+        let names = finding.get("variants").or_else(|| finding.get("vehicles"));
+        let names = names.and_then(toml::Value::as_array).unwrap();
+        names.iter().any(|name| name.as_str() == Some(variant))
+    };
+    findings.filter(about).collect()
 }
 
 fn text<'t>(table: &'t toml::Table, name: &str) -> &'t str {
@@ -183,75 +218,65 @@ fn differences(expected: &[toml::Table], found: &Found) -> String {
     report
 }
 
-#[test]
-fn the_harness_finds_in_a_foreign_vehicle_what_is_listed_and_nothing_else() {
-    if !Path::new(FOLDER)
+/// Runs both variants of a device, and holds that they are found to be what is listed.
+fn is_found_as_listed(device: &Device) {
+    let folder = device.folder;
+    if !Path::new(folder)
         .join("node_modules/vda-5050-lib/package.json")
         .exists()
     {
-        let missing = format!("the foreign vehicle is not installed: run `npm ci` in {FOLDER}");
+        let missing = format!("the foreign device is not installed: run `npm ci` in {folder}");
         assert!(std::env::var_os("CI").is_none(), "{missing}");
         eprintln!("skipped: {missing}");
         return;
     }
-    let benches = VEHICLES.map(|(vehicle, profile, of)| {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let benches = device.variants.map(|(variant, profile, of)| {
         let benches: Vec<Bench> = (1..=of)
-            .map(|shard| Bench::start(vehicle, profile, shard, of))
+            .map(|shard| Bench::start(folder, variant, profile, shard, of))
             .collect();
-        (vehicle, benches)
+        (variant, benches)
     });
     let mut report = String::new();
-    for (vehicle, benches) in benches {
+    for (variant, benches) in benches {
         let mut found = Found::default();
         for mut bench in benches {
             // Every bench is waited for, so that none is left behind.
-            let result = match bench.result() {
-                Ok(result) => result,
-                Err(why) => {
-                    let _ = writeln!(report, "{why}");
-                    continue;
-                }
-            };
-            for test in list(&result, "tests") {
-                if test["verdict"] == "error" {
-                    let _ = writeln!(report, "{vehicle}: {} is an error: {}", test["id"], test["reason"]);
-                }
-                for decision in list(test, "decisions") {
-                    found.add(
-                        &decision["requirement"],
-                        &decision["verdict"],
-                        &test["id"],
-                        &decision["message"],
-                    );
-                }
-            }
-            for monitor in list(&result, "monitors") {
-                for finding in list(monitor, "findings") {
-                    found.add(
-                        &finding["requirement"],
-                        &finding["verdict"],
-                        &monitor["id"],
-                        &finding["message"],
-                    );
-                }
+            match bench.result() {
+                Ok(result) => found.read(&result, variant, &mut report),
+                Err(why) => drop(writeln!(report, "{why}")),
             }
         }
-        let differences = differences(&expected(vehicle), &found);
+        let differences = differences(&expected(folder, variant), &found);
         if !differences.is_empty() {
-            let _ = writeln!(report, "{vehicle}:\n{differences}");
+            let _ = writeln!(report, "{variant}:\n{differences}");
         }
     }
     assert!(
         report.is_empty(),
-        "the findings differ from {FOLDER}/expected-findings.toml\n{report}"
+        "the findings differ from {folder}/expected-findings.toml\n{report}"
     );
 }
 
 #[test]
+fn the_harness_finds_in_a_foreign_vehicle_what_is_listed_and_nothing_else() {
+    is_found_as_listed(&AGV);
+}
+
+#[test]
+fn the_harness_finds_in_a_foreign_master_control_what_is_listed_and_nothing_else() {
+    is_found_as_listed(&MASTER_CONTROL);
+}
+
+#[test]
 fn every_expected_finding_is_listed_once_and_says_why() {
-    for (vehicle, ..) in VEHICLES {
+    let both = [AGV, MASTER_CONTROL];
+    let variants = both
+        .iter()
+        .flat_map(|device| device.variants.map(|(variant, ..)| (device.folder, variant)));
+    for (folder, variant) in variants {
         let mut seen = Verdicts::new();
-        for finding in expected(vehicle) {
+        for finding in expected(folder, variant) {
             let requirement = text(&finding, "requirement").to_owned();
             assert!(
                 !text(&finding, "because").trim().is_empty(),
@@ -263,7 +288,7 @@ fn every_expected_finding_is_listed_once_and_says_why() {
             );
             let kind = text(&finding, "kind");
             assert!(
-                ["true finding", "interpretation", "consequence"].contains(&kind),
+                ["true finding", "integration", "interpretation", "consequence"].contains(&kind),
                 "{requirement}: {kind}"
             );
             let verdict = text(&finding, "verdict").to_owned();
@@ -274,10 +299,10 @@ fn every_expected_finding_is_listed_once_and_says_why() {
             assert_eq!(
                 seen.insert(requirement.clone(), verdict),
                 None,
-                "{requirement} is listed twice for {vehicle}"
+                "{requirement} is listed twice for {variant}"
             );
         }
-        assert!(!seen.is_empty(), "nothing is expected of {vehicle}");
+        assert!(!seen.is_empty(), "nothing is expected of {variant} in {folder}");
     }
 }
 

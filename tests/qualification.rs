@@ -1,5 +1,5 @@
-//! Proof of every check, in virtual time: the faultless reference AGV passes everything without a warning, and
-//! every clause and monitor is failed by a named fault. The kill matrix is a snapshot.
+//! Proof of every check, in virtual time: the faultless reference device of each side passes everything without a
+//! warning, and every clause and monitor is failed by a named fault. The kill matrices are snapshots.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -7,19 +7,38 @@
     reason = "a test may fail by panicking"
 )]
 
-use vda5050_tck::pack::Pack;
-use vda5050_tck::reference::agv::{FAULTS, lapse};
-use vda5050_tck::run::{Decider, Library, Qualification, qualify};
+use vda5050_tck::pack::{Pack, Role};
+use vda5050_tck::run::{BuiltIn, Decider, Library, Qualification, qualify};
 use vda5050_tck::verdict::Verdict;
 
-/// Clauses and monitors no fault can fail yet: place, requirement, and why not.
-const UNPROVEN: &str = include_str!("qualification/unproven.tsv");
+/// What is excused on one side of the interface.
+struct Side {
+    role: Role,
+    /// Clauses and monitors no fault can fail: requirement, place, and why not.
+    unproven: &'static str,
+    /// Faults that no test or monitor finds, and why not.
+    unfound: &'static str,
+    /// Faults for which the report names something else first than what they break, and why.
+    first: &'static str,
+    /// Name of the snapshot.
+    matrix: &'static str,
+}
 
-/// Faults that no test or monitor finds yet, and why not: what they break is decided by tests to come.
-const UNFOUND: &str = include_str!("qualification/unfound.tsv");
+const AGV: Side = Side {
+    role: Role::Agv,
+    unproven: include_str!("qualification/unproven.tsv"),
+    unfound: include_str!("qualification/unfound.tsv"),
+    first: include_str!("qualification/first.tsv"),
+    matrix: "kill_matrix",
+};
 
-/// Faults with which another requirement is reported first, and why it is broken, too.
-const FIRST: &str = include_str!("qualification/first.tsv");
+const MASTER_CONTROL: Side = Side {
+    role: Role::MasterControl,
+    unproven: include_str!("qualification/master-control-unproven.tsv"),
+    unfound: include_str!("qualification/master-control-unfound.tsv"),
+    first: include_str!("qualification/master-control-first.tsv"),
+    matrix: "master_control_kill_matrix",
+};
 
 fn library() -> Library {
     Library::load(None).unwrap_or_else(|all| panic!("{}", all.iter().map(ToString::to_string).collect::<String>()))
@@ -44,13 +63,22 @@ fn table(text: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn every_check_passes_without_a_fault_and_is_failed_by_one() {
+fn every_check_of_an_agv_passes_without_a_fault_and_is_failed_by_one() {
+    prove(&AGV);
+}
+
+#[test]
+fn every_check_of_a_master_control_passes_without_a_fault_and_is_failed_by_one() {
+    prove(&MASTER_CONTROL);
+}
+
+fn prove(side: &Side) {
     let library = library();
     let pack = library.rules.packs.latest().clone();
-    let outcome = qualify(&library, &pack, FAULTS).expect("qualified");
-    assert_eq!(blemishes(&outcome), "", "not a pass on the faultless reference AGV");
+    let outcome = qualify(&library, &pack, side.role, BuiltIn::faults(side.role)).expect("qualified");
+    assert_eq!(blemishes(&outcome), "", "not a pass on the faultless reference device");
 
-    let excused = table(UNPROVEN);
+    let excused = table(side.unproven);
     let unproven: Vec<String> = outcome
         .unproven()
         .iter()
@@ -67,7 +95,7 @@ fn every_check_passes_without_a_fault_and_is_failed_by_one() {
         "these are proven by now; take them out of unproven.tsv:\n{old:#?}"
     );
 
-    let excused = table(UNFOUND);
+    let excused = table(side.unfound);
     let unfound: Vec<String> = outcome.missed().iter().map(|kill| kill.fault.name.to_owned()).collect();
     let new: Vec<_> = unfound
         .iter()
@@ -83,15 +111,15 @@ fn every_check_passes_without_a_fault_and_is_failed_by_one() {
         "these are found by now; take them out of unfound.tsv:\n{old:#?}"
     );
 
-    let outcome = retried(&library, &pack, outcome);
-    hold_to_failing(&outcome);
-    hold_to_what_is_first(&outcome);
-    insta::assert_snapshot!("kill_matrix", outcome.matrix());
+    let outcome = retried(&library, &pack, side.role, outcome);
+    hold_to_failing(side.role, &outcome);
+    hold_to_what_is_first(side, &outcome);
+    insta::assert_snapshot!(side.matrix, outcome.matrix());
 }
 
 /// What the report names first is what the fault breaks, or stands in the table with the reason.
-fn hold_to_what_is_first(outcome: &Qualification) {
-    let excused = table(FIRST);
+fn hold_to_what_is_first(side: &Side, outcome: &Qualification) {
+    let excused = table(side.first);
     let wrong = outcome.kills.iter().filter(|kill| !kill.named_first());
     let wrong = wrong.filter_map(|kill| {
         let (decider, _) = kill.first.as_ref()?;
@@ -117,10 +145,10 @@ fn hold_to_what_is_first(outcome: &Qualification) {
 }
 
 /// A fault that only brought a warning where it was tried is tried on everything.
-fn retried(library: &Library, pack: &Pack, mut outcome: Qualification) -> Qualification {
+fn retried(library: &Library, pack: &Pack, role: Role, mut outcome: Qualification) -> Qualification {
     for kill in &mut outcome.kills {
-        if kill.verdict != Some(Verdict::Fail) && lapse(kill.fault.name).is_none() {
-            let alone = qualify(library, pack, &[kill.fault]).expect("qualified");
+        if kill.verdict != Some(Verdict::Fail) && BuiltIn::lapse(role, kill.fault.name).is_none() {
+            let alone = qualify(library, pack, role, &[kill.fault]).expect("qualified");
             kill.verdict = alone.kills[0].verdict;
         }
     }
@@ -128,11 +156,11 @@ fn retried(library: &Library, pack: &Pack, mut outcome: Qualification) -> Qualif
 }
 
 /// A fault ends in a fail, and a lapse in no more than a warning, or undecided.
-fn hold_to_failing(outcome: &Qualification) {
+fn hold_to_failing(role: Role, outcome: &Qualification) {
     let named = |fails: bool| {
         let kills = outcome.kills.iter();
         let wrong = kills.filter(move |kill| {
-            (kill.verdict == Some(Verdict::Fail)) == fails && lapse(kill.fault.name).is_some() == fails
+            (kill.verdict == Some(Verdict::Fail)) == fails && BuiltIn::lapse(role, kill.fault.name).is_some() == fails
         });
         wrong.map(|kill| kill.fault.name).collect::<Vec<_>>()
     };
@@ -147,12 +175,15 @@ fn hold_to_failing(outcome: &Qualification) {
 #[test]
 fn the_older_version_passes_without_a_fault_too() {
     let library = library();
-    for pack in library.rules.packs.all() {
-        let outcome = qualify(&library, pack, &[]).expect("qualified");
-        assert_eq!(blemishes(&outcome), "", "VDA 5050 {}", pack.version);
+    for (role, pack) in [Role::Agv, Role::MasterControl]
+        .into_iter()
+        .flat_map(|role| library.rules.packs.all().iter().map(move |pack| (role, pack)))
+    {
+        let outcome = qualify(&library, pack, role, &[]).expect("qualified");
+        assert_eq!(blemishes(&outcome), "", "{role}, VDA 5050 {}", pack.version);
         assert!(
             outcome.deciders.len() > 100,
-            "VDA 5050 {}: only {} deciders",
+            "{role}, VDA 5050 {}: only {} deciders",
             pack.version,
             outcome.deciders.len()
         );

@@ -57,6 +57,17 @@ fn load() -> (Suites, Catalogue) {
             role: Role::Agv,
             parameters,
         })
+        // Any hook may be used to make a master control act.
+        .chain(
+            vda5050_tck::profile::HOOKS
+                .iter()
+                .filter(|hook| hook.role == Role::MasterControl)
+                .map(|hook| HookFacts {
+                    name: hook.name,
+                    role: hook.role,
+                    parameters: hook.parameters,
+                }),
+        )
         .collect();
     let suites = Suites::load(&assets, &packs, &catalogue, &known, &hooks).unwrap_or_else(|diagnostics| {
         for diagnostic in &diagnostics {
@@ -90,40 +101,43 @@ fn every_named_check_has_a_monitor_or_a_test() {
 }
 
 #[test]
-fn every_test_of_a_vehicle_decides_something() {
+fn every_test_decides_something() {
     let (suites, _) = load();
     for test in &suites.tests {
         assert!(!test.requirements().is_empty(), "{} decides nothing", test.id);
     }
 }
 
-/// Requirements of vehicles, and the tests and monitors that decide them.
+/// Requirements of each side, and the tests and monitors that decide them.
 #[test]
 fn the_requirements_covered_are_written_down() {
+    insta::assert_snapshot!("agv_requirements", covered(Role::Agv));
+    insta::assert_snapshot!("master_control_requirements", covered(Role::MasterControl));
+}
+
+fn covered(role: Role) -> String {
     let (suites, catalogue) = load();
     let mut by: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for test in suites.tests.iter().filter(|test| test.device == Role::Agv) {
+    for test in suites.tests.iter().filter(|test| test.device == role) {
         let file = test.id.split('[').next().unwrap_or_default();
         for requirement in test.requirements() {
             by.entry(requirement.to_string()).or_default().insert(file.to_owned());
         }
     }
-    for monitor in &suites.monitors {
+    let monitors = suites.monitors.iter();
+    for monitor in monitors.filter(|monitor| monitor.device.is_none_or(|device| device == role)) {
         for binding in &monitor.checks {
             let entry = by.entry(binding.requirement.to_string()).or_default();
             entry.insert(format!("monitor {}", monitor.id));
         }
     }
     let mut text = String::new();
-    for requirement in catalogue
-        .all()
-        .filter(|requirement| requirement.role.concerns(Role::Agv))
-    {
+    for requirement in catalogue.all().filter(|requirement| requirement.role.concerns(role)) {
         let deciders = by.get(requirement.id.as_str()).map_or_else(
             || "-".to_owned(),
             |names| names.iter().cloned().collect::<Vec<_>>().join(", "),
         );
         let _ = writeln!(text, "{}: {deciders}", requirement.id);
     }
-    insta::assert_snapshot!("agv_requirements", text);
+    text
 }

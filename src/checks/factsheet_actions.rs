@@ -85,7 +85,7 @@ impl Running for Predefined {
 }
 
 /// How a name is like a predefined one.
-enum How {
+pub(super) enum How {
     /// It is the same but for case and separators, and stands in its place.
     Respelled,
     /// It has all of its words.
@@ -93,14 +93,14 @@ enum How {
 }
 
 /// A name that is not predefined, and what it is like.
-struct Odd<'a> {
-    name: &'a str,
-    like: &'a str,
-    how: How,
+pub(super) struct Odd<'a> {
+    pub name: &'a str,
+    pub like: &'a str,
+    pub how: How,
 }
 
 /// Every name that is like a known one and none itself.
-fn look<'a>(names: &'a [&'a str], known: &'a [&'a str]) -> impl Iterator<Item = Odd<'a>> {
+pub(super) fn look<'a>(names: &'a [&'a str], known: &'a [&'a str]) -> impl Iterator<Item = Odd<'a>> {
     let others = names.iter().copied().filter(|name| !known.contains(name));
     others.filter_map(|name| {
         let respelled = known.iter().copied().find(|like| plain(like) == plain(name));

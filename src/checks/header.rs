@@ -10,6 +10,7 @@ use regex::Regex;
 use super::traffic::{Traffic, broken, quote, remark, says_broken};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
+use crate::pack::Role;
 
 /// How far the clock of a device may be off before it is remarked on.
 const CLOCK_TOLERANCE: Duration = Duration::from_secs(300);
@@ -29,7 +30,8 @@ pub(super) const IDENTITY: Check = Check {
     name: "header/identity",
     decides: &["HDR-05", "TOPIC-04", "TOPIC-05", "TOPIC-06"],
     doc: "manufacturer and serialNumber name the vehicle, the same one in every message. Empty, or other than in the \
-          topic, is a warning. The serial number keeps to its characters, and neither holds a slash.",
+          topic, is a warning; a master control that names anybody else than the vehicle it sends to breaks HDR-05. The \
+          serial number keeps to its characters, and neither holds a slash.",
     arguments: &[],
     start: |_| Box::new(Identity::default()),
 };
@@ -118,7 +120,11 @@ impl Running for Identity {
                     message.name,
                     quote(own)
                 );
-                findings.push(remark("TOPIC-04", seq, text));
+                findings.push(remark("TOPIC-04", seq, text.clone()));
+                // The harness knows its own vehicles; only an AGV under test may be called otherwise in its topics.
+                if context.role == Role::MasterControl {
+                    findings.push(broken("HDR-05", seq, text));
+                }
             }
             if value.contains('/') {
                 findings.push(broken(
@@ -135,7 +141,7 @@ impl Running for Identity {
         let identity = (bounded(manufacturer), bounded(serial));
         match &self.seen {
             None => self.seen = Some(identity),
-            Some(seen) if *seen != identity => {
+            Some(seen) if *seen != identity && context.role == Role::Agv => {
                 let text = format!(
                     "{} on {} names {} {}, an earlier message named {} {}",
                     "the header",

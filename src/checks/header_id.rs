@@ -10,6 +10,7 @@ use super::traffic::{Traffic, broken, remark, says_broken, show, unclear};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
+use crate::pack::Role;
 
 /// See the module.
 pub(super) const ID_RISES: Check = Check {
@@ -21,6 +22,9 @@ pub(super) const ID_RISES: Check = Check {
     arguments: &[],
     start: |_| Box::new(IdRises::default()),
 };
+
+/// Hooks of a master control after which it may count anew.
+const RESTARTS: [&str; 3] = ["start", "shutdown", "configure"];
 
 #[derive(Default)]
 struct IdRises {
@@ -38,6 +42,8 @@ impl Running for IdRises {
                 packet: Packet::Connect { .. },
                 ..
             } => self.last.clear(),
+            // What makes a master control act does not restart it.
+            Event::Hook { hook, .. } if context.role == Role::MasterControl && !RESTARTS.contains(&hook.as_str()) => {}
             // Messages may be lost on the way while the harness plays with the link or somebody with the device.
             Event::Fault { .. } | Event::Hook { .. } | Event::Answer { .. } | Event::Undecodable { .. } => {
                 self.last.clear();

@@ -47,6 +47,13 @@ pub(super) const SCHEMA: Check = Check {
         "FACT-09",
         "FACT-10",
         "VIS-01",
+        "ORD-MSG-01",
+        "ORD-MSG-03",
+        "ORD-MSG-05",
+        "ORD-MSG-15",
+        "ORD-MSG-16",
+        "ORD-MSG-18",
+        "IACT-01",
     ],
     doc: "Every message obeys the schema of its topic, written from the field tables of the document. A finding counts \
           for JSON-10, for the rule on JSON types or literals it breaks, and for the requirement of the field.",
@@ -68,27 +75,78 @@ struct Schema {
     traffic: Traffic,
     /// The member names of each topic's messages.
     members: BTreeMap<String, Vec<String>>,
+    /// The same of what is inside of commands: topic and path.
+    inner: Vec<(&'static str, &'static [&'static str], Vec<String>)>,
 }
 
 impl Schema {
     fn new(context: &CheckContext<'_>) -> Self {
         let names = context.topics.keys();
         let members = names.filter_map(|name| Some((name.clone(), context.pack.schema(name)?.members(&[]))));
+        let inner = INNER
+            .iter()
+            .filter_map(|(topic, path)| Some((*topic, *path, context.pack.schema(topic)?.members(path))));
         Self {
             traffic: Traffic::default(),
             members: members.collect(),
+            inner: inner.collect(),
         }
     }
 
     /// Members that are known ones but for their spelling.
     fn misspelled(&self, topic: &str, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
-        let Some(known) = self.members.get(topic) else { return };
-        let odd = value.as_object().into_iter().flatten().map(|(name, _)| name);
-        for name in odd.filter(|name| name.len() < 64 && !known.contains(name)).take(16) {
-            if let Some(meant) = known.iter().find(|known| plain(known) == plain(name)) {
-                let text = format!("member {} on {topic} is spelled {meant:?}", quote(name));
-                findings.push(broken("JSON-01", seq, text));
+        if let Some(known) = self.members.get(topic) {
+            odd_members(value, known, topic, seq, findings);
+        }
+        for (_, path, known) in self.inner.iter().filter(|(of, ..)| *of == topic) {
+            let mut inside = vec![value];
+            for name in *path {
+                inside = inside
+                    .into_iter()
+                    .flat_map(|value| inner(value, name))
+                    .take(INSIDE)
+                    .collect();
             }
+            let before = findings.len();
+            for value in inside {
+                odd_members(value, known, topic, seq, findings);
+            }
+            // The same mistake is made everywhere; once is enough.
+            findings.truncate(before + 1);
+        }
+    }
+}
+
+/// What is inside of commands and has members of its own.
+const INNER: [(&str, &[&str]); 9] = [
+    ("order", &["nodes"]),
+    ("order", &["nodes", "nodePosition"]),
+    ("order", &["nodes", "actions"]),
+    ("order", &["nodes", "actions", "actionParameters"]),
+    ("order", &["edges"]),
+    ("order", &["edges", "actions"]),
+    ("order", &["edges", "corridor"]),
+    ("order", &["edges", "trajectory"]),
+    ("instantActions", &["actions"]),
+];
+/// How many of them are looked at.
+const INSIDE: usize = 512;
+
+fn inner<'v>(value: &'v Value, name: &str) -> Vec<&'v Value> {
+    match value.get(name) {
+        Some(Value::Array(list)) => list.iter().take(INSIDE).collect(),
+        Some(one) => vec![one],
+        None => Vec::new(),
+    }
+}
+
+/// Members that are known ones but for their spelling.
+fn odd_members(value: &Value, known: &[String], topic: &str, seq: u64, findings: &mut Vec<CheckFinding>) {
+    let odd = value.as_object().into_iter().flatten().map(|(name, _)| name);
+    for name in odd.filter(|name| name.len() < 64 && !known.contains(name)).take(16) {
+        if let Some(meant) = known.iter().find(|known| plain(known) == plain(name)) {
+            let text = format!("member {} on {topic} is spelled {meant:?}", quote(name));
+            findings.push(broken("JSON-01", seq, text));
         }
     }
 }
@@ -151,6 +209,9 @@ fn requirements(topic: &str, finding: &Finding, value: &Value) -> Vec<&'static s
     if topic == "visualization" && !all.contains(&"VIS-01") {
         all.push("VIS-01");
     }
+    if topic == "instantActions" && all.ends_with(&["ORD-MSG-15"]) {
+        all.push("IACT-01");
+    }
     if all.ends_with(&["STATE-MSG-01"]) && finding.kind == FindingKind::Missing {
         all.push("STATE-01");
     }
@@ -186,6 +247,7 @@ fn of_field(topic: &str, path: &[&str], kind: FindingKind) -> Option<&'static st
         // A check of its own tells apart what is wrong with a trajectory.
         ("state", "edgeStates") if path.contains(&"trajectory") => None,
         ("state", "nodeStates" | "edgeStates") => Some("STATE-MSG-13"),
+        ("order" | "instantActions", _) => of_command(topic, path, kind),
         ("factsheet", _) if path.len() == 1 && missing => Some("FACT-02"),
         ("factsheet", "typeSpecification") => Some("FACT-03"),
         ("factsheet", "physicalParameters") => Some("FACT-04"),
@@ -195,6 +257,46 @@ fn of_field(topic: &str, path: &[&str], kind: FindingKind) -> Option<&'static st
         ("factsheet", "agvGeometry") => Some("FACT-08"),
         ("factsheet", "loadSpecification") => Some("FACT-09"),
         ("factsheet", "vehicleConfig") => Some("FACT-10"),
+        _ => None,
+    }
+}
+
+/// Fields of orders and instant actions. Arrays that are left out, parameters, trajectories, corridors and the ranges
+/// of positions have checks of their own.
+fn of_command(topic: &str, path: &[&str], kind: FindingKind) -> Option<&'static str> {
+    let missing = kind == FindingKind::Missing;
+    let in_action = path
+        .iter()
+        .rposition(|name| *name == "actions")
+        .map(|at| &path[at + 1..]);
+    match (topic, path) {
+        ("order", ["zoneSetId", ..]) => Some("ORD-MSG-03"),
+        ("order", ["edges"]) if missing => None,
+        ("order", [_]) => Some("ORD-MSG-01"),
+        ("instantActions", ["actions"]) => Some("IACT-01"),
+        _ if path
+            .iter()
+            .any(|name| matches!(*name, "actionParameters" | "trajectory" | "corridor")) =>
+        {
+            None
+        }
+        _ if in_action.is_some_and(|rest| !rest.is_empty()) => Some(match kind {
+            FindingKind::Enumeration => "ORD-MSG-16",
+            _ => "ORD-MSG-15",
+        }),
+        (_, [.., "actions"]) if missing => None,
+        ("order", ["nodes", _, "nodePosition", ..]) if kind == FindingKind::Range => None,
+        ("order", ["nodes", ..]) => Some("ORD-MSG-05"),
+        ("order", ["edges", _, "orientationType"]) => Some("ORD-MSG-16"),
+        (
+            "order",
+            ["edges", _]
+            | [
+                "edges",
+                _,
+                "edgeId" | "sequenceId" | "released" | "startNodeId" | "endNodeId" | "actions",
+            ],
+        ) => Some("ORD-MSG-18"),
         _ => None,
     }
 }

@@ -8,11 +8,13 @@
 //! stale, and tests send broken messages on purpose. Memory is bounded whatever a device sends.
 
 mod blocking;
+mod commands;
 mod connection;
 mod errors;
 mod errors_ready;
 mod factsheet;
 mod factsheet_actions;
+mod fleet;
 mod header;
 mod header_id;
 mod message;
@@ -41,7 +43,7 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 
 use crate::journal::Entry;
-use crate::pack::{Pack, RequirementId};
+use crate::pack::{Pack, RequirementId, Role};
 use crate::verdict::Verdict;
 
 /// What a check may know besides the entries.
@@ -51,7 +53,9 @@ pub struct CheckContext<'a> {
     pub pack: &'a Pack,
     /// Full topic by topic name.
     pub topics: &'a std::collections::BTreeMap<String, String>,
-    /// Manufacturer and serial number of the device.
+    /// The side under test.
+    pub role: Role,
+    /// Manufacturer and serial number of the device, or of the vehicle a master control commands.
     pub identity: (&'a str, &'a str),
     /// Arguments given by the test or monitor, variables filled in.
     pub with: &'a Map<String, Value>,
@@ -130,6 +134,7 @@ pub fn find(name: &str) -> Option<&'static Check> {
 static REGISTRY: &[Check] = &[
     message::SCHEMA,
     message::ENCODING,
+    fleet::COMMANDED,
     header_id::ID_RISES,
     header::TIMESTAMP,
     header::IDENTITY,
@@ -182,6 +187,43 @@ static REGISTRY: &[Check] = &[
     motion::AXES,
     motion::VELOCITY_SIGN,
     motion::MODE_SPEED,
+    commands::NODES_AND_EDGES,
+    commands::RELEASED,
+    commands::EDGE_ENDS,
+    commands::SEQUENCE,
+    commands::ARRAYS,
+    commands::POSITION,
+    commands::POSITION_RANGE,
+    commands::ZONE_SET,
+    commands::IDENTIFIERS,
+    commands::TOPICS,
+    commands::NODE_IDS,
+    commands::ACTION_IDS,
+    commands::SCOPES,
+    commands::IN_FACTSHEET,
+    commands::LOAD_DEVICE,
+    commands::VALUES,
+    commands::KEYS,
+    commands::MANDATORY,
+    commands::SIZES,
+    commands::ORDER_INTERVAL,
+    commands::OPTIONAL,
+    commands::REQUIRED,
+    commands::TRAJECTORY,
+    commands::ENDS,
+    commands::CORRIDORS,
+    commands::UPDATES,
+    commands::ORDER_IDS,
+    commands::RESENT,
+    commands::BASE_KEPT,
+    commands::START,
+    commands::CANCELLED_ON_NODE,
+    commands::CANCELLED_BETWEEN,
+    commands::AXES,
+    commands::ENABLED,
+    commands::DOWNLOADS,
+    commands::DUPLICATES,
+    commands::MODES,
 ];
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::event::{Event, Packet, Will};
 use crate::journal::{Entry, Parsed};
+use crate::pack::Role;
 
 /// How many open connections of a device are kept in mind.
 const CONNECTIONS: usize = 32;
@@ -16,8 +17,8 @@ const CONNECTIONS: usize = 32;
 /// `mqtt/quality`.
 pub(super) const QUALITY: Check = Check {
     name: "mqtt/quality",
-    decides: &["MQTT-07", "MQTT-08", "CONN-06", "FACT-01"],
-    doc: "state, visualization and factsheet are published with QoS 0 (higher is harmless, a warning), connection \
+    decides: &["MQTT-06", "MQTT-07", "MQTT-08", "CONN-06", "FACT-01"],
+    doc: "order, instantActions, state, visualization and factsheet are published with QoS 0 (higher is harmless, a warning), connection \
           with QoS 1 (2 is a warning); connection and factsheet with RETAIN, which only the tap can see here.",
     arguments: &[],
     start: |_| Box::new(Quality::default()),
@@ -29,7 +30,8 @@ pub(super) const CONNECT: Check = Check {
     decides: &["MQTT-01", "CONN-01", "CONN-02", "CONN-03", "CONN-04"],
     doc: "The connection on which the device publishes uses MQTT 3.1.1 or newer, registers a retained last will with \
           QoS 1 on the connection topic that says the connection is broken, and keeps alive about every 15 s. Other \
-          connections of the device are not held to this.",
+          connections of the device are not held to this. Of a master control only the version of MQTT is judged, on every \
+          connection.",
     arguments: &[],
     start: |_| Box::new(Connect::default()),
 };
@@ -49,6 +51,7 @@ impl Running for Quality {
         let (name, qos) = (message.name, message.qos);
         let text = format!("{name} is published with QoS {qos}");
         match (name, qos) {
+            ("order" | "instantActions", 1..) => findings.push(remark("MQTT-06", seq, text)),
             ("state" | "visualization" | "factsheet", 1..) => findings.push(remark("MQTT-07", seq, text)),
             // To a subscriber the will looks like any message; its QoS is judged in the CONNECT packet.
             ("connection", 0) if self.traffic.tap || !entry.json().is_some_and(says_broken) => {
@@ -101,6 +104,10 @@ impl Running for Connect {
                 },
         } = entry.event()
         {
+            if context.role == Role::MasterControl {
+                findings.extend(too_old(*level, entry.seq()));
+                return true;
+            }
             if self.open.len() == CONNECTIONS {
                 self.open.pop_front();
             }
@@ -147,13 +154,15 @@ impl Running for Connect {
     }
 }
 
+fn too_old(level: u8, seq: u64) -> Option<CheckFinding> {
+    let text = format!("protocol level {level} is older than MQTT 3.1.1");
+    (level < 4).then(|| broken("MQTT-01", seq, text))
+}
+
 impl Opened {
     fn judge(&self, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         let seq = self.seq;
-        if self.level < 4 {
-            let text = format!("protocol level {} is older than MQTT 3.1.1", self.level);
-            findings.push(broken("MQTT-01", seq, text));
-        }
+        findings.extend(too_old(self.level, seq));
         if !(10..=20).contains(&self.keep_alive) {
             let text = match self.keep_alive {
                 0 => "keep-alive is switched off: a silent loss of the device goes unnoticed".to_owned(),

@@ -79,12 +79,25 @@ impl Running for Names {
         let Some(name) = context.topics.keys().find(|name| plain(name) == plain(last)) else {
             return false;
         };
+        // A master control has topics of its own for other things than vehicles.
+        if context.role == Role::MasterControl && !names_vehicle(topic, context) {
+            return false;
+        }
         if last != name && self.seen.first(topic) {
             let text = format!("the last level of {} is no topic name; meant is {name:?}", quote(topic));
             findings.push(broken("TOPIC-01", entry.seq(), text));
         }
         last != name
     }
+}
+
+/// Whether a topic is about the vehicle, or about one of the same manufacturer.
+fn names_vehicle(topic: &str, context: &CheckContext<'_>) -> bool {
+    let (manufacturer, serial) = context.identity;
+    topic.split('/').any(|level| {
+        let level = level.trim_matches('$');
+        level == manufacturer || level == serial
+    })
 }
 
 /// A name without what people vary: case, underscores, hyphens.
@@ -153,6 +166,9 @@ impl Structure {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         let levels: Vec<&str> = topic.split('/').collect();
+        if context.role == Role::MasterControl {
+            return self.command_elsewhere(topic, &levels, entry, context, findings);
+        }
         let [_, level, manufacturer, serial, name] = levels[..] else {
             return false;
         };
@@ -168,6 +184,45 @@ impl Structure {
             findings.push(remark("TOPIC-03", entry.seq(), text));
         }
         judged
+    }
+
+    /// An order or instant action for the vehicle on another topic than its own, which nobody listens to.
+    fn command_elsewhere(
+        &mut self,
+        topic: &str,
+        levels: &[&str],
+        entry: &Entry,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let name = levels.last().copied().unwrap_or_default().trim_matches('$');
+        let commands = context
+            .pack
+            .topic(name)
+            .is_some_and(|rule| rule.publisher == Role::MasterControl);
+        let known = context.topic_name(topic).is_some();
+        if known || !commands || !names_vehicle(topic, context) || !self.seen.first(topic) {
+            return false;
+        }
+        let (shown, seq) = (quote(topic), entry.seq());
+        if topic.contains('$') {
+            findings.push(remark("TOPIC-07", seq, format!("{shown} holds a dollar sign")));
+        }
+        let usual = context
+            .topics
+            .get(name)
+            .map(|usual| usual.split('/').collect::<Vec<_>>());
+        let Some(usual) = usual.filter(|usual| usual.len() == 5) else {
+            return true;
+        };
+        if levels.len() != usual.len() {
+            let text = format!("{shown} has {} levels instead of five", levels.len());
+            findings.push(remark("TOPIC-02", seq, text));
+        } else if levels[1] != usual[1] && levels[2..4] == usual[2..4] {
+            let text = format!("the second level of {shown} is not {:?}", usual[1]);
+            findings.push(remark("TOPIC-03", seq, text));
+        }
+        true
     }
 }
 
@@ -186,7 +241,7 @@ impl Running for OwnSide {
             return false;
         };
         if self.traffic.published(entry, context).is_none() {
-            let owner = match self.traffic.role {
+            let owner = match context.role {
                 Role::Agv => "master control",
                 Role::MasterControl => "the vehicle",
             };

@@ -10,7 +10,7 @@ use super::{CheckContext, CheckFinding, find};
 use crate::clock::{Moment, Stamp};
 use crate::journal::event::{Close, Direction, Event, LinkFault, Occurrence, Packet, RunHeader, Source, Will};
 use crate::journal::{Entry, Journal, Payload};
-use crate::pack::{Assets, Pack, Packs};
+use crate::pack::{Assets, Pack, Packs, Role};
 use crate::verdict::Verdict;
 
 /// A run under construction.
@@ -24,6 +24,7 @@ pub(super) struct Trace {
     pub prefix: String,
     /// The serial number of the vehicle in its topics.
     pub serial: String,
+    role: Role,
 }
 
 /// What came out: requirement, verdict and message of each finding, and whether anything was judged.
@@ -61,15 +62,25 @@ pub(super) fn merged(mut base: Value, over: &Value) -> Value {
 impl Trace {
     /// A run seen by a subscriber.
     pub fn subscriber() -> Self {
-        Self::new("subscriber")
+        Self::new("subscriber", Role::Agv)
+    }
+
+    /// A run with a master control under test, seen by a subscriber.
+    pub fn master_control() -> Self {
+        Self::new("subscriber", Role::MasterControl)
+    }
+
+    /// The same seen at the tap.
+    pub fn master_control_at_tap() -> Self {
+        Self::new("tap", Role::MasterControl)
     }
 
     /// A run seen at the tap.
     pub fn tap() -> Self {
-        Self::new("tap")
+        Self::new("tap", Role::Agv)
     }
 
-    fn new(vantage: &str) -> Self {
+    fn new(vantage: &str, role: Role) -> Self {
         let utc: jiff::Timestamp = "2026-01-01T12:00:00Z".parse().unwrap();
         let mut trace = Self {
             journal: Journal::new(),
@@ -81,10 +92,11 @@ impl Trace {
             with: Map::new(),
             prefix: format!("uagv/v{}/acme/7", pack().version.major),
             serial: "7".to_owned(),
+            role,
         };
         let header = RunHeader {
             vantage: vantage.to_owned(),
-            role: "agv".to_owned(),
+            role: role.word().to_owned(),
             ..RunHeader::default()
         };
         trace.add(
@@ -168,6 +180,29 @@ impl Trace {
             payload: payload(value),
         };
         self.add(Source::Harness, Some(Direction::ToDevice), event)
+    }
+
+    /// The mock vehicle publishes a state, changed by `over`.
+    pub fn shows(&mut self, over: &Value) -> &mut Self {
+        let state = merged(self.header(), &idle());
+        let state = merged(state, over);
+        self.sent("state", &state)
+    }
+
+    /// The master control sends an order or instant actions, with a full header.
+    pub fn commands(&mut self, name: &str, message: &Value) -> &mut Self {
+        let message = merged(self.header(), message);
+        self.message(name, &message)
+    }
+
+    /// The harness does something to its mock vehicle.
+    pub fn vehicle(&mut self, what: &str) -> &mut Self {
+        let event = Event::Vehicle {
+            vehicle: 0,
+            what: what.to_owned(),
+            with: json!({}),
+        };
+        self.add(Source::Harness, None, event)
     }
 
     /// The harness sends an instant action.
@@ -255,6 +290,7 @@ impl Trace {
             hook: "power-cycle".into(),
             ok: true,
             detail: String::new(),
+            vehicle: None,
         };
         self.add(Source::Operator, None, event)
     }
@@ -280,6 +316,7 @@ impl Trace {
         let context = CheckContext {
             pack: &pack,
             topics: &topics,
+            role: self.role,
             identity: ("acme", &self.serial),
             with: &self.with,
             bindings: &bindings,

@@ -14,24 +14,12 @@ use crate::verdict::Verdict;
 pub(super) const HEADER: [&str; 5] = ["headerId", "timestamp", "version", "manufacturer", "serialNumber"];
 
 /// What a check has learned about the run from the entries so far.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Traffic {
-    /// The side under test.
-    pub role: Role,
     /// Whether packets are seen, so that what the device really published is known.
     pub tap: bool,
     /// Whether the harness disturbs the link right now.
     pub disturbed: bool,
-}
-
-impl Default for Traffic {
-    fn default() -> Self {
-        Self {
-            role: Role::Agv,
-            tap: false,
-            disturbed: false,
-        }
-    }
 }
 
 impl Traffic {
@@ -40,9 +28,6 @@ impl Traffic {
         match entry.event() {
             Event::RunBegun { header } => {
                 self.tap = header.vantage == "tap";
-                if header.role == Role::MasterControl.word() {
-                    self.role = Role::MasterControl;
-                }
             }
             Event::Opened { .. } | Event::Packet { .. } => self.tap = true,
             Event::Fault { fault } => self.disturbed = *fault != LinkFault::Restore,
@@ -52,6 +37,7 @@ impl Traffic {
 
     /// A message of the device under test that was delivered live. Retained deliveries are stale: nobody
     /// knows when, or by which firmware, they were sent.
+    #[expect(clippy::unused_self, reason = "asked in one breath with `published`, which needs it")]
     pub fn delivered<'c>(self, entry: &Entry, context: &'c CheckContext<'_>) -> Option<Delivered<'c>> {
         let Event::Message {
             topic,
@@ -64,7 +50,7 @@ impl Traffic {
             return None;
         };
         let name = context.topic_name(topic)?;
-        (publisher(name, context) == Some(self.role)).then_some(Delivered {
+        (publisher(name, context) == Some(context.role)).then_some(Delivered {
             name,
             qos: *qos,
             retain: None,
@@ -80,7 +66,7 @@ impl Traffic {
         }
         let (_, topic, qos, retain, dup, _) = device_publish(entry)?;
         let name = context.topic_name(topic)?;
-        (publisher(name, context) == Some(self.role)).then_some(Delivered {
+        (publisher(name, context) == Some(context.role)).then_some(Delivered {
             name,
             qos,
             retain: Some(retain),

@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
-use crate::pack::Pack;
+use crate::pack::{Pack, Role};
 use crate::profile::{self, Claim, Effective, Place, SAMPLE_ACTIONS};
-use crate::reference::agv::TOLERANCES;
-use crate::run::{Library, ReferenceAgv};
+use crate::run::{BuiltIn, Library};
 
 /// The protocol version the device is judged by.
 pub(super) fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Problem> {
@@ -24,18 +23,18 @@ pub(super) fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pa
     })
 }
 
-/// Refuses a fault the reference AGV does not have.
-pub(super) fn check_faults(faults: &[String]) -> Result<(), Problem> {
-    use crate::reference::agv::FAULTS;
+/// Refuses a fault the reference device of this role does not have.
+pub(super) fn check_faults(role: Role, faults: &[String]) -> Result<(), Problem> {
+    let known = BuiltIn::faults(role);
     for fault in faults {
-        if !FAULTS.iter().any(|known| known.name == fault) {
-            let names = FAULTS.iter().map(|known| known.name);
-            let hint = match crate::diagnostic::closest(fault, names) {
+        if !known.iter().any(|known| known.name == fault) {
+            let hint = match crate::diagnostic::closest(fault, known.iter().map(|known| known.name)) {
                 Some(close) => format!("did you mean `{close}`?"),
                 None => "`vda5050-tck list faults` shows them all".to_owned(),
             };
+            let device = reference_device(role);
             return Err(
-                Diagnostic::whole("unknown-fault", format!("the reference AGV has no fault `{fault}`"))
+                Diagnostic::whole("unknown-fault", format!("the {device} has no fault `{fault}`"))
                     .hint(hint)
                     .into(),
             );
@@ -44,12 +43,21 @@ pub(super) fn check_faults(faults: &[String]) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Gives the reference AGV its liberties, and refuses one it does not have.
-pub(super) fn tolerate(device: &mut ReferenceAgv, tolerances: &[String]) -> Result<(), Problem> {
+/// What the built-in device of a role is called.
+fn reference_device(role: Role) -> &'static str {
+    match role {
+        Role::Agv => "reference AGV",
+        Role::MasterControl => "reference master control",
+    }
+}
+
+/// Gives the built-in device its liberties, and refuses one it does not have.
+pub(super) fn tolerate(device: &mut BuiltIn, tolerances: &[String]) -> Result<(), Problem> {
     for name in tolerances {
+        let role = device.role();
         device.tolerate(name).map_err(|unknown| {
-            let names = TOLERANCES.iter().map(|known| known.name);
-            let hint = match crate::diagnostic::closest(name, names) {
+            let hint = match crate::diagnostic::closest(name, BuiltIn::tolerances(role).iter().map(|known| known.name))
+            {
                 Some(close) => format!("did you mean `{close}`?"),
                 None => "`vda5050-tck list tolerances` shows them all".to_owned(),
             };

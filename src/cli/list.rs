@@ -11,10 +11,10 @@ use super::problem::Problem;
 use crate::checks;
 use crate::diagnostic::{self, Diagnostic};
 use crate::pack::{Pack, Requirement, Role};
-use crate::profile::HOOKS;
-use crate::reference::agv::{FAULTS, TOLERANCES, lapse};
+use crate::profile::{HOOKS, VEHICLE_WORDS};
+use crate::reference::Fault;
 use crate::report::coverage;
-use crate::run::{Library, sources};
+use crate::run::{BuiltIn, Library, sources};
 use crate::suite::model::{Monitor, Rule, Test, Verb};
 use crate::ui::{self, Output};
 
@@ -67,20 +67,37 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
             }
             text
         }
-        (Listing::Faults, Format::Text) => ui::faults(FAULTS),
-        (Listing::Faults, Format::Json) => {
-            lines(FAULTS.iter().map(|fault| json!({ "name": fault.name, "breaks": fault.breaks, "wrong": fault.wrong, "lapse": lapse(fault.name) })))
+        (Listing::Faults, Format::Text) => {
+            let all = roles.iter().map(|role| format!("{role}\n\n{}\n", ui::faults(BuiltIn::faults(*role), |name| BuiltIn::lapse(*role, name))));
+            all.collect()
         }
-        (Listing::Tolerances, Format::Text) => ui::tolerances(TOLERANCES),
-        (Listing::Tolerances, Format::Json) => lines(
-            TOLERANCES.iter().map(|one| json!({ "name": one.name, "under": one.under, "does": one.does })),
-        ),
+        (Listing::Faults, Format::Json) => {
+            let all = roles.iter().flat_map(|role| BuiltIn::faults(*role).iter().map(move |fault| (role, fault)));
+            lines(all.map(|(role, fault)| json!({ "name": fault.name, "role": role.word(), "breaks": fault.breaks, "wrong": fault.wrong, "lapse": BuiltIn::lapse(*role, fault.name) })))
+        }
+        (Listing::Tolerances, Format::Text) => {
+            let all = roles.iter().map(|role| format!("{role}\n\n{}\n", ui::tolerances(BuiltIn::tolerances(*role))));
+            all.collect()
+        }
+        (Listing::Tolerances, Format::Json) => {
+            let all = roles.iter().flat_map(|role| BuiltIn::tolerances(*role).iter().map(move |one| (role, one)));
+            lines(all.map(|(role, one)| json!({ "name": one.name, "role": role.word(), "under": one.under, "does": one.does })))
+        }
         (Listing::Hooks, Format::Text) => ui::hooks(HOOKS),
         (Listing::Hooks, Format::Json) => lines(HOOKS.iter().map(|hook| {
             json!({ "name": hook.name, "role": hook.role.word(), "parameters": hook.parameters, "doc": hook.doc })
         })),
+        (Listing::Vehicle, Format::Text) => ui::vehicle_words(VEHICLE_WORDS),
+        (Listing::Vehicle, Format::Json) => lines(VEHICLE_WORDS.iter().map(|word| {
+            json!({ "name": word.name, "parameters": word.parameters, "doc": word.doc })
+        })),
     };
     super::print(&text)
+}
+
+/// The faults of both reference devices.
+fn all_faults() -> impl Iterator<Item = &'static Fault> {
+    [Role::Agv, Role::MasterControl].into_iter().flat_map(BuiltIn::faults)
 }
 
 fn lines(all: impl Iterator<Item = serde_json::Value>) -> String {
@@ -213,7 +230,7 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             let _ = writeln!(text, "parameters: {}", hook.parameters.join(", "));
         }
     }
-    if let Some(fault) = FAULTS.iter().find(|fault| fault.name == id) {
+    if let Some(fault) = all_faults().find(|fault| fault.name == id) {
         let _ = writeln!(
             text,
             "fault {id} of the reference AGV\n\n{}\n\nbreaks {}\ntry    vda5050-tck run --virtual --fault {id}",
@@ -231,7 +248,7 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             .chain(suites.monitors.iter().map(|monitor| monitor.id.as_str()))
             .chain(checks::registry().iter().map(|check| check.name))
             .chain(HOOKS.iter().map(|hook| hook.name))
-            .chain(FAULTS.iter().map(|fault| fault.name))
+            .chain(all_faults().map(|fault| fault.name))
             .collect();
         let hint = match diagnostic::closest(id, known) {
             Some(close) => format!("did you mean `{close}`?"),
@@ -302,8 +319,7 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
     for decider in deciders.iter().skip(1) {
         let _ = writeln!(text, "               {decider}");
     }
-    let breaking: Vec<&str> = FAULTS
-        .iter()
+    let breaking: Vec<&str> = all_faults()
         .filter(|fault| fault.breaks.contains(&id))
         .map(|fault| fault.name)
         .collect();

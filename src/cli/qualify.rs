@@ -7,28 +7,51 @@ use super::device::check_faults;
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::pack::Role;
-use crate::reference::agv::FAULTS;
-use crate::run::{Library, Qualification, qualify_tests};
+use crate::run::{BuiltIn, Library, Qualification, qualify_tests};
 
 /// `qualify`.
 pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
     let library = Library::load(arguments.suites.suites.as_deref())?;
-    check_faults(&arguments.fault)?;
+    let roles: Vec<Role> = match arguments.role {
+        Some(role) => vec![role],
+        None => vec![Role::Agv, Role::MasterControl],
+    };
+    // A fault or a test belongs to one side; the other one is left out without a word.
+    let known = |role: Role| {
+        let of_role = |name: &String| BuiltIn::faults(role).iter().any(|fault| fault.name == name);
+        arguments.fault.iter().all(of_role)
+    };
+    let with_faults: Vec<Role> = roles.iter().copied().filter(|role| known(*role)).collect();
+    if with_faults.is_empty() {
+        check_faults(roles.first().copied().unwrap_or(Role::Agv), &arguments.fault)?;
+    }
     let packs = match arguments.protocol.as_deref() {
         Some(wanted) => vec![super::pack(&library, Some(wanted))?],
         None => library.rules.packs.all().to_vec(),
     };
     let whole = arguments.tests.is_empty() && arguments.fault.is_empty();
-    let faults: Vec<_> = FAULTS
-        .iter()
-        .filter(|fault| arguments.fault.is_empty() || arguments.fault.iter().any(|name| name == fault.name))
-        .copied()
-        .collect();
     let mut exit = Exit::Conforms;
-    for pack in packs {
-        let all = library.tests(Role::Agv, &pack.id);
-        let tests = super::select::select(&all, &arguments.tests)?;
-        let outcome = qualify_tests(&library, &pack, &tests, &faults, &|_| {});
+    let mut refused = None;
+    let mut any = false;
+    for (role, pack) in with_faults
+        .iter()
+        .flat_map(|role| packs.iter().map(move |pack| (*role, pack)))
+    {
+        let faults: Vec<_> = BuiltIn::faults(role)
+            .iter()
+            .filter(|fault| arguments.fault.is_empty() || arguments.fault.iter().any(|name| name == fault.name))
+            .copied()
+            .collect();
+        let all = library.tests(role, &pack.id);
+        let tests = match super::select::select(&all, &arguments.tests) {
+            Ok(tests) => tests,
+            Err(problem) => {
+                refused.get_or_insert(problem);
+                continue;
+            }
+        };
+        any = true;
+        let outcome = qualify_tests(&library, pack, &tests, &faults, &|_| {});
         let outcome = outcome.map_err(|error| Problem::Environment(error.to_string()))?;
         // Faults of what a version does not have cannot show there.
         let newest = pack.id == library.rules.packs.latest().id;
@@ -38,12 +61,15 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
             exit = Exit::DoesNotConform;
         }
         let text = match arguments.format {
-            Format::Text => format!("VDA 5050 {}\n\n{}\n", pack.version, page(&outcome)),
-            Format::Json => format!("{}\n", data(&pack.version.to_string(), &outcome)),
+            Format::Text => format!("{role}, VDA 5050 {}\n\n{}\n", pack.version, page(&outcome)),
+            Format::Json => format!("{}\n", data(role, &pack.version.to_string(), &outcome)),
         };
         super::print(&text)?;
     }
-    Ok(exit)
+    match refused {
+        Some(problem) if !any => Err(problem.into()),
+        _ => Ok(exit),
+    }
 }
 
 fn page(outcome: &Qualification) -> String {
@@ -67,7 +93,7 @@ fn page(outcome: &Qualification) -> String {
     text
 }
 
-fn data(version: &str, outcome: &Qualification) -> serde_json::Value {
+fn data(role: Role, version: &str, outcome: &Qualification) -> serde_json::Value {
     let kills = outcome.kills.iter().map(|kill| {
         let deciders = kill.deciders.iter().map(|decider| json!({ "requirement": decider.requirement, "by": decider.place }));
         json!({ "fault": kill.fault.name, "breaks": kill.fault.breaks, "named": kill.named(), "killed": deciders.collect::<Vec<_>>() })
@@ -76,5 +102,5 @@ fn data(version: &str, outcome: &Qualification) -> serde_json::Value {
     let unproven = unproven
         .iter()
         .map(|decider| json!({ "requirement": decider.requirement, "by": decider.place }));
-    json!({ "protocol": version, "deciders": outcome.deciders.len(), "faults": kills.collect::<Vec<_>>(), "unproven": unproven.collect::<Vec<_>>() })
+    json!({ "role": role.word(), "protocol": version, "deciders": outcome.deciders.len(), "faults": kills.collect::<Vec<_>>(), "unproven": unproven.collect::<Vec<_>>() })
 }

@@ -1,5 +1,8 @@
 //! `run` and `certify`: test a device, write the evidence, say the verdict.
 
+mod conclude;
+mod hooks;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,25 +17,19 @@ use super::screen::Screen;
 use crate::clock::WallClock;
 use crate::course::Layout;
 use crate::diagnostic::Diagnostic;
-use crate::engine::{Composer, Engine, HookOutcome, Operator, Recorder};
+use crate::engine::{Composer, Engine, Operator, Recorder};
 use crate::journal::event::{Event, Occurrence, Setting};
 use crate::judge::RunJudge;
 use crate::link::mqtt::endpoint::{Credentials, Endpoint};
 use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
 use crate::link::{LinkError, Vantage};
-use crate::pack::Pack;
+use crate::pack::{Pack, Role};
 use crate::profile::{self, Effective, Profile, Surroundings, TimeLimits};
-use crate::reference::agv::Agv;
-use crate::report::result::RunResult;
-use crate::report::text;
-use crate::run::device_driver::RunningDevice;
-use crate::run::hooks::{DeviceProcess, ProfileHooks};
 use crate::run::{
-    Bundle, Capabilities, End, Finished, HeaderParts, Library, ReferenceAgv, Setup, Subject, VirtualRun, run,
-    run_virtually, sources, write_all, write_result,
+    BuiltIn, Bundle, Capabilities, Finished, Fleet, HeaderParts, Library, ReferenceAgv, ReferenceMasterControl, Setup,
+    Subject, USUAL_FLEET, VirtualRun, WithFleet, run, run_virtually, write_result,
 };
 use crate::suite::model::Test;
-use crate::verdict::Verdict;
 
 /// What `run` and `certify` have in common.
 struct Job {
@@ -45,6 +42,8 @@ struct Job {
     command: Vec<String>,
     run: String,
     no_motion: bool,
+    /// How many mock AGVs there are when a master control is tested.
+    vehicles: usize,
 }
 
 /// `run`.
@@ -81,11 +80,21 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         || !arguments.tolerance.is_empty()
         || arguments.vehicle.0 != crate::run::Vehicle::default();
     if !built_in && altered {
-        let title = "`--fault`, `--tolerance` and `--vehicle` are for the built-in reference AGV, and another device is \
-                     tested here";
+        let title = "`--fault`, `--tolerance` and `--vehicle` are for the built-in device, and another device is tested \
+                     here";
         return Err(Diagnostic::whole("usage", title).into());
     }
-    check_faults(&arguments.fault)?;
+    if role == Role::MasterControl && arguments.vehicle.0 != crate::run::Vehicle::default() {
+        let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
+        return Err(Diagnostic::whole("usage", title).into());
+    }
+    if role == Role::Agv && arguments.vehicles.is_some() {
+        let title = "`--vehicles` is for a master control under test, and an AGV is tested here";
+        return Err(Diagnostic::whole("usage", title)
+            .hint("add `--role master-control`")
+            .into());
+    }
+    check_faults(role, &arguments.fault)?;
     let job = Job {
         complete: tests.len() == all.len(),
         library,
@@ -96,6 +105,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         command: std::env::args().collect(),
         run,
         no_motion: arguments.device.no_motion,
+        vehicles: arguments.vehicles.map_or(USUAL_FLEET, |count| count as usize),
     };
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -172,15 +182,15 @@ impl Job {
     }
 
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let mut device = ReferenceAgv::of(arguments.vehicle.0, &self.pack);
+        let mut device = self.built_in_device(arguments);
         tolerate(&mut device, &arguments.tolerance)?;
         let utc = WallClock::start().now().utc;
-        let bundle = self.bundle(&device.subject, utc)?;
+        let bundle = self.bundle(device.subject(), utc)?;
         let writer = bundle
             .journal()
             .map_err(|error| Problem::Environment(error.to_string()))?;
-        let device_name = format!("{} {}", device.subject.manufacturer, device.subject.serial_number);
-        let mut request = VirtualRun::of(&self.library, &self.pack);
+        let device_name = device.subject().to_string();
+        let mut request = VirtualRun::of_role(device.role(), &self.library, &self.pack);
         request.device = device;
         request.faults.clone_from(&arguments.fault);
         request.tests.clone_from(&self.tests);
@@ -205,24 +215,36 @@ impl Job {
         self.conclude(&bundle, finished, terminal)
     }
 
+    fn built_in_device(&self, arguments: &args::Run) -> BuiltIn {
+        match self.effective.profile.device.role {
+            Role::Agv => ReferenceAgv::of(arguments.vehicle.0, &self.pack).into(),
+            Role::MasterControl => ReferenceMasterControl::with_vehicles(self.vehicles, &self.pack).into(),
+        }
+    }
+
     async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
-        let mut device = ReferenceAgv::of(arguments.vehicle.0, &self.pack);
+        let mut device = self.built_in_device(arguments);
         device.hurry();
         tolerate(&mut device, &arguments.tolerance)?;
-        let mut options = BenchOptions::loopback(device.subject.published(&self.pack));
+        let mut options = BenchOptions::loopback(match device.fleet() {
+            Some(fleet) => fleet.commanded(&self.pack),
+            None => device.subject().published(&self.pack),
+        });
         let bench = &self.effective.profile.bench;
         if arguments.device.listen.is_some() {
             options.listen.clone_from(&bench.listen);
         }
         options.broker = broker_choice(bench.broker.as_deref(), &self.effective.profile, None);
         let clock = options.clock;
-        let bundle = self.bundle(&device.subject, clock.origin_stamp().utc)?;
+        let bundle = self.bundle(device.subject(), clock.origin_stamp().utc)?;
         let (link, info) = MqttBench::start(options).await.map_err(link_problem)?;
         let faults: Vec<&str> = arguments.fault.iter().map(String::as_str).collect();
-        let agv = Agv::new(device.config.clone(), &faults)
-            .map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?;
         let endpoint = Endpoint::parse(&info.device_address, None, None).map_err(link_problem)?;
-        let operator = Commands(RunningDevice::start(agv, endpoint, clock, None));
+        let running = device.start(&faults, endpoint, clock);
+        let operator = hooks::Commands {
+            device: running.map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?,
+            hooks: device.hooks(),
+        };
         let capabilities = Capabilities {
             factsheet: None,
             statements: device.statements(),
@@ -237,15 +259,17 @@ impl Job {
             },
         };
         let session = SessionParts {
-            subject: device.subject.clone(),
-            time: device.time.clone(),
+            subject: device.subject().clone(),
+            time: device.time().clone(),
             device: device.device_bindings(),
-            layout: Some(device.layout.clone()),
+            layout: Some(device.layout().clone()),
             capabilities,
-            limits: vec!["The device is the built-in reference AGV.".to_owned()],
+            limits: vec![device.limit(false)],
             deviations: BTreeMap::new(),
+            fleet: device.fleet().cloned(),
         };
-        self.carry_out(session, &bundle, link, operator, clock, interrupt).await
+        let at = Surrounding { info: &info, clock };
+        self.carry_out(session, &bundle, link, operator, &at, interrupt).await
     }
 
     async fn device(
@@ -257,6 +281,10 @@ impl Job {
         let profile = self.effective.profile.clone();
         let subject = Self::subject(&profile)?;
         let layout = Layout::of_profile(&profile)?;
+        let fleet = match subject.role {
+            Role::Agv => None,
+            Role::MasterControl => Some(self.fleet(&profile, layout.as_ref())),
+        };
         let password = profile.bench.password.password(surroundings);
         let password = password.map_err(|error| Problem::from(Diagnostic::whole("password", error.to_string())))?;
         let credentials = profile.bench.username.clone().map(|username| Credentials {
@@ -265,7 +293,10 @@ impl Job {
                 .map(|password| password.reveal().to_owned())
                 .unwrap_or_default(),
         });
-        let mut options = BenchOptions::loopback(subject.published(&self.pack));
+        let mut options = BenchOptions::loopback(match &fleet {
+            Some(fleet) => fleet.commanded(&self.pack),
+            None => subject.published(&self.pack),
+        });
         options.listen.clone_from(&profile.bench.listen);
         options.tap = profile.bench.tap;
         options.maps_listen.clone_from(&profile.bench.maps_listen);
@@ -287,9 +318,11 @@ impl Job {
             .as_deref()
             .and_then(Path::parent)
             .map_or_else(PathBuf::new, Path::to_path_buf);
-        let operator = Self::hooks(&profile, &info, &bundle, &folder)?;
+        let operator = hooks::of_profile(&profile, &info, &bundle, &folder)?;
         eprintln!("the device is expected at mqtt://{}", info.device_address);
         let motion = match (self.no_motion, profile.motion.allowed) {
+            // The vehicles are the harness's own.
+            _ if fleet.is_some() => Ok(()),
             (true, _) => Err(NO_MOTION.to_owned()),
             (false, false) => Err("the profile does not allow motion ([motion] allowed = true)".to_owned()),
             (false, true) => Ok(()),
@@ -311,7 +344,8 @@ impl Job {
             subject,
             time: profile.time.clone(),
             device: profile.device.bindings(),
-            layout,
+            layout: layout.or_else(|| fleet.is_some().then(Layout::built_in)),
+            fleet,
             capabilities,
             limits,
             deviations: profile
@@ -320,7 +354,25 @@ impl Job {
                 .map(|deviation| (deviation.requirement.as_str().to_owned(), deviation.reason.clone()))
                 .collect(),
         };
-        self.carry_out(session, &bundle, link, operator, clock, interrupt).await
+        let at = Surrounding { info: &info, clock };
+        self.carry_out(session, &bundle, link, operator, &at, interrupt).await
+    }
+
+    /// The mock AGVs of a profile.
+    fn fleet(&self, profile: &Profile, layout: Option<&Layout>) -> Fleet {
+        let mut like = ReferenceAgv::new(&self.pack);
+        if let Some(layout) = layout {
+            like.live_on(layout.clone());
+        }
+        like.furnish(&profile.device.sample_actions);
+        like.subject.topic_template.clone_from(&profile.device.topic_template);
+        let wanted = &profile.vehicles;
+        let count = self.vehicles.max(wanted.serial_numbers.len());
+        let mut fleet = Fleet::new(&like, &wanted.manufacturer, &wanted.serial_numbers, count, &self.pack);
+        if let (Some(vehicle), Some(node)) = (fleet.vehicles.first_mut(), &wanted.start_node) {
+            vehicle.config.start_node.clone_from(node);
+        }
+        fleet
     }
 
     fn screen(&self, device: &str) -> Screen {
@@ -354,53 +406,19 @@ impl Job {
         })
     }
 
-    fn hooks(profile: &Profile, info: &BenchInfo, bundle: &Bundle, folder: &Path) -> Result<ProfileHooks, Problem> {
-        let (host, port) = info
-            .device_address
-            .rsplit_once(':')
-            .unwrap_or((&info.device_address, "1883"));
-        let device = &profile.device;
-        let common: BTreeMap<String, String> = [
-            ("broker-host", host.to_owned()),
-            ("broker-port", port.to_owned()),
-            ("manufacturer", device.manufacturer.clone().unwrap_or_default()),
-            ("serial-number", device.serial_number.clone().unwrap_or_default()),
-        ]
-        .into_iter()
-        .map(|(name, value)| (name.to_owned(), value))
-        .collect();
-        let mut process = device.command.as_ref().map(|command| {
-            let filled = command
-                .iter()
-                .map(|word| profile::fill(word, &common, str::to_owned))
-                .collect();
-            DeviceProcess::new(filled, folder.to_owned(), Some(bundle.folder().join("device.log")))
-        });
-        if let Some(process) = &mut process {
-            process
-                .start()
-                .map_err(|error| Problem::Environment(error.to_string()))?;
-        }
-        let attended = console::user_attended();
-        Ok(ProfileHooks::new(
-            profile.hooks.clone(),
-            common,
-            folder.to_owned(),
-            process,
-            attended,
-        ))
-    }
-
     async fn carry_out<O: Operator>(
         self,
         session: SessionParts,
         bundle: &Bundle,
         link: MqttLink,
         operator: O,
-        clock: WallClock,
+        at: &Surrounding<'_>,
         interrupt: watch::Receiver<bool>,
     ) -> Result<Exit, Problem> {
-        let device_name = format!("{} {}", session.subject.manufacturer, session.subject.serial_number);
+        let device_name = session.subject.to_string();
+        let mocks = session.fleet.as_ref();
+        let mocks = mocks.map_or_else(Vec::new, |fleet| fleet.mock_vehicles(&self.pack));
+        let vehicles = mocks.len();
         let header = HeaderParts {
             subject: &session.subject,
             pack: &self.pack,
@@ -410,11 +428,13 @@ impl Job {
             modified: self.library.assets.modified(),
             time: session.time.bindings(),
             device: session.device,
+            vehicles: mocks,
+            fleet: session.fleet.as_ref().map_or_else(Vec::new, Fleet::bindings),
             settings: settings(&self.effective),
             command: self.command.clone(),
         };
         let first = Occurrence::harness(
-            clock.now(),
+            at.clock.now(),
             Event::RunBegun {
                 header: Box::new(header.header()),
             },
@@ -424,12 +444,18 @@ impl Job {
             .map_err(|error| Problem::Environment(error.to_string()))?;
         let recorder = Recorder::begin(&self.library.rules, Some(writer), first);
         let recorder = recorder.map_err(|error| Problem::Environment(error.to_string()))?;
+        let operator = match &session.fleet {
+            None => WithFleet::alone(operator),
+            Some(fleet) => WithFleet::start(operator, fleet, &at.info.broker, at.clock, &link.reporter())
+                .map_err(|error| Problem::Environment(error.to_string()))?,
+        };
         let mut engine = Engine::new(link, operator, recorder, Composer::new(&self.run), interrupt);
         let setup = Setup {
             tests: self.tests.clone(),
             complete: self.complete,
             capabilities: session.capabilities,
             layout: session.layout,
+            vehicles,
             deviations: session.deviations,
             limits: session.limits,
             run: self.run.clone(),
@@ -437,7 +463,13 @@ impl Job {
         let mut terminal = self.screen(&device_name);
         let mut saved = |judge: &RunJudge| drop(write_result(bundle, &judge.result()));
         let end = run(&mut engine, setup, &mut terminal, &mut saved).await;
-        let Engine { link, recorder, .. } = engine;
+        let Engine {
+            link,
+            recorder,
+            operator,
+            ..
+        } = engine;
+        operator.stop().await;
         link.stop().await;
         let finished = Finished {
             result: recorder.judge().result(),
@@ -446,66 +478,6 @@ impl Job {
         };
         self.conclude(bundle, finished, terminal)
     }
-
-    /// Writes the bundle and says the verdict.
-    fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Screen) -> Result<Exit, Problem> {
-        let Finished { end, result, recorder } = finished;
-        let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
-        let root = write_all(bundle, &result, &quoted, recorder.journal());
-        let root = root.map_err(|error| Problem::Environment(error.to_string()))?;
-        terminal.finish();
-        let shown = bundle.folder().display().to_string();
-        match self.output.format {
-            args::Format::Json => {
-                let text =
-                    crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
-                super::print(&text)?;
-            }
-            args::Format::Text => {
-                let color = super::color();
-                let mut page = String::new();
-                for test in result
-                    .tests
-                    .iter()
-                    .filter(|test| test.verdict.is_some_and(|verdict| verdict > Verdict::Pass))
-                {
-                    page.push_str(&text::test(test, &quoted, Some(recorder.journal()), color));
-                    page.push('\n');
-                }
-                for monitor in result.monitors.iter().filter(|monitor| !monitor.findings.is_empty()) {
-                    page.push_str(&text::monitor(monitor, color));
-                    page.push('\n');
-                }
-                page.push_str(&text::summary(
-                    &result,
-                    text::Bundle {
-                        report: Some(&format!("{shown}/report.html")),
-                        root: Some(&root),
-                    },
-                    color,
-                ));
-                super::print(&page)?;
-            }
-        }
-        match end {
-            End::Completed => match result.tests.iter().find_map(|test| test.not_applicable.as_deref()) {
-                Some(why) if result.verdict.is_none() => Err(Problem::NothingToDo(format!(
-                    "no selected test applies to the device: {why}"
-                ))),
-                _ => Ok(Exit::of(result.verdict)),
-            },
-            End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
-            End::NoDevice(why) => Ok(broken_off(&why, &shown, &result)),
-            End::Broken(error) => Ok(broken_off(&error.to_string(), &shown, &result)),
-        }
-    }
-}
-
-/// Says why a run broke off. A failure that was found before stands on its evidence.
-fn broken_off(why: &str, report: &str, result: &RunResult) -> Exit {
-    let problem = Problem::Environment(format!("{why}; the partial report is in {report}"));
-    eprintln!("{}", problem.render(console::colors_enabled_stderr()));
-    Exit::of_partial(result.verdict, false)
 }
 
 const NO_MOTION: &str = "motion was ruled out by --no-motion";
@@ -519,6 +491,14 @@ struct SessionParts {
     capabilities: Capabilities,
     limits: Vec<String>,
     deviations: BTreeMap<String, String>,
+    /// The mock AGVs, when a master control is tested.
+    fleet: Option<Fleet>,
+}
+
+/// Where a run over real sockets takes place.
+struct Surrounding<'a> {
+    info: &'a BenchInfo,
+    clock: WallClock,
 }
 
 fn settings(effective: &Effective) -> Vec<Setting> {
@@ -537,25 +517,5 @@ fn broker_choice(url: Option<&str>, profile: &Profile, credentials: Option<Crede
             authority: profile.bench.tls_ca.clone(),
             credentials,
         },
-    }
-}
-
-/// Hooks of the built-in device: commands to its driver.
-struct Commands(RunningDevice);
-
-impl Operator for Commands {
-    fn hooks(&self) -> Vec<String> {
-        ReferenceAgv::HOOKS.iter().map(|hook| (*hook).to_owned()).collect()
-    }
-
-    async fn run(&mut self, hook: &str, parameters: serde_json::Map<String, serde_json::Value>) -> HookOutcome {
-        if !ReferenceAgv::HOOKS.contains(&hook) {
-            return HookOutcome::Missing;
-        }
-        if self.0.command(hook, serde_json::Value::Object(parameters)).await {
-            HookOutcome::Done("done by the built-in device".to_owned())
-        } else {
-            HookOutcome::Failed("the built-in device is not running any more".to_owned())
-        }
     }
 }

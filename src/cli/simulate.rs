@@ -1,74 +1,170 @@
 //! `simulate`: be a reference device on a broker.
 
-use super::args::{Simulate, Simulated};
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::args::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::clock::WallClock;
-use crate::diagnostic::Diagnostic;
+use crate::course::Layout;
+use crate::diagnostic::{Diagnostic, Source};
 use crate::link::mqtt::endpoint::{Credentials, Endpoint};
-use crate::reference::agv::Agv;
+use crate::pack::{Pack, Role};
 use crate::run::device_driver::RunningDevice;
-use crate::run::{Library, ReferenceAgv};
+use crate::run::{BuiltIn, Fleet, HookServer, Library, ReferenceAgv, ReferenceMasterControl};
 
 /// `simulate`.
 pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
-    let Simulated::Agv(device) = &arguments.what;
-    check_faults(&device.fault)?;
+    let connection = match &arguments.what {
+        Simulated::Agv(device) => &device.connection,
+        Simulated::MasterControl(device) => &device.connection,
+    };
     let library = Library::load(None)?;
-    let pack = super::pack(&library, device.connection.protocol.as_deref())?;
-    let credentials = device.connection.username.clone().map(|username| Credentials {
-        username,
-        password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
-    });
-    let endpoint = Endpoint::parse(&device.connection.broker, None, credentials).map_err(|error| {
-        Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
-    })?;
+    let pack = super::pack(&library, connection.protocol.as_deref())?;
+    // Suites and catalogue are not needed by a device.
+    drop(library);
+    let endpoint = endpoint(connection)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
-    let faults: Vec<&str> = device.fault.iter().map(String::as_str).collect();
     runtime.block_on(async {
-        // Said at once when nobody is there; later losses are the device's own business.
-        tokio::net::TcpStream::connect((endpoint.host.as_str(), endpoint.port))
-            .await
-            .map_err(|error| {
-                Problem::Environment(format!(
-                    "the broker at {} is not reachable: {error}",
-                    device.connection.broker
-                ))
-            })?;
-        let clock = WallClock::start();
-        let mut running = Vec::new();
-        for number in 1..=device.count {
-            let mut reference = ReferenceAgv::of(device.vehicle.0, &pack);
-            tolerate(&mut reference, &device.tolerance)?;
-            let serial = if device.count == 1 {
-                device.serial.clone()
-            } else {
-                format!("{}-{number}", device.serial)
-            };
-            reference.rename(
-                &device.manufacturer,
-                &serial,
-                device.connection.topic_template.as_deref(),
-                &pack,
-            );
-            let agv = Agv::new(reference.config, &faults)
-                .map_err(|error| Problem::from(Diagnostic::whole("fault", error.to_string())))?;
-            running.push(RunningDevice::start(agv, endpoint.clone(), clock, None));
+        match &arguments.what {
+            Simulated::Agv(device) => agvs(device, &pack, &endpoint).await,
+            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint).await,
         }
-        eprintln!(
-            "{} reference AGV(s) on {}; Ctrl-C signs off",
-            device.count, device.connection.broker
-        );
-        let _ = tokio::signal::ctrl_c().await;
-        for device in running {
-            device.command("shutdown", serde_json::Value::Null).await;
-            device.stop().await;
-        }
-        Ok(Exit::Conforms)
     })
+}
+
+/// Where the broker is, and how it lets in.
+fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint, Problem> {
+    let credentials = connection.username.clone().map(|username| Credentials {
+        username,
+        password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
+    });
+    Endpoint::parse(&connection.broker, None, credentials).map_err(|error| {
+        Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
+    })
+}
+
+/// Says at once when nobody is there; later losses are the device's own business.
+async fn reach(endpoint: &Endpoint, connection: &ConnectionArgs) -> Result<(), Problem> {
+    let reached = tokio::net::TcpStream::connect((endpoint.host.as_str(), endpoint.port)).await;
+    reached.map(drop).map_err(|error| {
+        let broker = &connection.broker;
+        Problem::Environment(format!("the broker at {broker} is not reachable: {error}"))
+    })
+}
+
+fn start(
+    reference: &BuiltIn,
+    faults: &[String],
+    endpoint: &Endpoint,
+    clock: WallClock,
+) -> Result<RunningDevice, Problem> {
+    let faults: Vec<&str> = faults.iter().map(String::as_str).collect();
+    let started = reference.start(&faults, endpoint.clone(), clock);
+    started.map_err(|error| Diagnostic::whole("fault", error.to_string()).into())
+}
+
+/// Signs a device off.
+async fn end(device: RunningDevice) {
+    device.command("shutdown", Value::Null).await;
+    device.stop().await;
+}
+
+async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> Result<Exit, Problem> {
+    check_faults(Role::Agv, &device.fault)?;
+    reach(endpoint, &device.connection).await?;
+    let clock = WallClock::start();
+    let mut running = Vec::new();
+    for number in 1..=device.count {
+        let serial = if device.count == 1 {
+            device.serial.clone()
+        } else {
+            format!("{}-{number}", device.serial)
+        };
+        let mut reference = ReferenceAgv::of(device.vehicle.0, pack);
+        let template = device.connection.topic_template.as_deref();
+        reference.rename(&device.manufacturer, &serial, template, pack);
+        if let Some(seconds) = device.state_interval {
+            reference.config.state_interval = Duration::from_secs_f64(seconds);
+        }
+        let mut reference = BuiltIn::from(reference);
+        tolerate(&mut reference, &device.tolerance)?;
+        let agv = start(&reference, &device.fault, endpoint, clock)?;
+        for persona in &device.persona {
+            agv.command(persona.word, persona.parameters.clone()).await;
+        }
+        running.push(agv);
+    }
+    eprintln!(
+        "{} reference AGV(s) on {}; Ctrl-C signs off",
+        device.count, device.connection.broker
+    );
+    let _ = tokio::signal::ctrl_c().await;
+    for device in running {
+        end(device).await;
+    }
+    Ok(Exit::Conforms)
+}
+
+async fn master_control(
+    device: &SimulatedMasterControl,
+    pack: &Arc<Pack>,
+    endpoint: &Endpoint,
+) -> Result<Exit, Problem> {
+    check_faults(Role::MasterControl, &device.fault)?;
+    let mut reference = BuiltIn::from(configured(device, pack)?);
+    tolerate(&mut reference, &device.tolerance)?;
+    reach(endpoint, &device.connection).await?;
+    let running = start(&reference, &device.fault, endpoint, WallClock::start())?;
+    let server = HookServer::start(&device.hooks, running, reference.hooks()).await;
+    let server = server.map_err(|error| Problem::Environment(error.to_string()))?;
+    eprintln!("hooks are served at http://{}", server.address());
+    let vehicles = reference.fleet().map_or(0, |fleet| fleet.vehicles.len());
+    eprintln!(
+        "a reference master control of {vehicles} vehicle(s) on {}; Ctrl-C signs off",
+        device.connection.broker
+    );
+    let _ = tokio::signal::ctrl_c().await;
+    if let Some(running) = server.stop().await {
+        end(running).await;
+    }
+    Ok(Exit::Conforms)
+}
+
+/// The master control as the command line wants it.
+fn configured(device: &SimulatedMasterControl, pack: &Pack) -> Result<ReferenceMasterControl, Problem> {
+    let mut like = ReferenceAgv::new(pack);
+    like.subject
+        .topic_template
+        .clone_from(&device.connection.topic_template);
+    if let Some(file) = &device.layout {
+        let name = file.display().to_string();
+        let text = std::fs::read_to_string(file)
+            .map_err(|error| Diagnostic::whole("unreadable", format!("the layout {name} cannot be read: {error}")))?;
+        like.live_on(Layout::from_lif(
+            &Source::new(name, text),
+            device.vehicle_type.as_deref(),
+        )?);
+    }
+    let named = device.vehicle.iter();
+    let names: Vec<(String, String)> = named
+        .map(|vehicle| (vehicle.manufacturer.clone(), vehicle.serial.clone()))
+        .collect();
+    if names.is_empty() && device.layout.is_none() && device.connection.topic_template.is_none() {
+        return Ok(ReferenceMasterControl::new(pack));
+    }
+    let fleet = if names.is_empty() {
+        Fleet::new(&like, "vda5050-tck", &[], crate::run::USUAL_FLEET, pack)
+    } else {
+        Fleet::named(&like, &names, pack)
+    };
+    Ok(ReferenceMasterControl::commanding(fleet, like.layout, pack))
 }

@@ -100,6 +100,12 @@ impl Layout {
             course.nodes.insert(FAR.to_owned(), far.clone());
         }
         add_ways(&mut course, graph, need, stops)?;
+        self.add_edges(&mut course);
+        Ok(Some(course))
+    }
+
+    /// Adds every edge between two named nodes.
+    pub(super) fn add_edges(&self, course: &mut Course) {
         let ids: Vec<(String, String)> = course
             .nodes
             .iter()
@@ -112,12 +118,11 @@ impl Layout {
                 }
             }
         }
-        Ok(Some(course))
     }
 }
 
 /// Adds the ways to and from stations, with a name for every node on them.
-fn add_ways(
+pub(super) fn add_ways(
     course: &mut Course,
     graph: &Graph<'_>,
     need: &CourseNeed,
@@ -190,7 +195,7 @@ pub(super) struct Graph<'a> {
 }
 
 impl<'a> Graph<'a> {
-    fn of(layout: &'a Layout, start: &str) -> Self {
+    pub(super) fn of(layout: &'a Layout, start: &str) -> Self {
         let mut nodes: Vec<&Node> = layout.nodes().collect();
         if let Some(at) = nodes.iter().position(|node| node.id == start) {
             nodes[..=at].rotate_right(1);
@@ -225,8 +230,13 @@ impl<'a> Graph<'a> {
         self.nodes.iter().position(|node| node.id == id)
     }
 
+    /// Whether the vehicle can come back from a node.
+    pub(super) fn returns(&self, place: usize) -> bool {
+        self.returning.contains(&place)
+    }
+
     /// A node that is not taken, not next to where the vehicle stands if possible, and as far away as possible.
-    fn far(&self, taken: &[usize]) -> Option<&'a Node> {
+    pub(super) fn far(&self, taken: &[usize]) -> Option<&'a Node> {
         let here = self.nodes.first()?;
         (0..self.nodes.len())
             .filter(|place| !taken.contains(place))

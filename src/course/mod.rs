@@ -8,6 +8,7 @@ mod assign;
 mod curve;
 mod layout;
 mod lif;
+mod outward;
 #[cfg(test)]
 mod tests;
 mod ways;
@@ -155,6 +156,14 @@ pub enum CourseError {
         from: String,
         /// nodeId.
         to: String,
+    },
+    /// No node is as far away as the test asks.
+    #[error("no node of the layout is {steps} edges away from {start:?}, where the vehicle stands")]
+    TooNear {
+        /// Where the vehicle stands.
+        start: String,
+        /// How many edges are asked for.
+        steps: usize,
     },
     /// The search was given up.
     #[error(

@@ -5,6 +5,7 @@
 //! comes from there. The only async logic of a test is here.
 
 mod compose;
+mod hands;
 mod operator;
 mod recorder;
 mod route;
@@ -19,7 +20,7 @@ pub use operator::{HookOutcome, Operator};
 pub use recorder::{RecordError, Recorder};
 
 use crate::clock::Moment;
-use crate::journal::event::{Event, Occurrence, Payload, Source, StepEnd};
+use crate::journal::event::{Event, Occurrence, Payload, StepEnd};
 use crate::judge::{JudgeError, Progress};
 use crate::link::{Link, LinkError, Offer, Outgoing};
 use crate::pattern::Bindings;
@@ -159,6 +160,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 }
                 if section == Section::Finally
                     && ((is_cancelling(step) && *spared.get_or_insert_with(|| self.spares_cancelling(begun)))
+                        || (is_calling_off(step) && *spared.get_or_insert_with(|| self.spares_calling_off(begun)))
                         || (is_driving_on(step) && self.device_is_gone()))
                 {
                     continue;
@@ -199,6 +201,15 @@ impl<L: Link, O: Operator> Engine<L, O> {
             .find(|entry| matches!(entry.event(), Event::Sent { .. }));
         let since = sent.map_or(begun, |entry| entry.seq().max(begun));
         !self.cancels || self.device_is_gone() || vehicle::is_idle_since(judge, since)
+    }
+
+    /// Whether the master control has nothing left to call off: the vehicle is idle, and was not told to be awkward,
+    /// which may have kept it from what the master control still wants.
+    fn spares_calling_off(&self, begun: u64) -> bool {
+        let entries = self.recorder.journal().entries();
+        let mut own = entries.iter().rev().take_while(|entry| entry.seq() > begun);
+        let awkward = own.any(|entry| matches!(entry.event(), Event::Vehicle { .. }));
+        !awkward && vehicle::has_nothing_to_do(self.recorder.judge())
     }
 
     /// Whether the tap has seen the device go.
@@ -262,9 +273,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 self.mark(step)?;
                 self.operate(operator, section).await
             }
-            Verb::Vehicle(_) => Ok(StepEnd::Broken(
-                "`vehicle` needs a master control under test".to_owned(),
-            )),
+            Verb::Vehicle(vehicle) => self.vehicle_step(vehicle, step).await,
             Verb::Retained(retained) => {
                 let topic = self.recorder.judge().ground().topics.get(&retained.topic).cloned();
                 let Some(topic) = topic else {
@@ -277,13 +286,13 @@ impl<L: Link, O: Operator> Engine<L, O> {
         }
     }
 
-    fn mark(&mut self, step: &Step) -> Result<u64, EngineError> {
+    pub(super) fn mark(&mut self, step: &Step) -> Result<u64, EngineError> {
         self.note(Event::Mark {
             path: step.path.clone(),
         })
     }
 
-    fn bind(&mut self, name: &str, value: Value) -> Result<(), EngineError> {
+    pub(super) fn bind(&mut self, name: &str, value: Value) -> Result<(), EngineError> {
         self.note(Event::Bound {
             name: name.to_owned(),
             value,
@@ -374,86 +383,16 @@ impl<L: Link, O: Operator> Engine<L, O> {
         )?;
         Ok(StepEnd::Decided)
     }
-
-    async fn operate(
-        &mut self,
-        operator: &crate::suite::model::Operator,
-        section: Section,
-    ) -> Result<StepEnd, EngineError> {
-        let mut parameters = Map::new();
-        if let Some(test) = self.recorder.judge().current() {
-            for (name, term) in &operator.with {
-                match term.bind(test.bindings()) {
-                    Ok(value) => parameters.insert(name.clone(), value),
-                    Err(unbound) => return Ok(StepEnd::Broken(unbound.to_string())),
-                };
-            }
-        }
-        // What a postamble undoes is undone even when the user has asked to stop.
-        let outcome = self
-            .hook(&operator.hook, parameters, section != Section::Finally)
-            .await?;
-        if section != Section::Finally && self.interrupted() {
-            return Ok(StepEnd::Interrupted);
-        }
-        Ok(match outcome {
-            HookOutcome::Done(_) => StepEnd::Decided,
-            HookOutcome::Failed(why) => StepEnd::Broken(format!("hook `{}` failed: {why}", operator.hook)),
-            HookOutcome::Missing => StepEnd::Broken(format!("the profile has no hook `{}`", operator.hook)),
-        })
-    }
-
-    /// Runs a hook of the profile while everything that happens goes on being recorded. One that `abandons` is given
-    /// up when the user asks to stop.
-    pub async fn hook(
-        &mut self,
-        name: &str,
-        parameters: Map<String, Value>,
-        abandons: bool,
-    ) -> Result<HookOutcome, EngineError> {
-        let far = Moment::from_micros(u64::MAX);
-        let outcome = if self.operator.runs_on_the_link() {
-            operator::on_link(&mut self.link, name, &parameters)
-        } else {
-            let running = self.operator.run(name, parameters);
-            tokio::pin!(running);
-            loop {
-                tokio::select! {
-                    outcome = &mut running => break outcome,
-                    _ = self.interrupt.wait_for(|interrupted| *interrupted), if abandons => {
-                        break HookOutcome::Failed("given up: the user has interrupted the run".to_owned());
-                    }
-                    happened = self.link.next(far) => {
-                        if let Some(occurrence) = happened? {
-                            self.recorder.record(occurrence)?;
-                        }
-                    }
-                }
-            }
-        };
-        let (ok, detail) = match &outcome {
-            HookOutcome::Done(detail) => (true, detail.clone()),
-            HookOutcome::Failed(detail) => (false, detail.clone()),
-            HookOutcome::Missing => (false, "no such hook".to_owned()),
-        };
-        let occurrence = Occurrence {
-            at: self.link.now(),
-            source: Source::Operator,
-            direction: None,
-            event: Event::Hook {
-                hook: name.to_owned(),
-                ok,
-                detail,
-            },
-        };
-        self.recorder.record(occurrence)?;
-        Ok(outcome)
-    }
 }
 
 /// Whether a step of a postamble comes from the state that cancels whatever is left.
 fn is_cancelling(step: &Step) -> bool {
     step.path.contains("/cancel-order[")
+}
+
+/// Whether a step of a postamble comes from the state in which a master control calls off what it still wants.
+fn is_calling_off(step: &Step) -> bool {
+    step.path.contains("/called-off[")
 }
 
 /// Whether a step of a postamble waits for the vehicle to drive what was released to it.

@@ -1,5 +1,7 @@
 //! Hooks of the profile, as the engine sees them.
 
+use std::time::Duration;
+
 use serde_json::{Map, Value};
 
 use crate::link::Link;
@@ -24,7 +26,20 @@ pub trait Operator {
     /// Runs one and waits for its end.
     async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome;
 
-    /// Whether hooks are commands to a device that lives on the link, as in virtual time.
+    /// Whether nothing is done for this hook but to wait for an order or instant action that comes by itself, and for
+    /// how long.
+    fn natural_traffic(&self, hook: &str) -> Option<Duration> {
+        let _ = hook;
+        None
+    }
+
+    /// Sets a mock AGV; they are counted from 0. `false` when there is none of that number.
+    async fn vehicle(&mut self, number: usize, what: &str, with: Value) -> bool {
+        let _ = (number, what, with);
+        false
+    }
+
+    /// Whether hooks are commands to a device that lives on the link, and so are mock AGVs, as in virtual time.
     fn runs_on_the_link(&self) -> bool {
         false
     }

@@ -31,13 +31,32 @@ pub fn is_idle_since(judge: &RunJudge, seq: u64) -> bool {
     is_without_order(state) && actions.is_some_and(|actions| actions.iter().all(is_over))
 }
 
+/// Whether a mock AGV has done everything it was sent: it is idle, and its last state is about the last order.
+#[must_use]
+pub fn has_nothing_to_do(judge: &RunJudge) -> bool {
+    let Some(order) = judge.timeline().of("order").last() else {
+        return is_idle(judge);
+    };
+    let Some(state) = last_state(judge).filter(|state| state.seq() > order.seq()) else {
+        return false;
+    };
+    let same =
+        |name: &str| order.json().and_then(|order| order.get(name)) == state.json().and_then(|state| state.get(name));
+    is_idle(judge) && same("orderId") && same("orderUpdateId")
+}
+
+/// Whether any connection of the device that the tap has seen is open. A master control may have one for each vehicle.
+#[must_use]
+pub fn has_any_open_connection(judge: &RunJudge) -> bool {
+    let timeline = judge.timeline();
+    let closed: std::collections::BTreeSet<u64> = timeline.of("mqtt/closed").iter().filter_map(number).collect();
+    let mut opened = timeline.of("mqtt/connect").iter().filter_map(number);
+    opened.any(|connection| !closed.contains(&connection))
+}
+
 /// Whether the newest connection of the device that the tap has seen is open.
 #[must_use]
 pub fn has_open_connection(judge: &RunJudge) -> bool {
-    let number = |entry: &Arc<Entry>| match entry.event() {
-        Event::Packet { connection, .. } | Event::Closed { connection, .. } => Some(*connection),
-        _ => None,
-    };
     let timeline = judge.timeline();
     let last = timeline.of("mqtt/connect").last().and_then(number);
     let is_closed = |connection| {
@@ -47,6 +66,14 @@ pub fn has_open_connection(judge: &RunJudge) -> bool {
             .any(|entry| number(entry) == Some(connection))
     };
     last.is_some_and(|connection| !is_closed(connection))
+}
+
+/// The number of the connection an entry is about.
+fn number(entry: &Arc<Entry>) -> Option<u64> {
+    match entry.event() {
+        Event::Packet { connection, .. } | Event::Closed { connection, .. } => Some(*connection),
+        _ => None,
+    }
 }
 
 fn last_state(judge: &RunJudge) -> Option<&Arc<Entry>> {

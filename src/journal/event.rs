@@ -9,7 +9,7 @@ use serde_json::Value;
 pub use super::fault::LinkFault;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
-pub use super::plan::{Capability, Gate, Plan, PlannedTest, RunHeader, Setting};
+pub use super::plan::{Capability, Gate, MockVehicle, Plan, PlannedTest, RunHeader, Setting};
 use crate::clock::Stamp;
 
 /// Who saw or caused an event.
@@ -218,6 +218,15 @@ pub enum Event {
         /// `begun`, `done` or `cut`.
         phase: String,
     },
+    /// The harness set one of its mock AGVs.
+    Vehicle {
+        /// Its number, counted from 0.
+        vehicle: usize,
+        /// What it was told.
+        what: String,
+        /// With which parameters.
+        with: Value,
+    },
     /// A hook of the profile was run.
     Hook {
         /// Name of the hook.
@@ -226,6 +235,9 @@ pub enum Event {
         ok: bool,
         /// What it said.
         detail: String,
+        /// The serial number of the mock AGV it was run for, where it was run for every one of them.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        vehicle: Option<String>,
     },
     /// A person was asked, and answered.
     Answer {

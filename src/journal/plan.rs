@@ -23,8 +23,11 @@ pub struct RunHeader {
     pub manufacturer: String,
     /// Serial number of the device.
     pub serial_number: String,
-    /// Full topic by topic name.
+    /// Full topic by topic name; of the first vehicle when a master control is tested.
     pub topics: std::collections::BTreeMap<String, String>,
+    /// The mock AGVs of the harness, first the one that tests talk about. Empty when an AGV is tested.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub vehicles: Vec<MockVehicle>,
     /// `tap` or `subscriber`.
     pub vantage: String,
     /// SHA-256 over suites, schemas and requirements.
@@ -37,6 +40,18 @@ pub struct RunHeader {
     pub settings: Vec<Setting>,
     /// The command line as typed, passwords left out.
     pub command: Vec<String>,
+}
+
+/// A mock AGV that a master control is tested with.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub struct MockVehicle {
+    /// Manufacturer, as in its topics and headers.
+    pub manufacturer: String,
+    /// Serial number, as in its topics and headers.
+    pub serial_number: String,
+    /// Full topic by topic name.
+    pub topics: std::collections::BTreeMap<String, String>,
 }
 
 /// What a run is going to do, and why it leaves things out.

@@ -8,10 +8,12 @@ mod decide;
 mod departure;
 mod limit;
 mod monitor;
+mod reactions;
 mod run;
 mod step;
 mod test;
 mod timeline;
+mod watches;
 mod window;
 
 pub use monitor::MonitorJudge;

@@ -200,21 +200,6 @@ impl MonitorJudge {
         }
     }
 
-    /// What it says about each requirement it is bound to, or found something about.
-    pub fn decisions(&self) -> Vec<(String, Verdict)> {
-        let mut all: Vec<(String, Verdict)> = self
-            .findings
-            .iter()
-            .map(|f| (f.requirement.clone(), f.verdict))
-            .collect();
-        if self.judged > 0 {
-            for binding in &self.monitor.checks {
-                all.push((binding.requirement.as_str().to_owned(), Verdict::Pass));
-            }
-        }
-        all
-    }
-
     /// The monitor.
     pub fn monitor(&self) -> &Arc<Monitor> {
         &self.monitor
@@ -240,6 +225,7 @@ fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>) -> 
     CheckContext {
         pack: &ground.pack,
         topics: &ground.topics,
+        role: ground.role,
         identity: (&ground.identity.0, &ground.identity.1),
         with,
         bindings: &ground.bindings,

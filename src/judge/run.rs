@@ -8,16 +8,17 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::decide::mood;
-use super::monitor::MonitorJudge;
+use super::reactions::Reactions;
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
+use super::watches::{Watched, Watches};
 use crate::clock::Stamp;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, RunHeader};
 use crate::pack::{Catalogue, Decided, Packs, Role};
 use crate::report::result::{Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult};
 use crate::suite::Suites;
-use crate::suite::model::Test;
+use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};
 
 /// Format of `result.json`.
@@ -59,7 +60,8 @@ pub struct RunJudge {
     begun: Stamp,
     last: Stamp,
     timeline: Timeline,
-    monitors: Vec<MonitorJudge>,
+    watches: Watches,
+    reactions: Reactions,
     current: Option<TestJudge>,
     done: Vec<TestResult>,
     plan: Plan,
@@ -82,31 +84,46 @@ impl RunJudge {
         } else {
             Role::MasterControl
         };
-        let ground = Ground {
+        let ground_of = |topics: &BTreeMap<String, String>, manufacturer: &str, serial_number: &str| Ground {
             pack: Arc::clone(pack),
             catalogue: Arc::clone(&rules.catalogue),
-            topics: header.topics.clone(),
-            identity: (header.manufacturer.clone(), header.serial_number.clone()),
+            topics: topics.clone(),
+            role,
+            identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: header.bindings.clone(),
         };
+        // What a master control sends names the vehicle it is for.
+        let mut of_vehicles = header
+            .vehicles
+            .iter()
+            .map(|vehicle| ground_of(&vehicle.topics, &vehicle.manufacturer, &vehicle.serial_number));
+        let ground = of_vehicles
+            .next()
+            .unwrap_or_else(|| ground_of(&header.topics, &header.manufacturer, &header.serial_number));
         let tap = header.vantage == "tap";
-        let monitors = rules
+        let monitors: Vec<&Arc<Monitor>> = rules
             .suites
             .monitors
             .iter()
-            .filter(|monitor| monitor.device.is_none_or(|device| device == role));
-        let monitors = monitors
-            .filter_map(|monitor| MonitorJudge::start(monitor, &ground, tap))
+            .filter(|monitor| monitor.device.is_none_or(|device| device == role))
             .collect();
+        let watches = Watches::begin(&monitors, &ground, of_vehicles.collect(), tap);
+        let reactions = Reactions::of(header.vehicles.len());
+        let timeline = if header.vehicles.is_empty() {
+            Timeline::new(&header.topics)
+        } else {
+            Timeline::of_vehicles(&header.vehicles)
+        };
         Ok(Self {
             rules: rules.clone(),
-            timeline: Timeline::new(&header.topics),
+            timeline,
             header,
             role,
             ground,
             begun: first.at(),
             last: first.at(),
-            monitors,
+            watches,
+            reactions,
             current: None,
             done: Vec::new(),
             plan: Plan::default(),
@@ -118,9 +135,11 @@ impl RunJudge {
     pub fn observe(&mut self, entry: &Arc<Entry>) -> Result<(), JudgeError> {
         self.last = entry.at();
         let subject = self.timeline.add(entry);
-        for monitor in &mut self.monitors {
-            monitor.observe(entry, subject.as_deref(), &self.ground);
+        if let Some(place) = self.timeline.place(entry) {
+            self.reactions.observe(entry, place);
         }
+        self.watches
+            .observe(entry, subject.as_deref(), &self.timeline, &self.ground);
         match entry.event() {
             Event::Planned { plan } => self.plan = (**plan).clone(),
             // Outside a test, a variable gets its value for the whole run.
@@ -137,9 +156,7 @@ impl RunJudge {
             Event::RunEnded { partial, reason } => {
                 self.break_off(reason.as_deref().unwrap_or("the run ended before the test did"));
                 self.end = Some((*partial, reason.clone()));
-                for monitor in &mut self.monitors {
-                    monitor.finish(entry.at().moment, &self.ground);
-                }
+                self.watches.finish(entry.at().moment, &self.ground);
             }
             _ => {}
         }
@@ -159,9 +176,7 @@ impl RunJudge {
         if self.end.is_none() {
             self.break_off(why);
             self.end = Some((true, Some(why.to_owned())));
-            for monitor in &mut self.monitors {
-                monitor.finish(self.last.moment, &self.ground);
-            }
+            self.watches.finish(self.last.moment, &self.ground);
         }
     }
 
@@ -185,6 +200,11 @@ impl RunJudge {
         self.current.as_ref()
     }
 
+    /// The side under test.
+    pub fn role(&self) -> Role {
+        self.role
+    }
+
     /// The tests that have ended.
     pub fn done(&self) -> &[TestResult] {
         &self.done
@@ -204,11 +224,11 @@ impl RunJudge {
     pub fn result(&self) -> RunResult {
         let mut tests = self.done.clone();
         tests.extend(self.set_aside());
-        let monitors: Vec<_> = self.monitors.iter().map(MonitorJudge::result).collect();
+        let watched = self.watches.results();
         let all = tests
             .iter()
             .filter_map(|test| test.verdict)
-            .chain(monitors.iter().filter_map(|monitor| monitor.verdict));
+            .chain(watched.iter().filter_map(|watched| watched.result.verdict));
         let verdict: Accumulated = all.collect();
         // Monitors alone make no device conform when tests were planned and none of them applied.
         let none_applied = !tests.is_empty() && tests.iter().all(|test| test.verdict.is_none());
@@ -240,9 +260,9 @@ impl RunJudge {
             suites_sha256: header.suites.clone(),
             suites_modified: header.modified,
             journal: "journal.jsonl".to_owned(),
-            requirements: self.requirements(&tests),
+            requirements: self.requirements(&tests, &watched),
             tests,
-            monitors,
+            monitors: watched.into_iter().map(|watched| watched.result).collect(),
             capabilities: self
                 .plan
                 .capabilities
@@ -253,6 +273,7 @@ impl RunJudge {
                     source: capability.source.clone(),
                 })
                 .collect(),
+            fleet: self.reactions.result(),
             limits: self.plan.limits.clone(),
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
@@ -308,7 +329,7 @@ impl RunJudge {
         all
     }
 
-    fn requirements(&self, tests: &[TestResult]) -> Vec<RequirementResult> {
+    fn requirements(&self, tests: &[TestResult], watched: &[Watched]) -> Vec<RequirementResult> {
         let mut decided: BTreeMap<&str, (Accumulated, Vec<String>)> = BTreeMap::new();
         for test in tests {
             for decision in &test.decisions {
@@ -319,10 +340,9 @@ impl RunJudge {
                 }
             }
         }
-        let monitored: Vec<(String, Vec<(String, Verdict)>)> = self
-            .monitors
+        let monitored: Vec<(String, Vec<(String, Verdict)>)> = watched
             .iter()
-            .map(|monitor| (monitor.monitor().id.clone(), monitor.decisions()))
+            .map(|watched| (watched.result.id.clone(), watched.decisions()))
             .collect();
         for (id, decisions) in &monitored {
             for (requirement, verdict) in decisions {
@@ -342,7 +362,7 @@ impl RunJudge {
             let (verdict, decided_by) = decided.remove(id).unwrap_or_default();
             let not_decided = match verdict.get() {
                 Some(_) => None,
-                None => Some(self.why_not(id, &requirement.decided, tests)),
+                None => Some(self.why_not(id, &requirement.decided, tests, watched)),
             };
             all.push(RequirementResult {
                 id: id.to_owned(),
@@ -354,17 +374,16 @@ impl RunJudge {
         all
     }
 
-    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult]) -> String {
+    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult], watched: &[Watched]) -> String {
         if let Decided::NotTestable { reason } = decided {
             return format!("not testable: {reason}");
         }
         let deciding = self.rules.suites.deciding(id).iter();
         let with_test: Vec<&Arc<Test>> = deciding.filter(|test| test.device == self.role).collect();
         if with_test.is_empty() {
-            let monitored = self
-                .monitors
+            let monitored = watched
                 .iter()
-                .any(|m| m.monitor().checks.iter().any(|b| b.requirement.as_str() == id));
+                .any(|w| w.monitor.checks.iter().any(|b| b.requirement.as_str() == id));
             return if monitored {
                 "nothing came that could have been judged".to_owned()
             } else {

@@ -17,7 +17,7 @@ use super::window::Scene;
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, StepEnd};
-use crate::pack::{Catalogue, Pack};
+use crate::pack::{Catalogue, Pack, Role};
 use crate::pattern::Bindings;
 use crate::report::result::{StepResult, TestResult, Waited};
 use crate::suite::model::{Maturity, Section, Step, Test, Verb};
@@ -31,7 +31,9 @@ pub struct Ground {
     pub catalogue: Arc<Catalogue>,
     /// Full topic by topic name.
     pub topics: BTreeMap<String, String>,
-    /// Manufacturer and serial number.
+    /// The side under test.
+    pub role: Role,
+    /// Manufacturer and serial number; of the vehicle that is commanded, when a master control is tested.
     pub identity: (String, String),
     /// `time`, `device`.
     pub bindings: Map<String, Value>,
@@ -182,6 +184,7 @@ impl TestJudge {
         Scene {
             pack: &ground.pack,
             topics: &ground.topics,
+            role: ground.role,
             identity: (&ground.identity.0, &ground.identity.1),
             run_bindings: &ground.bindings,
             bindings: &self.bindings,

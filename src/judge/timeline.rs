@@ -2,30 +2,61 @@
 //!
 //! A subject is a topic name of the pack (`state`), a packet of the device (`mqtt/connect`), a map
 //! download (`http/fetch`) or a delivery to a fresh subscriber. The judge looks only into this index.
+//!
+//! When a master control is tested, the topics of the first mock AGV have their plain names, those of the second end
+//! in [`OF_SECOND`], and those of further ones are left to the monitors. What the mock AGVs themselves say is filed as
+//! well, so that a test can wait for it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use serde_json::Value;
 
 use crate::clock::Stamp;
 use crate::journal::Entry;
-use crate::journal::event::{Direction, Event, Packet};
+use crate::journal::event::{Direction, Event, MockVehicle, Packet};
+
+/// How the subjects of the second mock AGV end: `order@second`.
+pub const OF_SECOND: &str = "@second";
+
+/// Whose topic it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Number of the vehicle, counted from 0.
+    pub vehicle: usize,
+    /// Topic name.
+    pub name: String,
+}
 
 /// The index.
 #[derive(Debug, Default)]
 pub struct Timeline {
-    topics: BTreeMap<String, String>,
+    topics: HashMap<String, Place>,
+    /// Whether what the harness sends is filed, too.
+    own: bool,
     subjects: BTreeMap<String, Vec<Arc<Entry>>>,
     last: Option<Stamp>,
 }
 
 impl Timeline {
-    /// An empty index for these full topics by topic name.
+    /// An empty index for these full topics by topic name, of an AGV under test.
     #[must_use]
     pub fn new(topics: &BTreeMap<String, String>) -> Self {
         Self {
-            topics: topics.iter().map(|(name, full)| (full.clone(), name.clone())).collect(),
+            topics: places(topics, 0).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// An empty index for the mock AGVs that a master control is tested with.
+    #[must_use]
+    pub fn of_vehicles(vehicles: &[MockVehicle]) -> Self {
+        let all = vehicles.iter().enumerate();
+        Self {
+            topics: all
+                .flat_map(|(number, vehicle)| places(&vehicle.topics, number))
+                .collect(),
+            own: true,
             ..Self::default()
         }
     }
@@ -45,7 +76,8 @@ impl Timeline {
     #[must_use]
     pub fn subject_of(&self, entry: &Entry) -> Option<String> {
         match entry.event() {
-            Event::Message { topic, .. } => self.topics.get(topic).cloned(),
+            Event::Message { topic, .. } => self.named(topic),
+            Event::Sent { topic, .. } if self.own => self.named(topic),
             Event::Packet { packet, .. } if entry.record.direction == Some(Direction::FromDevice) => {
                 let name = match packet {
                     Packet::Connect { .. } => "connect",
@@ -65,10 +97,29 @@ impl Timeline {
         }
     }
 
-    /// The topic name of a full topic.
+    fn named(&self, full: &str) -> Option<String> {
+        let place = self.topics.get(full)?;
+        match place.vehicle {
+            0 => Some(place.name.clone()),
+            1 => Some(format!("{}{OF_SECOND}", place.name)),
+            _ => None,
+        }
+    }
+
+    /// Whose topic an entry is about.
     #[must_use]
-    pub fn topic_name(&self, full: &str) -> Option<&str> {
-        self.topics.get(full).map(String::as_str)
+    pub fn place(&self, entry: &Entry) -> Option<&Place> {
+        let (Event::Message { topic, .. }
+        | Event::Sent { topic, .. }
+        | Event::Retained { topic, .. }
+        | Event::Packet {
+            packet: Packet::Publish { topic, .. },
+            ..
+        }) = entry.event()
+        else {
+            return None;
+        };
+        self.topics.get(topic)
     }
 
     /// All entries of a subject.
@@ -102,4 +153,11 @@ impl Timeline {
     pub fn last(&self) -> Option<Stamp> {
         self.last
     }
+}
+
+fn places(topics: &BTreeMap<String, String>, vehicle: usize) -> impl Iterator<Item = (String, Place)> {
+    topics.iter().map(move |(name, full)| {
+        let name = name.clone();
+        (full.clone(), Place { vehicle, name })
+    })
 }

@@ -9,7 +9,7 @@ use super::step::Holds;
 use super::timeline::Timeline;
 use crate::checks::{self, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
-use crate::pack::Pack;
+use crate::pack::{Pack, Role};
 use crate::pattern::Bindings;
 use crate::suite::model::{Binding, CheckUse};
 use crate::verdict::Verdict;
@@ -21,6 +21,8 @@ pub struct Scene<'a> {
     pub pack: &'a Pack,
     /// Full topic by topic name.
     pub topics: &'a BTreeMap<String, String>,
+    /// The side under test.
+    pub role: Role,
     /// Manufacturer and serial number.
     pub identity: (&'a str, &'a str),
     /// The run's own bindings: `time`, `device`.
@@ -160,6 +162,7 @@ fn context<'a>(scene: &'a Scene<'_>, with: &'a Map<String, Value>) -> CheckConte
     CheckContext {
         pack: scene.pack,
         topics: scene.topics,
+        role: scene.role,
         identity: scene.identity,
         with,
         bindings: scene.run_bindings,

@@ -112,4 +112,11 @@ pub trait Link {
         let _ = (name, parameters);
         false
     }
+
+    /// Sets a mock AGV of the harness that lives on this link; they are counted from 0. `false` when there is none
+    /// of that number.
+    fn vehicle(&mut self, number: usize, what: &str, with: serde_json::Value) -> bool {
+        let _ = (number, what, with);
+        false
+    }
 }

@@ -9,7 +9,7 @@ use super::layer::Layer;
 use super::value::Value;
 use super::{
     Bench, Claim, Device, Layout, LayoutSource, Motion, PasswordSource, Profile, SampleAction, SampleActions, Setting,
-    TimeLimits,
+    TimeLimits, Vehicles,
 };
 use crate::diagnostic::{self, Diagnostic, Span};
 use crate::pack::Role;
@@ -209,6 +209,11 @@ impl Taken<'_> {
                 source,
                 allow_list: self.texts("layout.allow-list"),
             },
+            vehicles: Vehicles {
+                manufacturer: self.text("vehicles.manufacturer").unwrap_or_default(),
+                serial_numbers: self.texts("vehicles.serial-numbers").unwrap_or_default(),
+                start_node: self.text("vehicles.start-node"),
+            },
             time: self.time(),
             maps: match self.value("maps.files") {
                 Some(Value::Paths(files)) => files.clone(),
@@ -261,7 +266,7 @@ impl Taken<'_> {
                     HookAction::Run(_) => "run",
                     HookAction::Http { .. } => "http",
                     HookAction::Prompt(_) => "prompt",
-                    HookAction::RestartDevice => "builtin",
+                    HookAction::RestartDevice | HookAction::NaturalTraffic => "builtin",
                 }
                 .to_owned(),
                 origin: origin.to_string(),

@@ -124,60 +124,64 @@ pub const HOOKS: &[HookInfo] = &[
     ),
     master_control(
         "dispatch",
-        &["from", "to", "loadType", "action"],
+        &["vehicle", "from", "to", "loadType", "action"],
         "A transport was ordered.",
     ),
     master_control(
         "reroute",
-        &["to"],
+        &["vehicle", "to"],
         "The running transport was given another destination.",
     ),
-    master_control("cancel", &[], "The running transport was called off."),
-    master_control("pause", &[], "The vehicle was told to pause."),
-    master_control("resume", &[], "The vehicle was told to go on."),
+    master_control("cancel", &["vehicle"], "The running transport was called off."),
+    master_control("pause", &["vehicle"], "The vehicle was told to pause."),
+    master_control("resume", &["vehicle"], "The vehicle was told to go on."),
     master_control(
         "instant-action",
-        &["action"],
+        &["vehicle", "action"],
         "An instant action was sent to the vehicle.",
     ),
-    master_control("request-factsheet", &[], "The factsheet of the vehicle was asked for."),
-    master_control("request-state", &[], "The state of the vehicle was asked for."),
+    master_control(
+        "request-factsheet",
+        &["vehicle"],
+        "The factsheet of the vehicle was asked for.",
+    ),
+    master_control("request-state", &["vehicle"], "The state of the vehicle was asked for."),
     master_control(
         "init-position",
-        &["nodeId", "x", "y", "theta", "mapId"],
+        &["vehicle", "nodeId", "x", "y", "theta", "mapId"],
         "The vehicle was told where it stands.",
     ),
     master_control(
         "download-map",
-        &["mapId", "mapVersion", "mapDownloadLink"],
+        &["vehicle", "mapId", "mapVersion", "mapDownloadLink"],
         "The roll-out of a map version to the vehicle was begun.",
     ),
     master_control(
         "enable-map",
-        &["mapId", "mapVersion"],
+        &["vehicle", "mapId", "mapVersion"],
         "A map version was enabled on the vehicle.",
     ),
     master_control(
         "delete-map",
-        &["mapId", "mapVersion"],
+        &["vehicle", "mapId", "mapVersion"],
         "A map version was deleted from the vehicle.",
     ),
     master_control(
         "block-edge",
-        &["from", "to"],
+        &["vehicle", "from", "to"],
         "A way was closed for the vehicle in the layout.",
     ),
-    master_control("unblock-edge", &["from", "to"], "The way was opened again."),
+    master_control("unblock-edge", &["vehicle", "from", "to"], "The way was opened again."),
     master_control(
         "configure",
-        &["what"],
+        &["vehicle", "what"],
         "The master control was set up for what comes next.",
     ),
-    master_control("start", &[], "The master control was started."),
-    master_control("shutdown", &[], "The master control was shut down."),
+    master_control("start", &["vehicle"], "The master control was started."),
+    master_control("shutdown", &["vehicle"], "The master control was shut down."),
     master_control(
         "confirm",
-        &["question"],
+        &["vehicle", "question"],
         "Somebody looked, and says yes to the question.",
     ),
 ];
@@ -219,10 +223,15 @@ pub enum HookAction {
     Prompt(String),
     /// The harness ends and starts again the device it has started itself (`device.command`).
     RestartDevice,
+    /// Nothing is done: the harness waits for the next order or instant action to come by itself.
+    NaturalTraffic,
 }
 
-/// The one value of `builtin`.
+/// `builtin`: the harness ends and starts again the device it has started itself.
 pub const RESTART_DEVICE: &str = "restart-command";
+
+/// `builtin`: the harness waits for the next order or instant action to come by itself.
+pub const NATURAL_TRAFFIC: &str = "natural-traffic";
 
 impl HookAction {
     /// A program or request that needs nobody.
@@ -234,7 +243,8 @@ impl HookAction {
     /// How long it may take unless said.
     #[must_use]
     pub fn default_timeout(&self) -> Duration {
-        Duration::from_secs(if self.is_unattended() { 60 } else { 600 })
+        let patient = !self.is_unattended() || *self == Self::NaturalTraffic;
+        Duration::from_secs(if patient { 600 } else { 60 })
     }
 
     /// The action with values for its placeholders. A value stays one argument, one part of an address, one
@@ -246,6 +256,7 @@ impl HookAction {
             Self::Run(arguments) => Self::Run(arguments.iter().map(|text| fill(text, values, verbatim)).collect()),
             Self::Prompt(text) => Self::Prompt(fill(text, values, verbatim)),
             Self::RestartDevice => Self::RestartDevice,
+            Self::NaturalTraffic => Self::NaturalTraffic,
             Self::Http { method, url, body } => Self::Http {
                 method: method.clone(),
                 url: fill(url, values, |value| {
@@ -265,7 +276,7 @@ impl HookAction {
         match self {
             Self::Run(arguments) => arguments.iter().map(String::as_str).collect(),
             Self::Prompt(text) => vec![text],
-            Self::RestartDevice => Vec::new(),
+            Self::RestartDevice | Self::NaturalTraffic => Vec::new(),
             Self::Http { url, body, .. } => [Some(url), body.as_ref()]
                 .into_iter()
                 .flatten()

@@ -53,7 +53,16 @@ pub enum Kind {
 pub const TEMPLATE_PLACEHOLDERS: &[&str] = &["majorVersion", "manufacturer", "serialNumber"];
 
 /// Placeholders of `device.command`, also known to every hook.
-pub const COMMON_PLACEHOLDERS: &[&str] = &["broker-host", "broker-port", "manufacturer", "serial-number"];
+/// `vehicle` is the serial number of the mock AGV a test is about, when a master control is tested. `free-port` is a
+/// port of this machine that nobody used when the run began, for a device that serves its hooks itself.
+pub const COMMON_PLACEHOLDERS: &[&str] = &[
+    "broker-host",
+    "broker-port",
+    "manufacturer",
+    "serial-number",
+    "vehicle",
+    "free-port",
+];
 
 /// Something a vehicle is like that no message says; `needs: profile NAME` of a test asks for it.
 #[derive(Clone, Copy, Debug)]
@@ -348,6 +357,9 @@ pub const KEYS: &[Key] = &[
     key("layout.lif", Kind::File),
     key("layout.vehicle-type", Kind::Text),
     key("layout.allow-list", Kind::Names),
+    key("vehicles.manufacturer", Kind::Level),
+    key("vehicles.serial-numbers", Kind::Names),
+    key("vehicles.start-node", Kind::Text),
     key("time.react", Kind::Duration),
     key("time.slow", Kind::Duration),
     key("time.event", Kind::Duration),

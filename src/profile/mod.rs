@@ -16,6 +16,7 @@ mod read;
 mod tests;
 mod time;
 mod value;
+mod vehicle;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -25,13 +26,16 @@ use serde_json::{Map, Value, json};
 
 pub use claim::Claim;
 pub use effective::Effective;
-pub use hooks::{HOOKS, Hook, HookAction, HookInfo, RESTART_DEVICE, fill, find as find_hook, placeholders};
+pub use hooks::{
+    HOOKS, Hook, HookAction, HookInfo, NATURAL_TRAFFIC, RESTART_DEVICE, fill, find as find_hook, placeholders,
+};
 pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
     Statement,
 };
 pub use layer::{Surroundings, check, load};
 pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
+pub use vehicle::{VEHICLE_WORDS, VehicleWord, find as find_vehicle_word};
 
 use crate::diagnostic::Span;
 use crate::pack::{RequirementId, Role};
@@ -64,6 +68,8 @@ pub struct Profile {
     pub motion: Motion,
     /// `[layout]`.
     pub layout: Layout,
+    /// `[vehicles]`.
+    pub vehicles: Vehicles,
     /// `[time]`.
     pub time: TimeLimits,
     /// `[maps]`: files the device can read.
@@ -296,6 +302,17 @@ pub struct Motion {
     pub allowed: bool,
     /// Speed cap in m/s.
     pub max_speed: Option<f64>,
+}
+
+/// `[vehicles]`: the mock AGVs that a master control is tested with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Vehicles {
+    /// Manufacturer, as in their topics and headers.
+    pub manufacturer: String,
+    /// Serial numbers; the first vehicle is the one that tests talk about.
+    pub serial_numbers: Vec<String>,
+    /// Where the first one stands at the beginning; the first node of the layout when absent.
+    pub start_node: Option<String>,
 }
 
 /// `[layout]`.

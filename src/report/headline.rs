@@ -42,6 +42,7 @@ pub fn kind(entry: &Entry) -> String {
         Event::Fault { .. } => "link".to_owned(),
         Event::Served { .. } | Event::Fetched { .. } => "map server".to_owned(),
         Event::Hook { hook, .. } => format!("hook {}", short(&line(hook), VALUE)),
+        Event::Vehicle { .. } => "mock AGV".to_owned(),
         Event::Answer { .. } => "operator".to_owned(),
         Event::StepBegun { .. } | Event::StepEnded { .. } | Event::Mark { .. } => "step".to_owned(),
         Event::Note { .. } => "note".to_owned(),

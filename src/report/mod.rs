@@ -7,6 +7,7 @@
 pub mod clean;
 pub mod compare;
 pub mod coverage;
+pub mod fleet;
 pub mod headline;
 pub mod html;
 pub mod json;

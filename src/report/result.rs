@@ -50,12 +50,81 @@ pub struct RunResult {
     pub requirements: Vec<RequirementResult>,
     /// Where capabilities come from: name, value, source (factsheet, profile, contradiction).
     pub capabilities: Vec<Capability>,
+    /// How a master control commanded its vehicles; absent when an AGV was tested.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fleet: Option<FleetResult>,
     /// What restricts this statement, one sentence each.
     pub limits: Vec<String>,
     /// Declared deviations of the profile: requirement id to reason.
     pub deviations: BTreeMap<String, String>,
     /// Effective settings with their origins.
     pub settings: Vec<Setting>,
+}
+
+/// How a master control commanded its vehicles (MQTT-11; informative).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct FleetResult {
+    /// How many mock AGVs there were.
+    pub vehicles: usize,
+    /// How many of them were sent an order.
+    pub commanded: usize,
+    /// From a state of a vehicle to the next order message for it; absent when none came.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reaction: Option<ReactionTimes>,
+}
+
+/// A distribution of times, in milliseconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct ReactionTimes {
+    /// How many were measured.
+    pub count: usize,
+    /// The shortest.
+    pub shortest: f64,
+    /// Half of them are no longer.
+    pub median: f64,
+    /// Nine of ten are no longer.
+    pub most: f64,
+    /// Ninety-nine of a hundred are no longer.
+    pub nearly_all: f64,
+    /// The longest.
+    pub longest: f64,
+    /// How many are up to each of [`ReactionTimes::BOUNDS`] and above the one before; the last is above all bounds.
+    pub buckets: Vec<usize>,
+}
+
+impl ReactionTimes {
+    /// Upper bounds of the buckets in milliseconds: 1, 2, 5, 10 and so on, up to 50 s.
+    pub const BOUNDS: [f64; 15] = [
+        1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1_000.0, 2_000.0, 5_000.0, 10_000.0, 20_000.0, 50_000.0,
+    ];
+
+    /// The distribution of times in microseconds; `None` of none.
+    #[must_use]
+    pub fn of(micros: &[u32]) -> Option<Self> {
+        let mut sorted = micros.to_vec();
+        sorted.sort_unstable();
+        let millis = |micros: u32| f64::from(micros) / 1_000.0;
+        let at = |share: usize| {
+            let place = (sorted.len() * share).div_ceil(100).saturating_sub(1);
+            sorted.get(place).copied().map(millis)
+        };
+        let mut buckets = vec![0; Self::BOUNDS.len() + 1];
+        for one in &sorted {
+            let bucket = Self::BOUNDS.partition_point(|bound| *bound < millis(*one));
+            buckets[bucket] += 1;
+        }
+        Some(Self {
+            count: sorted.len(),
+            shortest: millis(*sorted.first()?),
+            median: at(50)?,
+            most: at(90)?,
+            nearly_all: at(99)?,
+            longest: millis(*sorted.last()?),
+            buckets,
+        })
+    }
 }
 
 /// Who was judged.

@@ -259,6 +259,7 @@ mod tests {
         let id = |id: &str| RequirementId::from(id);
         let verb = Verb::Expect(Box::new(Expect {
             topic: "state".to_owned(),
+            of: crate::suite::model::Which::First,
             checks: vec![Binding {
                 requirement: id("B-1"),
                 span: span(source, "B-1"),
@@ -313,6 +314,7 @@ mod tests {
             hook: "power-cycle".to_owned(),
             with: Vec::new(),
             within: None,
+            each: false,
         });
         let hook = step(span(&source, "steps"), hook);
         let found = TestSource::of(&test(&source, vec![hook, expect(&other)]));

@@ -279,6 +279,9 @@ pub fn summary(result: &RunResult, bundle: Bundle<'_>, color: Color) -> String {
     for (name, counts, without) in rows.into_iter().filter(|(_, counts, _)| counts.total() > 0) {
         let _ = writeln!(text, "{name:<13} {}", numbers(counts, &without, color));
     }
+    if let Some(fleet) = &result.fleet {
+        let _ = writeln!(text, "{:<13} {}", "fleet", super::fleet::line(fleet));
+    }
     let style = color.verdict(result.verdict);
     let word = result
         .verdict

@@ -9,6 +9,7 @@ use super::session::Session;
 use crate::engine::{EngineError, Operator, Recorder};
 use crate::journal::event::Event;
 use crate::link::Link;
+use crate::pack::Role;
 use crate::profile::show_duration;
 
 impl<L: Link, O: Operator> Session<'_, L, O> {
@@ -20,6 +21,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let there = |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
         if !self.engine.watch(until, there).await? {
             return Ok(Err(format!("no device connected within {}", show_duration(patience))));
+        }
+        if self.engine.recorder.judge().role() == Role::MasterControl {
+            return self.settle_in().await;
         }
         let begun = self.engine.recorder.journal().entries().len() as u64;
         let has_state = |recorder: &Recorder| {

@@ -4,11 +4,12 @@ use serde_json::Map;
 
 use super::admission::is_stale;
 use super::session::Session;
-use crate::engine::vehicle::{has_open_connection, is_idle};
+use crate::engine::vehicle::{has_any_open_connection, has_open_connection, is_idle};
 use crate::engine::{EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, LinkFault};
 use crate::judge::RunJudge;
 use crate::link::{Link, Vantage};
+use crate::pack::Role;
 use crate::profile::show_duration;
 
 /// Whether the device is connected, as far as the harness can see.
@@ -20,6 +21,9 @@ pub(super) enum Presence {
 impl Presence {
     pub(super) fn of(judge: &RunJudge, vantage: Vantage) -> Self {
         let there = match vantage {
+            Vantage::Tap if judge.role() == Role::MasterControl => has_any_open_connection(judge),
+            // A master control says nothing by itself, so nobody can tell.
+            Vantage::Subscriber if judge.role() == Role::MasterControl => true,
             Vantage::Tap => has_open_connection(judge),
             Vantage::Subscriber => {
                 let said = judge.timeline().of("connection").last();

@@ -8,6 +8,7 @@ use super::pace::{Pace, between_looks};
 use crate::course::{Layout, Standing};
 use crate::journal::event::{Event, Packet};
 use crate::judge::RunJudge;
+use crate::pack::Role;
 use crate::suite::model::Test;
 
 /// Margin on one and a half keep-alives for the last will, in milliseconds.
@@ -44,7 +45,9 @@ pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) 
     }
     let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
     let standing = standing(judge, layout).ok_or("the vehicle does not say where it stands")?;
-    let course = if test.course.directed {
+    let course = if test.device == Role::MasterControl {
+        layout.outward(&test.course, &standing)
+    } else if test.course.directed {
         let layout = layout.clone().directed();
         if layout.edges().next().is_none() {
             return Err("no edge of the layout says its direction at a junction".to_owned());

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use crate::journal::event::{RunHeader, Setting};
+use crate::journal::event::{MockVehicle, RunHeader, Setting};
 use crate::link::Vantage;
 use crate::pack::{Pack, Role};
 
@@ -22,6 +22,12 @@ pub struct Subject {
     pub serial_number: String,
     /// How its topics are built; the pack's own way unless said.
     pub topic_template: Option<String>,
+}
+
+impl std::fmt::Display for Subject {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}", self.manufacturer, self.serial_number)
+    }
 }
 
 impl Subject {
@@ -75,6 +81,10 @@ pub struct HeaderParts<'a> {
     pub time: Map<String, Value>,
     /// `device.*` beside identity and factsheet.
     pub device: Map<String, Value>,
+    /// The mock AGVs of the harness; none when an AGV is tested.
+    pub vehicles: Vec<MockVehicle>,
+    /// What is known of each of them: `${each.…}`.
+    pub fleet: Vec<Value>,
     /// Effective settings.
     pub settings: Vec<Setting>,
     /// The command line.
@@ -91,6 +101,13 @@ impl HeaderParts<'_> {
         let mut bindings = Map::new();
         bindings.insert("time".to_owned(), Value::Object(self.time));
         bindings.insert("device".to_owned(), Value::Object(device));
+        for (name, vehicle) in ["vehicle", "second"].into_iter().zip(&self.vehicles) {
+            let identity = json!({ "manufacturer": vehicle.manufacturer, "serialNumber": vehicle.serial_number });
+            bindings.insert(name.to_owned(), identity);
+        }
+        if !self.fleet.is_empty() {
+            bindings.insert("fleet".to_owned(), Value::Array(self.fleet));
+        }
         RunHeader {
             format: JOURNAL_FORMAT.to_owned(),
             tool: tool(),
@@ -99,7 +116,11 @@ impl HeaderParts<'_> {
             protocol: self.pack.version.to_string(),
             manufacturer: self.subject.manufacturer.clone(),
             serial_number: self.subject.serial_number.clone(),
-            topics: self.subject.topics(self.pack),
+            topics: match self.vehicles.first() {
+                Some(vehicle) => vehicle.topics.clone(),
+                None => self.subject.topics(self.pack),
+            },
+            vehicles: self.vehicles,
             vantage: match self.vantage {
                 Vantage::Tap => "tap".to_owned(),
                 Vantage::Subscriber => "subscriber".to_owned(),

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Stdio;
+use std::time::Duration;
 
 use serde_json::{Map, Value};
 use tokio::process::{Child, Command};
@@ -139,6 +140,8 @@ impl ProfileHooks {
                 tokio::time::timeout(hook.timeout, answer).await
             }
             HookAction::Prompt(_) => Ok(HookOutcome::Missing),
+            // The engine waits for it itself.
+            HookAction::NaturalTraffic => Ok(HookOutcome::Done("left to natural traffic".to_owned())),
             HookAction::RestartDevice => match &mut self.device {
                 Some(device) => Ok(match device.restart().await {
                     Ok(()) => HookOutcome::Done("the device was started again".to_owned()),
@@ -160,6 +163,11 @@ impl Operator for ProfileHooks {
             .values()
             .filter(|hook| self.attended || hook.action.is_unattended());
         usable.map(|hook| hook.name.clone()).collect()
+    }
+
+    fn natural_traffic(&self, hook: &str) -> Option<Duration> {
+        let hook = self.hooks.get(hook)?;
+        (hook.action == HookAction::NaturalTraffic).then_some(hook.timeout)
     }
 
     async fn run(&mut self, name: &str, parameters: Map<String, Value>) -> HookOutcome {

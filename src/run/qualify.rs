@@ -8,11 +8,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+use super::built_in::BuiltIn;
 use super::library::Library;
-use super::reference_agv::ReferenceAgv;
 use super::virtual_run::{Finished, VirtualRun, run_silently};
 use crate::engine::EngineError;
-use crate::pack::Pack;
+use crate::pack::{Pack, Role};
 use crate::reference::Fault;
 use crate::report::result::RunResult;
 use crate::suite::model::Test;
@@ -166,16 +166,16 @@ pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
     all
 }
 
-/// Qualifies all tests and monitors of a protocol version with these faults.
+/// Qualifies all tests and monitors of a protocol version and a role with these faults of its reference device.
 ///
 /// # Errors
 /// When a run cannot be carried out.
-pub fn qualify(library: &Library, pack: &Pack, faults: &[Fault]) -> Result<Qualification, EngineError> {
-    let tests = library.tests(crate::pack::Role::Agv, &pack.id);
+pub fn qualify(library: &Library, pack: &Pack, role: Role, faults: &[Fault]) -> Result<Qualification, EngineError> {
+    let tests = library.tests(role, &pack.id);
     qualify_tests(library, pack, &tests, faults, &|_| {})
 }
 
-/// Qualifies some tests. `told` hears the name of each fault as its turn comes.
+/// Qualifies some tests, all of one role. `told` hears the name of each fault as its turn comes.
 ///
 /// # Errors
 /// When a run cannot be carried out.
@@ -186,12 +186,13 @@ pub fn qualify_tests(
     faults: &[Fault],
     told: &(dyn Fn(&str) + Sync),
 ) -> Result<Qualification, EngineError> {
-    let requests: Vec<VirtualRun> = ReferenceAgv::variants(pack)
+    let role = tests.first().map_or(Role::Agv, |test| test.device);
+    let requests: Vec<VirtualRun> = BuiltIn::variants(role, pack)
         .into_iter()
         .map(|device| VirtualRun {
             device,
             tests: tests.to_vec(),
-            ..VirtualRun::of(library, pack)
+            ..VirtualRun::of_role(role, library, pack)
         })
         .collect();
     let mut blemishes = Vec::new();

@@ -143,16 +143,7 @@ impl ReferenceAgv {
         let layout = Layout::built_in();
         let actions = sample_actions(&layout);
         let layout = layout.with_stations(&actions);
-        let nodes: Vec<LayoutNode> = layout
-            .nodes()
-            .map(|node| LayoutNode {
-                id: node.id.clone(),
-                x: node.x,
-                y: node.y,
-                theta: node.theta,
-                map_id: node.map_id.clone(),
-            })
-            .collect();
+        let nodes = layout_nodes(&layout);
         let first = nodes.first().map(|node| node.id.clone()).unwrap_or_default();
         let config = AgvConfig {
             manufacturer: subject.manufacturer.clone(),
@@ -354,6 +345,63 @@ impl ReferenceAgv {
         self.config.topics = self.subject.topics(pack);
     }
 
+    /// Puts it on another floor, where it knows no stations.
+    pub fn live_on(&mut self, layout: Layout) {
+        self.config.nodes = layout_nodes(&layout);
+        self.config.start_node = self
+            .config
+            .nodes
+            .first()
+            .map(|node| node.id.clone())
+            .unwrap_or_default();
+        let maps: BTreeSet<&str> = self.config.nodes.iter().map(|node| node.map_id.as_str()).collect();
+        let on_board = maps.into_iter().map(|map| OnboardMap {
+            map_id: map.to_owned(),
+            map_version: "1".to_owned(),
+            enabled: true,
+        });
+        self.config.maps = on_board.collect();
+        self.layout = layout;
+    }
+
+    /// Puts on its floor what the actions of a profile find there: loads, free places, chargers.
+    pub fn furnish(&mut self, actions: &SampleActions) {
+        for (kind, action) in actions.iter() {
+            let edge = action.edge.as_ref();
+            let leads_to = |id: &String| {
+                self.layout
+                    .edges()
+                    .find(|edge| edge.id == *id)
+                    .map(|edge| edge.end.clone())
+            };
+            let Some(node) = action.node.clone().or_else(|| edge.and_then(leads_to)) else {
+                continue;
+            };
+            match kind.name {
+                "pick" | "edge-pick" | "failing-drop" | "detect-object" | "edge-detect-object" => {
+                    self.config.stations.insert(node, true);
+                }
+                "drop" | "edge-drop" | "fine-positioning" | "edge-fine-positioning" => {
+                    self.config.stations.entry(node).or_insert(false);
+                }
+                "start-charging" => {
+                    self.config.chargers.insert(node);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The nodes it can stand on without being in the way of a station.
+    #[must_use]
+    pub fn places(&self) -> Vec<&str> {
+        let all = self.layout.nodes().filter(|node| !node.station);
+        let floor = self.layout.nodes().next().map(|node| node.map_id.as_str());
+        all.filter(|node| Some(node.map_id.as_str()) == floor)
+            .map(|node| node.id.as_str())
+            .collect()
+    }
+
     /// The hooks it understands as commands.
     pub const HOOKS: &'static [&'static str] = &[
         "power-cycle",
@@ -382,4 +430,16 @@ impl ReferenceAgv {
         "place-obstacle",
         "remove-obstacle",
     ];
+}
+
+/// The floor as the vehicle knows it.
+fn layout_nodes(layout: &Layout) -> Vec<LayoutNode> {
+    let all = layout.nodes().map(|node| LayoutNode {
+        id: node.id.clone(),
+        x: node.x,
+        y: node.y,
+        theta: node.theta,
+        map_id: node.map_id.clone(),
+    });
+    all.collect()
 }

@@ -15,6 +15,7 @@ use crate::engine::{Engine, EngineError, Operator, Watcher};
 use crate::journal::event::{Event, Gate, Plan, PlannedTest};
 use crate::judge::RunJudge;
 use crate::link::Link;
+use crate::pack::Role;
 use crate::report::result::TestResult;
 use crate::suite::model::Test;
 
@@ -28,6 +29,8 @@ pub struct Setup {
     pub capabilities: Capabilities,
     /// Where the vehicle may drive.
     pub layout: Option<Layout>,
+    /// How many mock AGVs the harness has; none when an AGV is tested.
+    pub vehicles: usize,
     /// Deviations the profile declares.
     pub deviations: BTreeMap<String, String>,
     /// What restricts the statement from the start.
@@ -151,6 +154,13 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 (None, Some(why)) if test.moves => Err(why.clone()),
                 _ => self.bindings(test, number),
             };
+            let ready = match ready {
+                Err(_) if gone.is_none() && test.device == Role::MasterControl => {
+                    self.bring_back().await?;
+                    self.bindings(test, number)
+                }
+                ready => ready,
+            };
             match ready {
                 Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
                 Ok(own) => {
@@ -244,6 +254,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
         settle_link(self).await?;
         self.engine.drain().await?;
+        if self.engine.recorder.judge().role() == Role::MasterControl {
+            return self.tidy_fleet(test).await;
+        }
         let judge = self.engine.recorder.judge();
         if (is_idle(judge) && says_online(judge))
             || !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there()

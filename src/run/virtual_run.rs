@@ -1,15 +1,17 @@
-//! A whole run against the reference AGV in virtual time, in one process and without a network.
+//! A whole run against a built-in device in virtual time, in one process and without a network.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use super::built_in::BuiltIn;
 use super::capabilities::Capabilities;
-use super::device_peer::DevicePeer;
+use super::fleet::Fleet;
 use super::header::HeaderParts;
 use super::library::Library;
 use super::reference_agv::ReferenceAgv;
+use super::reference_master_control::ReferenceMasterControl;
 use super::session::{End, Progress, Setup, run};
 use crate::clock::{Moment, Stamp};
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
@@ -18,8 +20,7 @@ use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::link::memory::{MemoryLink, MemoryOptions};
 use crate::link::{Link, LinkError, Vantage};
-use crate::pack::Pack;
-use crate::reference::agv::Agv;
+use crate::pack::{Pack, Role};
 use crate::report::result::RunResult;
 use crate::suite::model::{Step, Test};
 
@@ -27,7 +28,7 @@ use crate::suite::model::{Step, Test};
 #[derive(Clone)]
 pub struct VirtualRun {
     /// The device.
-    pub device: ReferenceAgv,
+    pub device: BuiltIn,
     /// Names of its faults.
     pub faults: Vec<String>,
     /// The tests, in order.
@@ -53,10 +54,19 @@ pub struct VirtualRun {
 impl VirtualRun {
     /// All tests against the faultless reference AGV, always at the same time of the same day.
     pub fn of(library: &Library, pack: &Pack) -> Self {
+        Self::of_role(Role::Agv, library, pack)
+    }
+
+    /// All tests against the faultless reference device of a role, always at the same time of the same day.
+    pub fn of_role(role: Role, library: &Library, pack: &Pack) -> Self {
+        let device = match role {
+            Role::Agv => ReferenceAgv::new(pack).into(),
+            Role::MasterControl => ReferenceMasterControl::new(pack).into(),
+        };
         Self {
-            device: ReferenceAgv::new(pack),
+            device,
             faults: Vec::new(),
-            tests: library.tests(crate::pack::Role::Agv, &pack.id),
+            tests: library.tests(role, &pack.id),
             complete: true,
             seed: 1,
             jitter: Duration::ZERO,
@@ -80,11 +90,11 @@ pub struct Finished {
 }
 
 /// Hooks are commands to the device on the bus.
-struct OnTheBus;
+struct OnTheBus(&'static [&'static str]);
 
 impl Operator for OnTheBus {
     fn hooks(&self) -> Vec<String> {
-        ReferenceAgv::HOOKS.iter().map(|hook| (*hook).to_owned()).collect()
+        self.0.iter().map(|hook| (*hook).to_owned()).collect()
     }
 
     async fn run(&mut self, _hook: &str, _parameters: Map<String, Value>) -> HookOutcome {
@@ -115,25 +125,37 @@ pub async fn run_virtually(
         utc: request.begun,
     };
     let faults: Vec<&str> = request.faults.iter().map(String::as_str).collect();
-    let agv = Agv::new(device.config.clone(), &faults).map_err(|error| LinkError::Setup(error.to_string()))?;
+    let peer = device
+        .peer(&faults)
+        .map_err(|error| LinkError::Setup(error.to_string()))?;
     let options = MemoryOptions {
-        device_topics: device.subject.published(pack),
+        device_topics: match device.fleet() {
+            Some(fleet) => fleet.commanded(pack),
+            None => device.subject().published(pack),
+        },
         jitter: request.jitter,
         seed: request.seed,
         coalesce: request.coalesce,
         vantage: request.vantage,
         ..MemoryOptions::default()
     };
-    let link = MemoryLink::new(start, vec![Box::new(DevicePeer(agv))], options);
+    let mut link = MemoryLink::new(start, vec![peer], options);
+    for mock in device.mock_peers() {
+        link.add_own_peer(mock);
+    }
+    let vehicles = device.fleet().map_or_else(Vec::new, |fleet| fleet.mock_vehicles(pack));
+    let mocks = vehicles.len();
     let header = HeaderParts {
-        subject: &device.subject,
+        subject: device.subject(),
         pack,
         run: &request.run,
         vantage: request.vantage,
         suites: &library.rules.sha256,
         modified: library.assets.modified(),
-        time: device.time.bindings(),
+        time: device.time().bindings(),
         device: device.device_bindings(),
+        vehicles,
+        fleet: device.fleet().map_or_else(Vec::new, Fleet::bindings),
         settings: Vec::new(),
         command: request.command.clone(),
     };
@@ -145,7 +167,9 @@ pub async fn run_virtually(
     );
     let recorder = Recorder::begin(&library.rules, writer, first)?;
     let composer = Composer::new(&request.run);
-    let mut engine = Engine::new(link, OnTheBus, recorder, composer, interrupt);
+    let operator = OnTheBus(device.hooks());
+    let hooks = operator.hooks();
+    let mut engine = Engine::new(link, operator, recorder, composer, interrupt);
     let setup = Setup {
         tests: request.tests,
         complete: request.complete,
@@ -154,13 +178,14 @@ pub async fn run_virtually(
             statements: device.statements(),
             claims: std::collections::BTreeMap::new(),
             vantage: request.vantage,
-            hooks: OnTheBus.hooks(),
+            hooks,
             maps: true,
             motion: Ok(()),
         },
-        layout: Some(device.layout.clone()),
+        layout: Some(device.layout().clone()),
+        vehicles: mocks,
         deviations: std::collections::BTreeMap::new(),
-        limits: vec!["The device is the built-in reference AGV, run in virtual time.".to_owned()],
+        limits: vec![device.limit(true)],
         run: request.run.clone(),
     };
     let end = run(&mut engine, setup, progress, saved).await;

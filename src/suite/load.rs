@@ -203,11 +203,11 @@ fn lint_state(
         needs: Vec::new(),
         complete: false,
     };
-    let test = Test {
+    let mut test = Test {
         id: name.to_owned(),
         group: String::new(),
         title: String::new(),
-        device: Role::Agv,
+        device: Role::MasterControl,
         spec,
         needs: Vec::new(),
         moves: true,
@@ -220,7 +220,13 @@ fn lint_state(
         course: CourseNeed::default(),
     };
     if problems.len() == before {
-        lint::test(&test, &places, vocabulary, known, problems);
+        // A state is meant for one side or for both.
+        let mut for_master_control = Problems::default();
+        lint::test(&test, &places, vocabulary, known, &mut for_master_control);
+        if for_master_control.len() != 0 {
+            test.device = Role::Agv;
+            lint::test(&test, &places, vocabulary, known, problems);
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a test is, once it has been read and linted.
 
 mod monitor;
+mod vehicle;
 
 use std::sync::Arc;
 
@@ -119,6 +120,7 @@ pub enum Need {
 
 pub use crate::course::CourseNeed;
 pub use monitor::{Monitor, Rule};
+pub use vehicle::{VehicleStep, Which};
 
 /// One step.
 #[derive(Clone, Debug)]
@@ -212,8 +214,8 @@ pub enum Verb {
     Serve(Serve),
     /// Run a hook of the profile.
     Operator(Operator),
-    /// Set the behaviour of a mock AGV (master control under test).
-    Vehicle(Term),
+    /// Say something to a mock vehicle (master control under test).
+    Vehicle(VehicleStep),
 }
 
 /// `send:`.
@@ -355,6 +357,8 @@ pub struct Assertion {
 pub struct Expect {
     /// Topic name, or `mqtt/connect`, `mqtt/publish`, `http/fetch` and so on.
     pub topic: String,
+    /// Whose topic, with a master control under test.
+    pub of: Which,
     /// What is decided by the picking itself.
     pub checks: Vec<Binding>,
     /// Which message is picked.
@@ -376,6 +380,8 @@ pub struct Expect {
 pub struct Never {
     /// Topic name.
     pub topic: String,
+    /// Whose topic, with a master control under test.
+    pub of: Which,
     /// What it decides.
     pub checks: Vec<Binding>,
     /// What must not come.
@@ -391,6 +397,8 @@ pub struct Never {
 pub struct Always {
     /// Topic name.
     pub topic: String,
+    /// Whose topic, with a master control under test.
+    pub of: Which,
     /// What it decides.
     pub checks: Vec<Binding>,
     /// What every message must show.
@@ -415,6 +423,8 @@ pub enum Extent {
 pub struct Until {
     /// Topic name; that of the `always` unless said.
     pub topic: String,
+    /// Whose topic, with a master control under test.
+    pub of: Which,
     /// What is decided by this message coming in time.
     pub checks: Vec<Binding>,
     /// The message.
@@ -522,6 +532,8 @@ pub struct Operator {
     pub with: Vec<(String, Term)>,
     /// How long it may take.
     pub within: Option<TimeTerm>,
+    /// Whether it is run for every mock AGV, one after the other, with `${each.…}` about that one.
+    pub each: bool,
 }
 
 impl ServeBehaviour {

@@ -8,8 +8,11 @@ use super::model::{
     ActionWalk, Always, Assertion, Binding, CheckUse, Expect, Extent, From, Never, Path, Retained, Selection, Step,
     TimeTerm, Until, Verb,
 };
-use super::stimuli::{OPERATOR_KEYS, SEND_KEYS, SERVE_KEYS, check_name, link, link_keys, operator, send, serve};
-use super::terms::{named_terms, pattern, term};
+use super::stimuli::{
+    OPERATOR_KEYS, SEND_KEYS, SERVE_KEYS, VEHICLE_KEYS, check_name, link, link_keys, operator, send, serve, vehicle,
+    which,
+};
+use super::terms::{named_terms, pattern};
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
 use crate::pack::{RequirementId, VersionRange};
 use crate::pattern::Pattern;
@@ -21,20 +24,20 @@ const VERBS: [(&str, &[&str]); 11] = [
     (
         "expect",
         &[
-            "checks", "where", "check", "with", "within", "from", "assert", "prefer", "save",
+            "checks", "where", "check", "with", "within", "from", "assert", "prefer", "save", "of",
         ],
     ),
-    ("never", &["checks", "where", "check", "with", "during", "from"]),
+    ("never", &["checks", "where", "check", "with", "during", "from", "of"]),
     (
         "always",
-        &["checks", "where", "check", "with", "from", "during", "until"],
+        &["checks", "where", "check", "with", "from", "during", "until", "of"],
     ),
     ("action", &["checks", "through", "tolerated", "within", "save"]),
     ("retained", &["checks", "where", "check", "with", "assert", "within"]),
     ("link", &[]),
     ("serve", SERVE_KEYS),
     ("operator", OPERATOR_KEYS),
-    ("vehicle", &[]),
+    ("vehicle", VEHICLE_KEYS),
     ("use", &["with"]),
 ];
 
@@ -209,14 +212,12 @@ impl StepReader<'_> {
 
     fn verb(&mut self, word: &str, value: &Node, fields: &Fields<'_>, at: &Span) -> Option<Verb> {
         let problems = &mut *self.problems;
-        if word == "vehicle" {
-            return Some(Verb::Vehicle(term(value, problems)));
-        }
         let text = text_of(value, problems)?;
         Some(match word {
             "send" => Verb::Send(Box::new(send(text, fields, at, problems))),
             "expect" => Verb::Expect(Box::new(Expect {
                 topic: text.to_owned(),
+                of: which(fields, problems),
                 checks: checks(fields, problems),
                 selection: selection(fields, problems),
                 within: needed_time(fields, "within", at, problems)?,
@@ -239,6 +240,7 @@ impl StepReader<'_> {
                 }
                 Verb::Never(Box::new(Never {
                     topic: text.to_owned(),
+                    of: which(fields, problems),
                     checks: checks(fields, problems),
                     selection: selection(fields, problems),
                     during: needed_time(fields, "during", at, problems)?,
@@ -256,6 +258,7 @@ impl StepReader<'_> {
                 }
                 let always = Always {
                     topic: text.to_owned(),
+                    of: which(fields, problems),
                     checks: checks(fields, problems),
                     selection: selection(fields, problems),
                     from: from(fields, problems),
@@ -285,6 +288,7 @@ impl StepReader<'_> {
             })),
             "link" => Verb::Link(link(text, fields, at, problems)?),
             "serve" => Verb::Serve(serve(value, fields, problems)?),
+            "vehicle" => Verb::Vehicle(vehicle(text, fields, problems)),
             _ => Verb::Operator(operator(text, fields, problems)),
         })
     }
@@ -445,6 +449,7 @@ fn extent(topic: &str, fields: &Fields<'_>, at: &Span, problems: &mut Problems) 
             inner.only(&[&["topic", "checks", "where", "check", "with", "within"]], problems);
             Some(Extent::Until(Box::new(Until {
                 topic: inner.text("topic", problems).unwrap_or(topic).to_owned(),
+                of: which(fields, problems),
                 checks: checks(&inner, problems),
                 selection: selection(&inner, problems),
                 within: needed_time(&inner, "within", &node.span, problems)?,

@@ -4,7 +4,9 @@ use base64::Engine as _;
 
 use super::fields::{Fields, Problems, text_of, word_of};
 use super::grammar::{course_name, place, time};
-use super::model::{LinkStep, Operator, Patch, Raw, Route, Send, SendAction, Serve, ServeBehaviour};
+use super::model::{
+    LinkStep, Operator, Patch, Raw, Route, Send, SendAction, Serve, ServeBehaviour, VehicleStep, Which,
+};
 use super::terms::{named_terms, term};
 use crate::diagnostic::Span;
 use crate::journal::event::{Direction, LinkFault};
@@ -14,7 +16,10 @@ pub(super) const SEND_KEYS: &[&str] = &[
     "route", "payload", "action", "as", "with", "withAll", "blocking", "actions", "patch", "raw", "qos", "retain",
 ];
 pub(super) const SERVE_KEYS: &[&str] = &["file", "behaviour"];
-pub(super) const OPERATOR_KEYS: &[&str] = &["with", "within"];
+pub(super) const OPERATOR_KEYS: &[&str] = &["with", "within", "each"];
+pub(super) const VEHICLE_KEYS: &[&str] = &["with", "of"];
+
+const WHICH: [(&str, Which); 2] = [("first", Which::First), ("second", Which::Second)];
 
 /// Every word of `link:` and the keys it takes.
 const FAULTS: [(&str, &[&str]); 7] = [
@@ -396,5 +401,41 @@ pub(super) fn operator(hook: &str, fields: &Fields<'_>, problems: &mut Problems)
             .map(|node| named_terms(node, problems))
             .unwrap_or_default(),
         within: fields.get("within", problems).and_then(|node| time(node, problems)),
+        each: fields
+            .get("each", problems)
+            .and_then(|node| {
+                let text = text_of(node, problems)?;
+                word_of(
+                    text,
+                    &node.span,
+                    "thing to do it for",
+                    "unknown-word",
+                    &[("vehicle", true)],
+                    problems,
+                )
+            })
+            .unwrap_or(false),
     }
+}
+
+/// `vehicle:`.
+pub(super) fn vehicle(what: &str, fields: &Fields<'_>, problems: &mut Problems) -> VehicleStep {
+    VehicleStep {
+        what: what.to_owned(),
+        with: fields
+            .get("with", problems)
+            .map(|node| named_terms(node, problems))
+            .unwrap_or_default(),
+        of: which(fields, problems),
+    }
+}
+
+/// `of:`; the first vehicle unless said.
+pub(super) fn which(fields: &Fields<'_>, problems: &mut Problems) -> Which {
+    let Some(node) = fields.get("of", problems) else {
+        return Which::First;
+    };
+    text_of(node, problems)
+        .and_then(|text| word_of(text, &node.span, "mock vehicle", "unknown-word", &WHICH, problems))
+        .unwrap_or_default()
 }

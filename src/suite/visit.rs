@@ -60,7 +60,7 @@ impl Step {
                 step.with.iter().for_each(|(_, term)| visit(term));
                 step.within.iter().for_each(|time| visit(&time.term));
             }
-            Verb::Vehicle(term) => visit(term),
+            Verb::Vehicle(step) => step.with.iter().for_each(|(_, term)| visit(term)),
         }
     }
 }

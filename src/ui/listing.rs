@@ -1,11 +1,11 @@
-//! Texts of `list hooks`, `list faults` and `list tolerances`.
+//! Texts of `list hooks`, `list vehicle`, `list faults` and `list tolerances`.
 
 use std::fmt::Write as _;
 
 use crate::pack::Role;
-use crate::profile::HookInfo;
+use crate::profile::{HookInfo, VehicleWord};
 use crate::reference::Fault;
-use crate::reference::agv::{Tolerance, lapse};
+use crate::reference::agv::Tolerance;
 
 /// Every hook with its parameters, by role.
 #[must_use]
@@ -36,9 +36,24 @@ pub fn hooks(hooks: &[HookInfo]) -> String {
     text
 }
 
+/// Every word for the mock vehicles with its parameters.
+#[must_use]
+pub fn vehicle_words(words: &[VehicleWord]) -> String {
+    let width = words.iter().map(|word| word.name.len()).max().unwrap_or(0);
+    let mut text = "Words for a mock vehicle, when a master control is tested, and what they bring about:\n".to_owned();
+    for word in words {
+        let _ = write!(text, "  {:<width$}  {}", word.name, word.doc);
+        if !word.parameters.is_empty() {
+            let _ = write!(text, " {{{}}}", word.parameters.join(", "));
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// Every fault with what is wrong and the requirements it breaks; those that end in a warning stand apart.
 #[must_use]
-pub fn faults(faults: &[Fault]) -> String {
+pub fn faults(faults: &[Fault], lapse: impl Fn(&str) -> Option<&'static str>) -> String {
     let width = faults.iter().map(|fault| fault.name.len()).max().unwrap_or(0);
     let mut text = String::new();
     let (lapses, faults): (Vec<&Fault>, Vec<&Fault>) = faults.iter().partition(|fault| lapse(fault.name).is_some());
@@ -47,7 +62,7 @@ pub fn faults(faults: &[Fault]) -> String {
         let _ = writeln!(text, "{:<width$}  {} ({breaks})", fault.name, fault.wrong);
     }
     if !lapses.is_empty() {
-        text.push_str("\nLapses: no vehicle is failed for these\n\n");
+        text.push_str("\nLapses: nobody is failed for these\n\n");
     }
     for fault in lapses {
         let breaks = fault.breaks.join(", ");
@@ -71,11 +86,16 @@ pub fn tolerances(tolerances: &[Tolerance]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::profile::HOOKS;
+    use crate::profile::{HOOKS, VEHICLE_WORDS};
 
     #[test]
     fn hooks_are_listed_by_role_with_their_parameters() {
         insta::assert_snapshot!(hooks(HOOKS));
+    }
+
+    #[test]
+    fn words_are_listed_with_their_parameters() {
+        insta::assert_snapshot!(vehicle_words(VEHICLE_WORDS));
     }
 
     #[test]
@@ -92,7 +112,7 @@ mod tests {
                 wrong: "Sends no state.",
             },
         ];
-        insta::assert_snapshot!(faults(&some), @r"
+        insta::assert_snapshot!(faults(&some, crate::reference::agv::lapse), @r"
         outdated-update-taken-over  Takes over an update that is older than the one it has. (ORD-REJ-10, ORD-REJ-11)
         silent                      Sends no state. (STATE-01)
         ");

@@ -8,7 +8,7 @@ mod output;
 mod progress;
 mod terminal;
 
-pub use listing::{faults, hooks, tolerances};
+pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, Quiet, RunSummary, RunTitle, TestLine};
 pub use terminal::{Terminal, TerminalOptions};

@@ -1,5 +1,7 @@
-//! `simulate agv` at a broker of somebody else.
+//! `simulate`: vehicles at a broker of somebody else, and a master control that is tested like a foreign one.
 
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -8,7 +10,7 @@ use serde_json::Value;
 use crate::bench::{Bench, MANUFACTURER, SERIAL};
 use crate::mosquitto::{Mosquitto, free_port};
 use crate::scripted::topic;
-use crate::tool::{Running, run, tool};
+use crate::tool::{Ended, Running, run, tool};
 
 /// What a topic says to somebody who comes late, until it is as wanted.
 fn retained(port: u16, wanted: &str) -> Value {
@@ -105,10 +107,195 @@ fn a_fleet_has_numbers() {
     agvs.end().code(0);
 }
 
+/// A profile of the simulated master control: the harness starts it, and asks it over HTTP.
+fn commanded(more: &str) -> String {
+    let tool = env!("CARGO_BIN_EXE_vda5050-tck");
+    let hooks = [
+        ("dispatch", "vehicle from to loadType action"),
+        ("cancel", "vehicle"),
+        ("request-state", "vehicle"),
+    ];
+    let hooks = hooks.map(|(name, parameters)| {
+        let body: Vec<String> = parameters
+            .split(' ')
+            .map(|parameter| format!("\"{parameter}\": \"{{{parameter}}}\""))
+            .collect();
+        let url = format!("http://127.0.0.1:{{free-port}}/hooks/{name}");
+        format!(
+            "[hooks.{name}]\nhttp = {{ url = \"{url}\", body = '{{ {} }}' }}\n",
+            body.join(", ")
+        )
+    });
+    format!(
+        r#"
+[device]
+role = "master-control"
+manufacturer = "{MANUFACTURER}"
+serial-number = "{SERIAL}"
+command = [
+  "{tool}", "simulate", "master-control", "--broker", "mqtt://{{broker-host}}:{{broker-port}}",
+  "--hooks", "127.0.0.1:{{free-port}}", {more}
+]
+[bench]
+listen = "127.0.0.1:0"
+[time]
+connect = "20 s"
+drive = "20 s"
+quiet = "500 ms"
+settle = "300 ms"
+reconnect = "1 s"
+{}"#,
+        hooks.concat()
+    )
+}
+
+/// Runs these tests against the simulated master control.
+fn judged(more: &str, tests: &[&str]) -> (Bench, Ended) {
+    let bench = Bench::new();
+    std::fs::write(bench.path().join("device.toml"), commanded(more)).unwrap();
+    let ended = bench.run(&[&["run", "--profile", "device.toml"], tests].concat());
+    (bench, ended)
+}
+
+#[test]
+fn a_simulated_master_control_conforms_and_is_commanded_over_http() {
+    let tests = [
+        "dispatch/one-edge",
+        "dispatch/two-in-a-row",
+        "dispatch/while-busy",
+        "instant-actions/as-asked[state]",
+    ];
+    let (bench, ended) = judged("", &tests);
+    ended.code(0);
+    let result = bench.result();
+    assert_eq!(result["role"], "master-control");
+    for test in result["tests"].as_array().unwrap() {
+        assert_eq!(test["verdict"], "pass", "{}", test["id"]);
+    }
+}
+
+#[test]
+fn a_simulated_master_control_with_a_fault_does_not_conform() {
+    let (bench, ended) = judged(r#""--fault", "edge-missing""#, &["dispatch/one-edge"]);
+    ended.code(1);
+    let result = bench.result();
+    let broken = result["requirements"].as_array().unwrap().iter();
+    let broken: Vec<&Value> = broken.filter(|requirement| requirement["verdict"] == "fail").collect();
+    assert!(
+        broken.iter().any(|requirement| requirement["id"] == "ORD-02"),
+        "{broken:?}"
+    );
+}
+
+/// What a hook answers: the status line and everything.
+fn answer(address: &str, request: &str) -> String {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    text
+}
+
+fn post(address: &str, path: &str, body: &str) -> String {
+    let length = body.len();
+    let head = format!("POST {path} HTTP/1.1\r\nhost: {address}\r\nconnection: close\r\n");
+    answer(address, &format!("{head}content-length: {length}\r\n\r\n{body}"))
+}
+
+#[test]
+fn hooks_say_what_there_is_and_what_is_wrong() {
+    let bench = Bench::new();
+    // Nothing but a port is needed: the connection is tried again and again.
+    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("mqtt://{}", silent.local_addr().unwrap());
+    let mut running = Running::start(&mut tool(
+        bench.path(),
+        &["simulate", "master-control", "--broker", &url],
+    ));
+    let address = running.line("hooks are served at http://");
+    assert!(address.starts_with("127.0.0.1:"), "{address}");
+    running.line("a reference master control of 2 vehicle(s) on ");
+
+    let list = answer(
+        &address,
+        &format!("GET / HTTP/1.1\r\nhost: {address}\r\nconnection: close\r\n\r\n"),
+    );
+    assert!(
+        list.starts_with("HTTP/1.1 200") && list.contains("POST /hooks/dispatch"),
+        "{list}"
+    );
+    let done = post(
+        &address,
+        "/hooks/dispatch",
+        r#"{"vehicle": "mock-1", "to": "A3", "from": ""}"#,
+    );
+    assert!(done.starts_with("HTTP/1.1 204"), "{done}");
+    assert!(post(&address, "/hooks/cancel", "").starts_with("HTTP/1.1 204"));
+    let unknown = post(&address, "/hooks/explode", "{}");
+    assert!(
+        unknown.starts_with("HTTP/1.1 404") && unknown.contains("POST /hooks/reroute"),
+        "{unknown}"
+    );
+    let wrong = post(&address, "/hooks/dispatch", "[1]");
+    assert!(
+        wrong.starts_with("HTTP/1.1 400") && wrong.contains("not a JSON object"),
+        "{wrong}"
+    );
+
+    running.interrupt();
+    running.end().code(0);
+}
+
+#[test]
+fn a_master_control_that_cannot_be_simulated_is_2() {
+    let refused = |arguments: &[&str], why: &str| {
+        run(&[&["simulate", "master-control"], arguments].concat())
+            .code(2)
+            .says(why);
+    };
+    refused(&["--vehicle", "ACME"], "a vehicle is written like ACME/0001");
+    refused(&["--fault", "edges-missing"], "did you mean `edge-missing`?");
+    refused(&["--layout", "nowhere.json"], "the layout nowhere.json cannot be read");
+}
+
+#[test]
+fn an_awkward_vehicle_is_asked_for_by_a_word() {
+    let refused = |word: &str, why: &str| {
+        run(&["simulate", "agv", "--persona", word]).code(2).says(why);
+    };
+    refused("ignore-order", "did you mean `ignore-orders`?");
+    refused("shutdown={\"when\": 1}", "`shutdown` has no parameters");
+    refused("set-battery={\"percent\": 1}", "it has charge, charging");
+
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    let url = mosquitto.url();
+    let arguments = [
+        "simulate",
+        "agv",
+        "--broker",
+        &url,
+        "--manufacturer",
+        MANUFACTURER,
+        "--serial",
+        SERIAL,
+        "--persona",
+        "shutdown",
+    ];
+    let mut agv = Running::start(&mut tool(bench.path(), &arguments));
+    agv.line("1 reference AGV(s) on ");
+    agv.interrupt();
+    agv.end().code(0);
+}
+
 #[test]
 fn nobody_there_is_5_at_once() {
     let url = format!("mqtt://127.0.0.1:{}", free_port());
     run(&["simulate", "agv", "--broker", &url])
+        .code(5)
+        .says_one_error("not reachable");
+    run(&["simulate", "master-control", "--broker", &url])
         .code(5)
         .says_one_error("not reachable");
     run(&["simulate", "agv", "--broker", "http://127.0.0.1"])

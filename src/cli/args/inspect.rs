@@ -55,6 +55,8 @@ pub enum Listing {
     Tolerances,
     /// What a profile can do to the device for a test
     Hooks,
+    /// What a test can ask of the mock vehicles, when a master control is tested
+    Vehicle,
 }
 
 const EXPLAIN_HELP: &str = "\
@@ -132,7 +134,7 @@ pub struct Report {
     pub suites: SuiteArgs,
 }
 
-fn parse_role(text: &str) -> Result<Role, String> {
+pub(super) fn parse_role(text: &str) -> Result<Role, String> {
     [Role::Agv, Role::MasterControl]
         .into_iter()
         .find(|role| role.word() == text)

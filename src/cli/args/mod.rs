@@ -16,7 +16,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub use run::{Certify, Qualify, Run, Shard};
-pub use simulate::{ConnectionArgs, Simulate, Simulated, SimulatedAgv};
+pub use simulate::{ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, VehicleArg};
 
 const AFTER_HELP: &str = "\
 Examples:

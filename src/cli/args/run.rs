@@ -35,19 +35,19 @@ pub struct Run {
     /// Which suites.
     #[command(flatten)]
     pub suites: SuiteArgs,
-    /// Give the reference AGV a defect, to see a test fail; may be repeated (see `list faults`)
+    /// Give the built-in device a defect, to see a test fail; may be repeated (see `list faults`)
     #[arg(
         long,
         value_name = "NAME",
-        help_heading = "Reference AGV",
+        help_heading = "Built-in device",
         conflicts_with = "profile"
     )]
     pub fault: Vec<String>,
-    /// Give the reference AGV a liberty the standard leaves it; may be repeated (see `list tolerances`)
+    /// Give the built-in device a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(
         long,
         value_name = "NAME",
-        help_heading = "Reference AGV",
+        help_heading = "Built-in device",
         conflicts_with = "profile"
     )]
     pub tolerance: Vec<String>,
@@ -57,12 +57,15 @@ pub struct Run {
         value_name = "KIND",
         value_enum,
         default_value_t,
-        help_heading = "Reference AGV",
+        help_heading = "Built-in device",
         conflicts_with = "profile"
     )]
     pub vehicle: super::vehicle::VehicleKind,
-    /// Run against the reference AGV in memory and in virtual time, without a network
-    #[arg(long = "virtual", help_heading = "Reference AGV", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
+    /// How many mock AGVs a master control is tested with [default: 2]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1_000), help_heading = "Master control")]
+    pub vehicles: Option<u32>,
+    /// Run against the built-in device in memory and in virtual time, without a network
+    #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
     pub in_virtual_time: bool,
     /// Make identifiers and the order of events repeatable
     #[arg(long, value_name = "NUMBER")]
@@ -112,6 +115,9 @@ pub struct Qualify {
     /// Only tests whose id matches one of these
     #[arg(value_name = "TEST")]
     pub tests: Vec<String>,
+    /// Only this side's [agv, master-control]; both unless said
+    #[arg(long, value_name = "ROLE", value_parser = super::inspect::parse_role)]
+    pub role: Option<crate::pack::Role>,
     /// Only these faults; may be repeated
     #[arg(long, value_name = "NAME")]
     pub fault: Vec<String>,

@@ -1,6 +1,13 @@
 //! `simulate`: being a device.
 
+use std::path::PathBuf;
+use std::str::FromStr;
+
 use clap::{Args, Subcommand};
+use serde_json::Value;
+
+use crate::diagnostic;
+use crate::profile::{VEHICLE_WORDS, find_vehicle_word};
 
 use super::vehicle::VehicleKind;
 
@@ -17,6 +24,8 @@ pub struct Simulate {
 pub enum Simulated {
     /// A reference AGV: the best-behaved vehicle there is, unless it is given faults
     Agv(SimulatedAgv),
+    /// A reference master control: it commands vehicles, and does what is asked of it over HTTP
+    MasterControl(SimulatedMasterControl),
 }
 
 /// How a simulated device reaches its broker.
@@ -41,6 +50,7 @@ Examples:
   vda5050-tck simulate agv --broker mqtt://127.0.0.1:1883
   vda5050-tck simulate agv --count 50 --manufacturer ACME
   vda5050-tck simulate agv --fault outdated-update-taken-over
+  vda5050-tck simulate agv --persona ignore-orders --persona 'set-battery={\"charge\": 10}'
 
 Runs until it is interrupted (Ctrl-C), and then signs off in good order.";
 
@@ -69,4 +79,118 @@ pub struct SimulatedAgv {
     /// Give it a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(long, value_name = "NAME")]
     pub tolerance: Vec<String>,
+    /// Make it awkward from the start, as a word of `list vehicle`, with its parameters as a JSON object behind `=`; may
+    /// be repeated
+    #[arg(long, value_name = "WORD")]
+    pub persona: Vec<PersonaArg>,
+    /// Seconds between two states when nothing happens
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub state_interval: Option<f64>,
+}
+
+const SIMULATE_MASTER_CONTROL_HELP: &str = "\
+Examples:
+  vda5050-tck simulate master-control --broker mqtt://127.0.0.1:1883 --hooks 127.0.0.1:8080
+  vda5050-tck simulate agv --serial mock-1    a vehicle for it, in another terminal
+  curl -d '{\"vehicle\": \"mock-1\", \"to\": \"A3\"}' http://127.0.0.1:8080/hooks/dispatch
+  curl http://127.0.0.1:8080/                 what can be asked of it
+
+Parameters are those of `list hooks`; an empty text is a parameter that is not there.
+Runs until it is interrupted (Ctrl-C), and then signs off in good order.";
+
+/// `simulate master-control`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = SIMULATE_MASTER_CONTROL_HELP)]
+pub struct SimulatedMasterControl {
+    /// The broker.
+    #[command(flatten)]
+    pub connection: ConnectionArgs,
+    /// Where its hooks are served; this machine only unless said, and port 0 is any that is free
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:0")]
+    pub hooks: String,
+    /// A vehicle it commands; may be repeated [default: vda5050-tck/mock-1 and vda5050-tck/mock-2]
+    #[arg(long, value_name = "MANUFACTURER/SERIAL")]
+    pub vehicle: Vec<VehicleArg>,
+    /// The floor, as a LIF file; the floor of the reference AGV unless said
+    #[arg(long, value_name = "FILE")]
+    pub layout: Option<PathBuf>,
+    /// The vehicle type whose ways of the LIF file are used, when it has several
+    #[arg(long, value_name = "NAME", requires = "layout")]
+    pub vehicle_type: Option<String>,
+    /// Give it a defect; may be repeated (see `list faults`)
+    #[arg(long, value_name = "NAME")]
+    pub fault: Vec<String>,
+    /// Give it a liberty the standard leaves it; may be repeated (see `list tolerances`)
+    #[arg(long, value_name = "NAME")]
+    pub tolerance: Vec<String>,
+}
+
+/// A vehicle by its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VehicleArg {
+    /// Manufacturer, as in its topics.
+    pub manufacturer: String,
+    /// Serial number, as in its topics.
+    pub serial: String,
+}
+
+impl FromStr for VehicleArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let level = |text: &str| !text.is_empty() && !text.contains(['/', '+', '#']);
+        match text.split_once('/') {
+            Some((manufacturer, serial)) if level(manufacturer) && level(serial) => Ok(Self {
+                manufacturer: manufacturer.to_owned(),
+                serial: serial.to_owned(),
+            }),
+            _ => Err("a vehicle is written like ACME/0001, without further `/`, `+` and `#`".to_owned()),
+        }
+    }
+}
+
+/// A word for a vehicle, and its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PersonaArg {
+    /// The word.
+    pub word: &'static str,
+    /// An object.
+    pub parameters: Value,
+}
+
+impl FromStr for PersonaArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, parameters) = text.split_once('=').unwrap_or((text, "{}"));
+        let word = find_vehicle_word(name).ok_or_else(|| {
+            let known = VEHICLE_WORDS.iter().map(|word| word.name);
+            match diagnostic::closest(name, known) {
+                Some(close) => format!("there is no word `{name}` for a vehicle; did you mean `{close}`?"),
+                None => format!("there is no word `{name}` for a vehicle; `vda5050-tck list vehicle` shows them all"),
+            }
+        })?;
+        let parameters: Value = serde_json::from_str(parameters)
+            .map_err(|error| format!("the parameters of `{name}` are not JSON: {error}"))?;
+        let Some(all) = parameters.as_object() else {
+            return Err(format!("the parameters of `{name}` are not a JSON object"));
+        };
+        if let Some(unknown) = all.keys().find(|key| !word.parameters.contains(&key.as_str())) {
+            return Err(match word.parameters {
+                [] => format!("`{name}` has no parameters"),
+                known => format!("`{name}` has no parameter `{unknown}`; it has {}", known.join(", ")),
+            });
+        }
+        Ok(Self {
+            word: word.name,
+            parameters,
+        })
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if (0.01..=3600.0).contains(&seconds) => Ok(seconds),
+        _ => Err("a number of seconds from 0.01 to 3600".to_owned()),
+    }
 }

@@ -48,7 +48,7 @@ struct Violation {
 
 impl Holding {
     pub(super) fn begin(verb: &Always, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
-        let mut selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
+        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?;
         let check = selector
             .check
             .take()
@@ -59,7 +59,7 @@ impl Holding {
             Extent::Until(until) => {
                 let limit = limit(&until.within, scene)?;
                 let goal = Goal {
-                    selector: Selector::bind(&until.selection, &until.topic, &until.at, position, scene)?,
+                    selector: Selector::bind(&until.selection, &until.subject(), &until.at, position, scene)?,
                     until: (**until).clone(),
                     limit,
                     nearest: None,
@@ -83,9 +83,9 @@ impl Holding {
             judged: false,
         };
         let from = position.start(verb.from, From::Mark);
-        let mut past = backlog(scene.timeline, &verb.topic, from);
+        let mut past = backlog(scene.timeline, &verb.subject(), from);
         if let Some(goal) = this.until.as_ref().filter(|goal| goal.until.topic != this.verb.topic) {
-            past.extend(backlog(scene.timeline, &goal.until.topic, from));
+            past.extend(backlog(scene.timeline, &goal.until.subject(), from));
             past.sort_by_key(|entry| entry.seq());
         }
         for entry in past {
@@ -101,7 +101,7 @@ impl Holding {
         }
         // What cannot be read shows nothing; that it cannot is another requirement, judged by a monitor.
         let readable = entry.subject().is_some();
-        if readable && subject == Some(self.verb.topic.as_str()) {
+        if readable && subject == Some(&*self.verb.subject()) {
             self.seen += 1;
             self.judge(entry, scene);
         }
@@ -111,7 +111,7 @@ impl Holding {
         if let Some(goal) = self
             .until
             .as_mut()
-            .filter(|goal| subject == Some(goal.until.topic.as_str()))
+            .filter(|goal| subject == Some(&*goal.until.subject()))
         {
             goal.seen += 1;
             if goal.selector.takes(entry, scene) {

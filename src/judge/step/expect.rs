@@ -30,7 +30,7 @@ impl Expecting {
     pub(super) fn begin(verb: &Expect, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
         let limit = limit(&verb.within, scene)?;
         let mut this = Self {
-            selector: Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?,
+            selector: Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?,
             deadline: position.base + limit.hard,
             verb: verb.clone(),
             position,
@@ -44,11 +44,11 @@ impl Expecting {
         if verb.from == From::Latest {
             // What is already known counts, however old it is; after that only what is new.
             this.deadline = position.begun + limit.hard;
-            if let Some(entry) = scene.timeline.of(&verb.topic).last().cloned() {
+            if let Some(entry) = scene.timeline.of(&verb.subject()).last().cloned() {
                 this.look_at(&entry, scene, true);
             }
         } else {
-            for entry in backlog(scene.timeline, &verb.topic, position.start(verb.from, From::Here)) {
+            for entry in backlog(scene.timeline, &verb.subject(), position.start(verb.from, From::Here)) {
                 this.look_at(&entry, scene, false);
             }
         }
@@ -56,7 +56,7 @@ impl Expecting {
     }
 
     pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
-        if subject == Some(self.verb.topic.as_str()) {
+        if subject == Some(&*self.verb.subject()) {
             self.look_at(entry, scene, false);
         }
     }
@@ -107,8 +107,8 @@ impl Expecting {
         let mut shares = vec![1.0; clauses.len()];
         for (word, assertions) in judged {
             for assertion in assertions {
-                let topic = &self.verb.topic;
-                let (clause, share) = weighed_clause(assertion, word, entry, topic, self.position, scene);
+                let topic = self.verb.subject();
+                let (clause, share) = weighed_clause(assertion, word, entry, &topic, self.position, scene);
                 clauses.push(clause);
                 shares.push(share);
             }

@@ -30,7 +30,7 @@ impl Forbidding {
             .get("time.broker")
             .and_then(serde_json::Value::as_u64)
             .unwrap_or(5_000);
-        let mut selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
+        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?;
         let check = selector
             .check
             .take()
@@ -47,7 +47,7 @@ impl Forbidding {
             violated: None,
             alive: false,
         };
-        for entry in backlog(scene.timeline, &verb.topic, position.start(verb.from, From::Mark)) {
+        for entry in backlog(scene.timeline, &verb.subject(), position.start(verb.from, From::Mark)) {
             this.look_at(&entry, scene);
         }
         Ok(this)
@@ -57,7 +57,7 @@ impl Forbidding {
         if matches!(entry.event(), Event::ProbeReceived { .. }) && entry.at().moment >= self.ends {
             self.alive = true;
         }
-        if subject == Some(self.verb.topic.as_str()) && !self.alive {
+        if subject == Some(&*self.verb.subject()) && !self.alive {
             self.look_at(entry, scene);
         }
     }

@@ -345,6 +345,13 @@ impl Link for MemoryLink {
         true
     }
 
+    fn vehicle(&mut self, number: usize, what: &str, with: serde_json::Value) -> bool {
+        let mut own = self.plugs.iter().enumerate().filter(|(_, plug)| plug.own);
+        let Some((peer, _)) = own.nth(number) else { return false };
+        MemoryLink::command(self, peer, what, with);
+        true
+    }
+
     async fn fresh_subscriber(&mut self, topic: &str) -> Result<u64, LinkError> {
         self.check()?;
         self.requests += 1;

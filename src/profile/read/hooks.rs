@@ -5,7 +5,7 @@ use toml::de::DeValue;
 
 use super::{Entry, Reader};
 use crate::diagnostic;
-use crate::profile::hooks::{HOOKS, Hook, HookAction, RESTART_DEVICE};
+use crate::profile::hooks::{HOOKS, Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE};
 use crate::profile::key::{COMMON_PLACEHOLDERS, Kind};
 use crate::profile::value::{self, Value};
 
@@ -88,7 +88,10 @@ impl Reader<'_> {
         if name == RESTART_DEVICE {
             return Some(HookAction::RestartDevice);
         }
-        let hint = Some(format!("did you mean `{RESTART_DEVICE}`?"));
+        if name == NATURAL_TRAFFIC {
+            return Some(HookAction::NaturalTraffic);
+        }
+        let hint = Some(diagnostic::did_you_mean(&name, [RESTART_DEVICE, NATURAL_TRAFFIC]));
         self.complain("bad-value", value.span(), &format!("{what} is not known"), &name, hint);
         None
     }

@@ -18,11 +18,12 @@ use super::{Deviation, LayoutList};
 use crate::diagnostic::{self, Diagnostic, Source, Span};
 use crate::pack::RequirementId;
 
-const SECTIONS: [&str; 8] = [
+const SECTIONS: [&str; 9] = [
     "device",
     "bench",
     "motion",
     "layout",
+    "vehicles",
     "time",
     "maps",
     "deviations",

@@ -27,6 +27,9 @@ enum Decision {
 impl Agv {
     /// Takes an order message.
     pub(super) fn order_received(&mut self, payload: &[u8]) {
+        if self.ignores_order() {
+            return;
+        }
         self.report.order_received = true;
         let message = if payload.len() > self.config.max_message {
             Err(Refusal::new(Rule::Malformed, "the message is too long"))
@@ -51,6 +54,10 @@ impl Agv {
         let tolerated = |_: &Defect| self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty();
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
+        }
+        self.check_ids(&order)?;
+        if self.rejects_as_told(&order, message) {
+            return Ok(());
         }
         match self.decide(&mut order)? {
             Decision::Begin => self.begin(order),
@@ -169,6 +176,9 @@ impl Agv {
     fn near(&self, node: &Node) -> bool {
         let Some(place) = self.place(node) else { return false };
         let pose = self.motion.pose(self.moment());
+        if self.persona.lost {
+            return false;
+        }
         let temporary = self.faults.has(F::TemporaryNodeRefused)
             && self.config.node(&node.id).is_none()
             && node.id != self.book.last_node;

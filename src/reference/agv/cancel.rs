@@ -26,6 +26,8 @@ impl Agv {
             self.book.nodes.truncate(1);
             self.book.edges.clear();
         }
+        let moment = self.moment();
+        self.persona.cancel_begins(moment);
         self.book.cancel = Some(Cancel {
             action_id: action_id.to_owned(),
             to_node,
@@ -101,7 +103,7 @@ impl Agv {
         let unfinished = self.actions.order_unfinished()
             && !self.faults.has(F::CancelFinishedEarly)
             && !self.faults.has(F::CancelLeavesWaiting);
-        if under_way || unfinished {
+        if under_way || unfinished || self.persona.holds_cancel() {
             return false;
         }
         self.book.cancel = None;

@@ -16,9 +16,7 @@ use super::{Agv, Mode};
 
 /// The commands of [`crate::reference::Input::Command`]; unknown ones are ignored.
 ///
-/// `place-on {nodeId}`, `move-to {nodeId}` or `{x, y, theta}`, `place-obstacle {edgeId}`, `remove-obstacle {edgeId}`,
-/// `set-mode {mode}`, `enable-map {mapId, mapVersion}`, `place-load {loadId, loadType}`,
-/// `provoke-error {errorLevel}`, `trigger {actionId?}`; the others take nothing.
+/// What each does and takes is said in [`crate::profile::VEHICLE_WORDS`].
 pub const COMMANDS: &[&str] = &[
     "power-cycle",
     "shutdown",
@@ -45,6 +43,32 @@ pub const COMMANDS: &[&str] = &[
     "leave-field",
     "place-load",
     "remove-load",
+    "reset",
+    "well-behaved",
+    "break-off",
+    "stale-will",
+    "lose-position",
+    "find-position",
+    "halt",
+    "stop-before",
+    "go-on",
+    "set-battery",
+    "request-new-base",
+    "answer-after",
+    "state-interval",
+    "lose-states",
+    "stay-silent",
+    "ignore-orders",
+    "reject-orders",
+    "reject-updates",
+    "hold-cancel",
+    "fail-actions",
+    "refuse-map",
+    "declare",
+    "show",
+    "show-visualization",
+    "publish",
+    "speak-version",
 ];
 
 /// More things than this do not stand about.
@@ -55,6 +79,9 @@ const KEPT: Duration = Duration::from_secs(60);
 impl Agv {
     pub(super) fn command(&mut self, name: &str, arguments: &Value) {
         let text = |key: &str| arguments.get(key).and_then(Value::as_str).unwrap_or_default();
+        if self.persona_command(name, arguments) {
+            return;
+        }
         match name {
             "power-cycle" => self.power_cycle(),
             "shutdown" => self.shut_down(),
@@ -72,7 +99,7 @@ impl Agv {
                 self.obstacles.remove(text("edgeId"));
             }
             "drive-manually" => self.drive_manually(),
-            "provoke-error" => self.provoke_error(text("errorLevel") == "FATAL"),
+            "provoke-error" => self.provoke_error(text("errorLevel") == "FATAL", text("errorType")),
             "clear-error" => self.clear_error(),
             "emergency-stop" => self.emergency_stop(),
             "release-emergency-stop" => {
@@ -207,8 +234,12 @@ impl Agv {
     }
 
     /// A defect of the vehicle: with a FATAL one it does not run (ERR-03, ERR-04).
-    fn provoke_error(&mut self, fatal: bool) {
-        let name = if fatal { "scannerContaminated" } else { "maintenanceDue" };
+    fn provoke_error(&mut self, fatal: bool, error_type: &str) {
+        let name = match error_type {
+            "" if fatal => "scannerContaminated",
+            "" => "maintenanceDue",
+            named => named,
+        };
         let life = match () {
             () if self.faults.has(F::OwnErrorForgotten) => Life::Until(self.moment() + super::cancel::MOMENT),
             () if self.faults.has(F::OwnErrorKept) => Life::Until(self.moment() + KEPT),

@@ -54,6 +54,14 @@ impl Connection {
         self.attempt_at = Some(attempt_at);
     }
 
+    /// The link is gone, and not to be restored.
+    pub(super) fn stays_away(&mut self) {
+        self.online = false;
+        self.online_at = None;
+        self.shut_down = true;
+        self.attempt_at = None;
+    }
+
     /// Somebody wants the vehicle connected.
     pub(super) fn wanted_at(&mut self, moment: Moment) {
         if !self.online {
@@ -91,6 +99,12 @@ impl Agv {
             let mut message = self.header("connection", false);
             if self.faults.has(F::WillWithoutHeader) {
                 message.clear();
+            }
+            if self.persona.stale_will {
+                let utc = self.now.utc;
+                let long_ago = utc.checked_sub(jiff::SignedDuration::from_hours(24)).unwrap_or(utc);
+                message.insert("headerId".into(), json!(0));
+                message.insert("timestamp".into(), json!(format!("{long_ago:.2}")));
             }
             message.insert("connectionState".into(), json!(state));
             Publication {
@@ -195,12 +209,10 @@ impl Agv {
             self.pending
                 .push(if silent { Output::Drop } else { Output::Disconnect });
         }
-        self.connection.online = false;
-        self.connection.shut_down = true;
-        self.connection.attempt_at = None;
+        self.connection.stays_away();
     }
 
-    fn publish_connection(&mut self, state: &str) {
+    pub(super) fn publish_connection(&mut self, state: &str) {
         let mut body = Map::new();
         body.insert("connectionState".into(), json!(state));
         self.publish("connection", body, &[]);
@@ -280,7 +292,7 @@ impl Agv {
     }
 
     /// The header of the next message on a topic (HDR-01 to HDR-05).
-    fn header(&mut self, name: &'static str, counts: bool) -> Map<String, Value> {
+    pub(super) fn header(&mut self, name: &'static str, counts: bool) -> Map<String, Value> {
         let counter = if self.faults.has(F::HeaderIdShared) {
             "all"
         } else {
@@ -303,7 +315,7 @@ impl Agv {
             .filter(|_| self.faults.has(F::VersionShort))
         {
             Some((short, _)) => short,
-            None => &self.config.version,
+            None => self.persona.version.as_ref().unwrap_or(&self.config.version),
         };
         let serial = &self.config.serial_number;
         let serial_number = match () {

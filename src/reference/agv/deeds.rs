@@ -141,6 +141,10 @@ impl Agv {
         let Some(action) = self.actions.get(id).cloned() else {
             return;
         };
+        if let Some(error_type) = self.persona.failure_of(&action.request.action_type, action.of_order()) {
+            self.fail_as_told(&action, error_type);
+            return;
+        }
         match self.deed(&action) {
             Outcome::Done(result) => self.finish(id, result),
             Outcome::Failed(problem) => self.fail(id, &problem),
@@ -178,6 +182,15 @@ impl Agv {
         let mut references = problem.references.clone();
         references.retain(|(key, _)| key != "actionId" || !self.faults.has(F::FailureUnreferenced));
         self.warn(name.clone(), references, problem.reason.clone());
+    }
+
+    /// Ends an action without success because a test wants that.
+    pub(super) fn fail_as_told(&mut self, action: &Action, error_type: String) {
+        let problem = Problem::unable(action, "the action did not succeed");
+        if let Some(action) = self.actions.get_mut(&action.request.id) {
+            action.end(Status::Failed);
+        }
+        self.warn(error_type, problem.references, problem.reason);
     }
 
     fn forget_if_faulty(&mut self, id: &str) {
@@ -339,6 +352,7 @@ impl Agv {
             return Ok(());
         }
         self.lost = self.faults.has(F::InitPositionUninitialized);
+        self.persona.lost = false;
         self.maps.enable_any(map_id);
         let stale = action.of_order() && self.faults.has(F::LiftMapStale);
         let old = self.motion.pose(self.moment()).map_id;

@@ -35,6 +35,10 @@ impl Agv {
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
+        if let Some(error_type) = self.persona.map_refusal.clone() {
+            self.fail_as_told(&action, error_type);
+            return;
+        }
         let (map_id, version, url) = (
             action.text("mapId"),
             action.text("mapVersion"),

@@ -43,16 +43,22 @@ impl Agv {
         if self.faults.has(F::NoFactsheet) {
             return;
         }
-        let Value::Object(mut body) = self.factsheet() else {
-            return;
-        };
-        if self.config.minimal_factsheet {
-            strip(&mut body);
-        }
+        let mut body = self.shown_factsheet(self.true_factsheet());
         if self.faults.has(F::FactsheetWithoutLimits) {
             body.remove("protocolLimits");
         }
         self.publish("factsheet", body, &[]);
+    }
+
+    /// What it says about itself.
+    pub(super) fn true_factsheet(&self) -> Map<String, Value> {
+        let Value::Object(mut body) = self.factsheet() else {
+            return Map::new();
+        };
+        if self.config.minimal_factsheet {
+            strip(&mut body);
+        }
+        body
     }
 
     fn factsheet(&self) -> Value {

@@ -4,7 +4,8 @@
 //! (figure 8), `book` holds the order, `progress` drives it, `cancel` ends it (figure 9); `actions` knows when an
 //! action runs and `deeds` what it does; `instant` takes instant actions, `commands` what people do to the vehicle;
 //! `connection` and `report` speak to the broker. Every deviation from good behaviour is declared in `faults`, every
-//! liberty a good vehicle may take in `tolerances`; both are found in the code by name.
+//! liberty a good vehicle may take in `tolerances`; both are found in the code by name. As a mock vehicle before a
+//! master control it also has `personas`: deviations a test switches on and off while it runs.
 
 mod ability;
 mod acceptance;
@@ -26,6 +27,7 @@ mod maps;
 mod motion;
 mod order_message;
 mod path;
+mod personas;
 mod progress;
 mod read;
 mod rejection;
@@ -55,6 +57,7 @@ use errors::{ActiveError, Errors, Life};
 use faults::Faults;
 use maps::Maps;
 use motion::{Motion, Pose};
+use personas::Persona;
 use report::Report;
 
 /// A fault that is not in [`FAULTS`].
@@ -159,6 +162,8 @@ pub struct Agv {
     logs: u32,
     /// What was decided and is still to be handed to the driver.
     pending: Vec<Output>,
+    /// How a test told it to behave.
+    persona: Persona,
 }
 
 impl Agv {
@@ -220,6 +225,7 @@ impl Agv {
             states_sent: 0,
             logs: 0,
             pending: Vec::new(),
+            persona: Persona::default(),
             config,
         })
     }
@@ -253,6 +259,7 @@ impl Agv {
             self.lingers_until,
             self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
+            self.persona.next_end(),
             self.next_report(),
         ];
         events.into_iter().flatten().min()
@@ -281,6 +288,7 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
+        self.persona.expire(moment);
         self.lingers_until = self.lingers_until.filter(|until| *until > moment);
         while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
             match self.inbox.pop_front() {
@@ -307,9 +315,7 @@ impl Device for Agv {
         match input {
             Input::Connected => self.connected(),
             Input::ConnectionLost => self.connection_lost(),
-            Input::Message { .. } | Input::Command(..) => {
-                self.inbox.push_back((now.moment + self.config.answers_after, input));
-            }
+            Input::Message { .. } | Input::Command(..) => self.lay_down(input),
             Input::Time => {}
             Input::Download { token, progress } => self.download_progress(token, progress),
         }
@@ -323,6 +329,19 @@ impl Device for Agv {
 }
 
 impl Agv {
+    /// Puts something into the inbox. What people do does not wait behind messages that are taken late.
+    fn lay_down(&mut self, input: Input) {
+        let is_message = |input: &Input| matches!(input, Input::Message { .. });
+        let mut due = self.moment() + self.config.answers_after;
+        if is_message(&input) {
+            due = self.moment() + self.persona.answers_after.unwrap_or(self.config.answers_after);
+            let before = self.inbox.iter().filter(|(_, other)| is_message(other));
+            due = before.map(|(other, _)| *other).fold(due, Moment::max);
+        }
+        let at = self.inbox.partition_point(|(other, _)| *other <= due);
+        self.inbox.insert(at, (due, input));
+    }
+
     fn message(&mut self, topic: &str, payload: &[u8]) {
         if self.config.topic("order") == Some(topic) {
             self.order_received(payload);

@@ -77,6 +77,8 @@ impl Agv {
         let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
         let warned = self.faults.has(F::WarningBlocks) && !self.errors.is_empty();
         self.mode.takes_orders()
+            && !self.persona.halted
+            && !self.persona.lost
             && self.lingers_until.is_none()
             && !held
             && !cancelled
@@ -184,6 +186,7 @@ impl Agv {
         let stops = edge.is_some_and(|edge| self.actions.edge_stops(edge.sequence_id));
         let (way, to_node) = match stops && !self.faults.has(F::EdgeActionsLate) {
             true => (BRAKING.min(distance / 4.0), false),
+            false if self.stops_before(&stop.node.id) => (distance / 2.0, false),
             false if self.turns_late() => (distance / 3.0, false),
             false if self.faults.has(F::TraversedEarly) => ((distance - 0.5).max(distance / 2.0), true),
             false => (distance, true),
@@ -272,6 +275,10 @@ impl Agv {
     pub(super) fn leg_finished(&mut self, rolled: bool) {
         if !rolled || self.motion.reached || !self.book.entered {
             return;
+        }
+        let ahead = self.book.nodes.front();
+        if ahead.is_some_and(|stop| self.stops_before(&stop.node.id)) {
+            (self.persona.halted, self.persona.stop_before) = (true, None);
         }
         let Some(sequence_id) = self.book.edge_ahead().map(|edge| edge.sequence_id) else {
             return;

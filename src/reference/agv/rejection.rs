@@ -162,7 +162,7 @@ impl Agv {
 }
 
 /// References that identify the message, as far as it can be read (BP-02).
-fn message_references(message: &Value) -> Vec<(String, String)> {
+pub(super) fn message_references(message: &Value) -> Vec<(String, String)> {
     let mut references = vec![("topic".to_owned(), "order".to_owned())];
     for key in ["headerId", "orderId", "orderUpdateId"] {
         match message.get(key) {

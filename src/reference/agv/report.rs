@@ -108,7 +108,18 @@ impl Agv {
         self.report.next_visualization = self.visualization_interval().map(|_| self.moment());
     }
 
+    /// The shortest time between two states.
+    fn min_state_interval(&self) -> Duration {
+        let told = self.persona.state_interval;
+        told.unwrap_or_default().max(self.config.min_state_interval)
+    }
+
     fn state_interval(&self) -> Duration {
+        self.usual_interval()
+            .max(self.persona.state_interval.unwrap_or_default())
+    }
+
+    fn usual_interval(&self) -> Duration {
         if self.faults.has(F::StateSilence) {
             Duration::from_secs(45)
         } else if self.faults.has(F::StateIntervalExceeded) {
@@ -143,7 +154,7 @@ impl Agv {
         }
         let last = self.report.last.as_ref().map(|(sent, _)| *sent)?;
         let state = if self.report.delayed {
-            self.config.min_state_interval
+            self.min_state_interval()
         } else {
             self.state_interval()
         };
@@ -183,7 +194,7 @@ impl Agv {
         let mut changes = Changes::between(last, &body);
         changes.order = self.report.order_received;
         let requested = self.report.requested;
-        let too_soon = *sent + self.config.min_state_interval > moment;
+        let too_soon = *sent + self.min_state_interval() > moment;
         self.report.delayed = false;
         if periodic {
             self.send_state(body, true);
@@ -270,8 +281,11 @@ impl Agv {
             () if self.takes(T::EveryStateTwice) => 2,
             () => 1,
         };
-        for _ in 0..times {
-            self.publish("state", body.clone(), &mangle);
+        if !self.swallows_state() {
+            let body = self.shown_state(body);
+            for _ in 0..times {
+                self.publish("state", body.clone(), &mangle);
+            }
         }
         let next_visualization = self.report.next_visualization;
         self.report = Report {
@@ -294,6 +308,7 @@ impl Agv {
             body.insert("agvPosition".into(), self.position_picture());
         }
         body.insert("velocity".into(), self.velocity_picture());
+        let body = self.shown_visualization(body);
         self.publish("visualization", body, &[]);
     }
 }

@@ -10,6 +10,7 @@ mod link;
 mod maps;
 mod orders;
 mod people;
+mod personas;
 mod rejections;
 mod scenarios;
 

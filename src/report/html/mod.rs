@@ -18,6 +18,7 @@ use askama::Template;
 
 pub use escape::Escape;
 
+use super::fleet;
 use super::result::{Capability, RunResult};
 use super::sources::Sources;
 use super::statement;
@@ -55,6 +56,11 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
         identity: view::identity(result),
         counts: view::counts(result),
         limits: statement::limits(result),
+        fleet: result.fleet.as_ref().map(fleet::line).unwrap_or_default(),
+        reactions: match result.fleet.as_ref().and_then(|fleet| fleet.reaction.as_ref()) {
+            Some(reaction) => fleet::plot(reaction)?,
+            None => String::new(),
+        },
         chapters: matrix::chapters(result, sources, &anchors),
         not_applicable: tests.iter().any(|test| test.not_applicable),
         tests,
@@ -93,6 +99,8 @@ struct Page<'a> {
     identity: Vec<(&'static str, String)>,
     counts: Vec<CountRow>,
     limits: Vec<String>,
+    fleet: String,
+    reactions: String,
     chapters: Vec<ChapterView>,
     tests: Vec<TestView>,
     shown_tests: usize,

@@ -250,13 +250,22 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
                 format!("HTTP {status}{}", text(phase)),
             )
         }
-        Event::Hook { hook, ok, detail } => {
+        Event::Hook { hook, ok, detail, .. } => {
             let done = if *ok { "done" } else { "failed" };
             plain(
                 entry,
                 What::Box(Harness),
                 format!("hook {} {done}", text(hook)),
                 text(detail),
+            )
+        }
+        Event::Vehicle { vehicle, what, with } => {
+            let which = if *vehicle == 0 { "" } else { " 2" };
+            plain(
+                entry,
+                What::Box(Harness),
+                format!("vehicle{which}: {}", text(what)),
+                text(&with.to_string()),
             )
         }
         Event::Answer { answer, .. } => plain(entry, What::Box(Harness), "the operator answers", text(answer)),

@@ -186,17 +186,39 @@ impl<'a> Scope<'a> {
                 is_course_use(rest),
                 "`${course.a}` is a node, `${course.a-b}` an edge, `${course.a.x}` a value of a node".to_owned(),
             ),
+            // A test may have an action of that name.
+            "vehicle" | "second" | "each" if self.names.contains_key(root) || self.comes_later(root) => {
+                self.defined(name, root, rest, span, unknown)
+            }
+            "vehicle" | "second" if ["manufacturer", "serialNumber"].contains(&rest) => None,
+            "vehicle" | "second" => unknown(did_you_mean(rest, ["manufacturer", "serialNumber"])),
+            "each" => only_in_tests(
+                ["manufacturer", "serialNumber", "next"].contains(&rest),
+                "`${each.serialNumber}`, `${each.manufacturer}` and `${each.next}` go with `each: vehicle`".to_owned(),
+            ),
             "run" => only_in_tests(!rest.is_empty(), "write such as `${run.order}`".to_owned()),
             "serve" => self.served(name, rest, span),
             // Filled in, or noted, before the steps were read.
             "case" | "with" if self.in_test => None,
             _ if !self.in_test => only_in_tests(false, String::new()),
-            _ => match self.names.get(root_name) {
-                Some(Origin::Saved) => None,
-                Some(Origin::Action(_)) if rest == "id" => None,
-                Some(Origin::Action(_)) => unknown(format!("`${{{root}.id}}` is its actionId")),
-                None => self.undefined(name, root_name, span),
-            },
+            _ => self.defined(name, root_name, rest, span, unknown),
+        }
+    }
+
+    /// A name that a step of the test defines.
+    fn defined(
+        &self,
+        name: &str,
+        root: &str,
+        rest: &str,
+        span: &Span,
+        unknown: impl Fn(String) -> Option<Diagnostic>,
+    ) -> Option<Diagnostic> {
+        match self.names.get(root) {
+            Some(Origin::Saved) => None,
+            Some(Origin::Action(_)) if rest == "id" => None,
+            Some(Origin::Action(_)) => unknown(format!("`${{{root}.id}}` is its actionId")),
+            None => self.undefined(name, root, span),
         }
     }
 
@@ -211,7 +233,9 @@ impl<'a> Scope<'a> {
             .names
             .keys()
             .map(String::as_str)
-            .chain(["time", "device", "course", "run", "vda", "serve"])
+            .chain([
+                "time", "device", "course", "run", "vda", "serve", "vehicle", "second", "each",
+            ])
             .collect();
         Some(
             Diagnostic::new(

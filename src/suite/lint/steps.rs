@@ -3,10 +3,16 @@
 use super::paths::Topic;
 use super::scope::Scope;
 use super::{Linter, within};
-use crate::diagnostic::Span;
+use crate::diagnostic::{Diagnostic, Span};
 use crate::journal::event::LinkFault;
 use crate::pack::Role;
-use crate::suite::model::{Extent, Path, Section, Send, Step, Verb, Walk};
+use crate::profile::{VEHICLE_WORDS, find_vehicle_word};
+use crate::suite::model::{Binding, Extent, Path, Section, Send, Step, VehicleStep, Verb, Walk, Which};
+
+/// Where the first requirement of a clause is written.
+fn first_bound(bindings: &[Binding]) -> Option<&Span> {
+    bindings.first().map(|binding| &binding.span)
+}
 
 impl Linter<'_> {
     pub(super) fn step(&mut self, step: &Step, section: Section, packs: &[usize], scope: &Scope<'_>) {
@@ -17,7 +23,9 @@ impl Linter<'_> {
         match &step.verb {
             Verb::Send(send) => self.send(send, packs, at),
             Verb::Expect(expect) => {
-                if self.observed_topic(&expect.topic, packs, at) {
+                let judged = expect.assert.iter().chain(&expect.prefer).map(|one| &one.span);
+                let bound = first_bound(&expect.checks).or_else(|| judged.into_iter().next());
+                if self.whose(expect.of, &expect.topic, step) && self.watched_topic(&expect.topic, packs, at, bound) {
                     self.selection(&expect.selection, &expect.topic, &expect.checks, packs);
                     self.assertions(&expect.assert, &expect.topic, packs);
                     self.assertions(&expect.prefer, &expect.topic, packs);
@@ -25,16 +33,18 @@ impl Linter<'_> {
                 }
             }
             Verb::Never(never) => {
-                if self.observed_topic(&never.topic, packs, at) {
+                let bound = first_bound(&never.checks);
+                if self.whose(never.of, &never.topic, step) && self.watched_topic(&never.topic, packs, at, bound) {
                     self.selection(&never.selection, &never.topic, &never.checks, packs);
                 }
             }
             Verb::Always(always) => {
-                if self.observed_topic(&always.topic, packs, at) {
+                let bound = first_bound(&always.checks);
+                if self.whose(always.of, &always.topic, step) && self.watched_topic(&always.topic, packs, at, bound) {
                     self.selection(&always.selection, &always.topic, &always.checks, packs);
                 }
                 if let Extent::Until(until) = &always.extent
-                    && self.observed_topic(&until.topic, packs, &until.at)
+                    && self.watched_topic(&until.topic, packs, &until.at, first_bound(&until.checks))
                 {
                     self.selection(&until.selection, &until.topic, &until.checks, packs);
                 }
@@ -54,6 +64,11 @@ impl Linter<'_> {
                     }
                 }
                 self.requirements(&action.checks, packs);
+                if self.role == Some(Role::MasterControl)
+                    && let Some(at) = first_bound(&action.checks)
+                {
+                    self.own_vehicle("state", at);
+                }
                 self.walk(&action.through, packs, &step.span);
                 if let Some(tolerated) = &action.tolerated {
                     self.walk(tolerated, packs, &step.span);
@@ -81,18 +96,82 @@ impl Linter<'_> {
                 let parameters: Vec<&str> = operator.with.iter().map(|(name, _)| name.as_str()).collect();
                 self.hook(&operator.hook, &parameters, at);
             }
-            Verb::Vehicle(_) => {
-                if self.role != Some(Role::MasterControl) {
-                    self.problems.at(
-                        "misplaced-verb",
-                        at,
-                        "`vehicle` sets the mock vehicle that a master control is tested with",
-                        "here the vehicle is the device under test",
-                    );
-                }
-            }
+            Verb::Vehicle(vehicle) => self.vehicle(vehicle, step),
             Verb::Serve(_) => {}
         }
+    }
+
+    fn vehicle(&mut self, vehicle: &VehicleStep, step: &Step) {
+        let at = &step.verb_span;
+        if self.role != Some(Role::MasterControl) {
+            self.problems.at(
+                "misplaced-verb",
+                at,
+                "`vehicle` is about the mock vehicle that a master control is tested with",
+                "here the vehicle is the device under test",
+            );
+            return;
+        }
+        let Some(word) = find_vehicle_word(&vehicle.what) else {
+            let names: Vec<&str> = VEHICLE_WORDS.iter().map(|word| word.name).collect();
+            self.problems
+                .unknown("unknown-vehicle-word", at, "word for a vehicle", &vehicle.what, names);
+            return;
+        };
+        for (parameter, _) in &vehicle.with {
+            if !word.parameters.contains(&parameter.as_str()) {
+                let at = within(&step.span, parameter);
+                let known = word.parameters.iter().copied();
+                self.problems
+                    .unknown("unknown-argument", &at, "parameter of the word", parameter, known);
+            }
+        }
+    }
+
+    /// Whether there can be such a vehicle here.
+    fn whose(&mut self, of: Which, topic: &str, step: &Step) -> bool {
+        let (title, label) = match of {
+            Which::Second if self.role != Some(Role::MasterControl) => (
+                "`of` names one of the mock vehicles that a master control is tested with",
+                "here the vehicle is the device under test",
+            ),
+            Which::Second if super::pictures::has(topic) => (
+                "`of` goes with the topics of a vehicle",
+                "this belongs to the master control",
+            ),
+            Which::First | Which::Second => return true,
+        };
+        self.problems
+            .at("misplaced-key", &within(&step.span, of.word()), title, label);
+        false
+    }
+
+    /// A topic on which something is awaited: from the device, or, to keep in step, from the mock vehicle.
+    fn watched_topic(&mut self, name: &str, packs: &[usize], at: &Span, bound: Option<&Span>) -> bool {
+        let own = self.role == Some(Role::MasterControl)
+            && packs
+                .iter()
+                .flat_map(|pack| self.vocabulary.topics(*pack))
+                .any(|(topic, publisher)| topic == name && publisher == Role::Agv);
+        if !own {
+            return self.observed_topic(name, packs, at);
+        }
+        if let Some(at) = bound {
+            self.own_vehicle(name, at);
+        }
+        bound.is_none()
+    }
+
+    fn own_vehicle(&mut self, topic: &str, at: &Span) {
+        self.problems.add(
+            Diagnostic::new(
+                "own-vehicle",
+                at.clone(),
+                format!("`{topic}` comes from the harness's own vehicle and decides nothing"),
+                "bound to a requirement all the same",
+            )
+            .hint("wait for it without `checks:` and `assert:`, and judge what the master control sends"),
+        );
     }
 
     fn must_not_decide(&mut self, step: &Step, section: Section) {

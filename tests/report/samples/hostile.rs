@@ -63,6 +63,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         hook: evil(),
         ok: false,
         detail: evil(),
+        vehicle: None,
     });
     record.harness(Event::Answer {
         prompt: evil(),

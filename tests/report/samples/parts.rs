@@ -165,6 +165,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
                 "factsheet says yes, profile says no",
             ),
         ],
+        fleet: None,
         limits: vec!["Only tests of the group order were selected.".to_owned()],
         deviations: BTreeMap::new(),
         settings: vec![

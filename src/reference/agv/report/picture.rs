@@ -57,7 +57,7 @@ impl Agv {
         }
         set(
             "newBaseRequest",
-            json!(self.book.base_runs_low() || has(F::NewBaseRequestAlways)),
+            json!(self.book.base_runs_low() || self.persona.wants_base || has(F::NewBaseRequestAlways)),
         );
         set(
             "actionStates",
@@ -234,7 +234,7 @@ impl Agv {
             }
         };
         json!({
-            "positionInitialized": !self.lost,
+            "positionInitialized": !(self.lost || self.persona.lost),
             "localizationScore": 0.98,
             "x": number(pose.x),
             "y": number(y),
@@ -282,7 +282,7 @@ impl Agv {
         if !self.faults.has(F::ChargeMissing) {
             let charge = match self.motion.is_moving() {
                 moving if self.faults.has(F::ChargeGoodBad) => json!(if moving { 0.0 } else { 100.0 }),
-                _ => json!(87.5),
+                _ => json!(self.persona.charge.unwrap_or(87.5)),
             };
             battery.insert("batteryCharge".into(), charge);
         }

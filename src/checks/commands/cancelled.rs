@@ -1,0 +1,184 @@
+//! `commands/base-kept`: a base is given up only by cancelOrder.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::vehicle::{Outside, Vehicle};
+use super::{Command, ELEMENTS, Found, released, short};
+use crate::checks::orders::number;
+use crate::checks::traffic::{Traffic, elements, quote, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
+use crate::journal::Entry;
+
+/// See the module.
+pub(in crate::checks) const BASE_KEPT: Check = Check {
+    name: "commands/base-kept",
+    decides: &["ORD-CANCEL-01"],
+    doc: "While the states of the vehicle show released elements of an order, no other order is sent to it and no update \
+          replaces them, unless cancelOrder has come before and the vehicle has reported it done or shows nothing left \
+          of the order. A vehicle that may have given its order up by itself is not judged.",
+    arguments: &[],
+    start: |_| Box::new(BaseKept::default()),
+};
+
+/// How many released elements and orders are remembered.
+const KEPT: usize = 4096;
+
+#[derive(Default)]
+struct BaseKept {
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// The order sent last, its released elements by sequenceId, and whether the vehicle took it over.
+    order: String,
+    base: std::collections::BTreeMap<u64, String>,
+    taken: bool,
+    /// Orders that were sent before.
+    before: BTreeSet<String>,
+    /// The actionId of the last cancelOrder for it.
+    cancel: Option<String>,
+    /// Whether something may have ended the order without cancelOrder.
+    free: bool,
+}
+
+impl BaseKept {
+    /// Whether the vehicle has an order in hand that has not been called off.
+    fn is_busy(&self) -> bool {
+        let Some(seen) = self.vehicle.last() else { return false };
+        if self.free || !self.taken || seen.order != self.order {
+            return false;
+        }
+        match &self.cancel {
+            None => seen.base > 0,
+            Some(id) => {
+                let status = seen
+                    .actions
+                    .iter()
+                    .find(|(action, _)| action == id)
+                    .map(|(_, status)| status.as_str());
+                match status {
+                    Some("FINISHED" | "FAILED") => false,
+                    Some(_) => true,
+                    None => seen.base > 0,
+                }
+            }
+        }
+    }
+
+    fn forget(&mut self) {
+        self.before.insert(std::mem::take(&mut self.order));
+        self.base.clear();
+        self.cancel = None;
+        self.taken = false;
+        self.free = false;
+        if self.before.len() > KEPT {
+            self.before.pop_first();
+        }
+    }
+}
+
+impl Running for BaseKept {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        match self.vehicle.note(entry, context) {
+            Outside::No => {}
+            Outside::Deviates => self.free = true,
+            Outside::Moved | Outside::Lost => self.forget(),
+        }
+        if let Some(seen) = self.vehicle.last() {
+            self.taken |= seen.order == self.order;
+            self.free |= self.taken && seen.abandons && self.cancel.is_none();
+        }
+        let command = Command::read(self.traffic, entry, context);
+        let Some(command) = command.filter(|_| !self.traffic.disturbed) else {
+            return false;
+        };
+        let Command::Order(order) = command else {
+            for (_, action) in command.actions() {
+                if text(action, "actionType") == "cancelOrder" {
+                    self.cancel = short(action, "actionId");
+                }
+            }
+            return false;
+        };
+        let Some(id) = short(order, "orderId") else {
+            return false;
+        };
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        if id != self.order {
+            // An older order that comes again was not meant to replace anything.
+            if self.before.contains(&id) {
+                return false;
+            }
+            if self.is_busy() {
+                let (new, old) = (quote(&id), quote(&self.order));
+                let why = if self.cancel.is_some() {
+                    "cancelOrder is not done"
+                } else {
+                    "it was not called off"
+                };
+                found.broken(
+                    "ORD-CANCEL-01",
+                    format!("order {new} comes while order {old} is driven: {why}"),
+                );
+                judged = true;
+            }
+            judged |= self.cancel.is_some();
+            self.forget();
+            self.order = id;
+        } else if self.cancel.is_none() && self.is_busy() {
+            judged = self.replaced(order, &mut found);
+        }
+        let base = released_elements(order).collect::<Vec<_>>();
+        for (sequence, id) in base {
+            if self.base.len() < KEPT {
+                self.base.insert(sequence, id);
+            }
+        }
+        judged
+    }
+}
+
+impl BaseKept {
+    /// An update with other elements in the place of released ones.
+    fn replaced(&self, order: &Value, found: &mut Found<'_>) -> bool {
+        let other = released_elements(order).find_map(|(sequence, id)| {
+            let known = self.base.get(&sequence).filter(|known| **known != id)?;
+            Some((sequence, known, id))
+        });
+        let Some((sequence, known, id)) = other else {
+            return false;
+        };
+        // Numbers that begin anew are another mistake.
+        let first = elements(order, "nodes")
+            .filter_map(|node| number(node, "sequenceId"))
+            .min();
+        let restarted = first.is_some_and(|first| {
+            self.base
+                .keys()
+                .next_back()
+                .is_some_and(|last| first + 1 < *last && first == 0)
+        });
+        if restarted {
+            return false;
+        }
+        let text = format!(
+            "an update puts {} in the place of {}, sequenceId {sequence}",
+            quote(&id),
+            quote(known)
+        );
+        found.broken("ORD-CANCEL-01", text);
+        true
+    }
+}
+
+fn released_elements(order: &Value) -> impl Iterator<Item = (u64, String)> {
+    [("nodes", "nodeId"), ("edges", "edgeId")]
+        .into_iter()
+        .flat_map(move |(list, id)| {
+            let all = elements(order, list).take(ELEMENTS);
+            let base = all.filter(|element| released(element) == Some(true));
+            base.filter_map(move |element| Some((number(element, "sequenceId")?, short(element, id)?)))
+        })
+}

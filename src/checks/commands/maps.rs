@@ -1,0 +1,219 @@
+//! Maps: only enabled ones are used, and they are brought to the vehicle in order.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use serde_json::Value;
+
+use super::sheet::grace;
+use super::vehicle::{Outside, Vehicle};
+use super::{Command, ELEMENTS, Each, Found, in_sequence, parameter, place_of, said, short};
+use crate::checks::traffic::{Traffic, elements, quote, show, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
+use crate::clock::Moment;
+use crate::journal::Entry;
+
+/// `commands/map-enabled`.
+pub(in crate::checks) const ENABLED: Check = Check {
+    name: "commands/map-enabled",
+    decides: &["MAP-09"],
+    doc: "The nodes of an order are on maps that the states of the vehicle list as ENABLED, or that the master control \
+          has had downloaded or enabled before. Judged only for a vehicle that lists maps.",
+    arguments: &[],
+    start: |_| Box::new(Enabled::default()),
+};
+
+/// `commands/map-download`.
+pub(in crate::checks) const DOWNLOADS: Check = Check {
+    name: "commands/map-download",
+    decides: &["MAP-16"],
+    doc: "downloadMap names mapId and mapDownloadLink; without mapVersion it is a warning.",
+    arguments: &[],
+    start: |_| Each::start(download),
+};
+
+/// `commands/map-duplicate`.
+pub(in crate::checks) const DUPLICATES: Check = Check {
+    name: "commands/map-duplicate",
+    decides: &["MAP-28"],
+    doc: "When a downloadMap has failed for a map version the vehicle already lists, deleteMap for it comes before the \
+          next downloadMap for it.",
+    arguments: &[],
+    start: |_| Box::new(Duplicates::default()),
+};
+
+/// How many maps or downloads are remembered.
+const KEPT: usize = 256;
+
+fn download(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
+    let mut judged = false;
+    for (_, action) in command.actions() {
+        if text(action, "actionType") != "downloadMap" {
+            continue;
+        }
+        judged = true;
+        for key in ["mapId", "mapDownloadLink"] {
+            let value = parameter(action, key);
+            if value.and_then(Value::as_str).is_none_or(str::is_empty) {
+                let shown = value.map_or_else(|| "missing".to_owned(), show);
+                found.broken("MAP-16", format!("{key} of downloadMap is {shown}"));
+            }
+        }
+        if parameter(action, "mapVersion").is_none() {
+            found.remark("MAP-16", "mapVersion of downloadMap is missing");
+        }
+    }
+    judged
+}
+
+/// mapId and mapVersion of an action on maps.
+fn pair(action: &Value) -> Option<(String, String)> {
+    let text = |key: &str| Some(parameter(action, key)?.as_str()?.chars().take(256).collect());
+    Some((text("mapId")?, text("mapVersion").unwrap_or_default()))
+}
+
+#[derive(Default)]
+struct Enabled {
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// Enabled maps of the last states; `None` for a state that lists no maps.
+    reported: VecDeque<(Moment, Option<BTreeSet<String>>)>,
+    /// Maps that the master control has begun to bring to the vehicle.
+    ordered: BTreeSet<String>,
+}
+
+impl Running for Enabled {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+            self.reported.clear();
+        }
+        if let Some(state) = said("state", entry, context) {
+            let listed = state
+                .get("maps")
+                .and_then(Value::as_array)
+                .filter(|maps| !maps.is_empty());
+            let enabled = listed.map(|maps| {
+                let on = maps.iter().take(KEPT).filter(|map| text(map, "mapStatus") == "ENABLED");
+                on.filter_map(|map| short(map, "mapId")).collect()
+            });
+            if self.reported.len() == 64 {
+                self.reported.pop_front();
+            }
+            self.reported.push_back((entry.at().moment, enabled));
+        }
+        let Some(command) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        for (_, action) in command.actions() {
+            if matches!(text(action, "actionType"), "enableMap" | "downloadMap")
+                && let Some((map, _)) = pair(action)
+                && self.ordered.len() < KEPT
+            {
+                self.ordered.insert(map);
+            }
+        }
+        let Some(order) = command.order() else { return false };
+        let (now, grace) = (entry.at().moment, grace(context));
+        let newest = self.reported.iter().rev();
+        let fresh = newest.clone().take_while(|(said, _)| now.since(*said) < grace).count();
+        let recent: Vec<_> = newest.take(fresh + 1).map(|(_, enabled)| enabled.as_ref()).collect();
+        if recent.is_empty() || recent.iter().any(Option::is_none) || self.vehicle.unsettled(entry, context) {
+            return false;
+        }
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        let mut said = BTreeSet::new();
+        for node in in_sequence(order, "nodes") {
+            let Some((_, _, map)) = place_of(node).filter(|(_, _, map)| !map.is_empty()) else {
+                continue;
+            };
+            judged = true;
+            let known = recent.iter().flatten().any(|enabled| enabled.contains(map)) || self.ordered.contains(map);
+            if !known && said.insert(map) {
+                found.broken(
+                    "MAP-09",
+                    format!("the order is on map {}, which is not enabled", quote(map)),
+                );
+            }
+        }
+        judged
+    }
+}
+
+#[derive(Default)]
+struct Duplicates {
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// Downloads by actionId.
+    asked: BTreeMap<String, (String, String)>,
+    /// Actions that were sent before: what comes again under the same id is no new download.
+    sent: BTreeSet<String>,
+    /// Pairs that were refused as duplicates, since when, and not deleted since.
+    refused: BTreeMap<(String, String), Moment>,
+}
+
+impl Duplicates {
+    fn note_state(&mut self, state: &Value, at: Moment) {
+        let has = |pair: &(String, String)| {
+            elements(state, "maps")
+                .take(KEPT)
+                .any(|map| text(map, "mapId") == pair.0 && text(map, "mapVersion") == pair.1)
+        };
+        for action in elements(state, "actionStates").take(ELEMENTS) {
+            if text(action, "actionStatus") != "FAILED" {
+                continue;
+            }
+            // Each download is looked at once.
+            if let Some(pair) = self.asked.remove(text(action, "actionId"))
+                && has(&pair)
+            {
+                self.refused.insert(pair, at);
+            }
+        }
+    }
+}
+
+impl Running for Duplicates {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+            self.asked.clear();
+            self.refused.clear();
+        }
+        if let Some(state) = said("state", entry, context) {
+            self.note_state(state, entry.at().moment);
+        }
+        let Some(command) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        for (_, action) in command.actions() {
+            let Some(pair) = pair(action) else { continue };
+            match text(action, "actionType") {
+                "deleteMap" => judged |= self.refused.remove(&pair).is_some(),
+                "downloadMap" => {
+                    let id = short(action, "actionId").unwrap_or_default();
+                    if self.sent.len() == KEPT {
+                        self.sent.pop_first();
+                    }
+                    if !self.sent.insert(id.clone()) {
+                        continue;
+                    }
+                    let late = |at: &Moment| entry.at().moment.since(*at) >= grace(context);
+                    if self.refused.get(&pair).is_some_and(late) {
+                        let text = format!("map {} is downloaded again, and was not deleted", quote(&pair.0));
+                        found.broken("MAP-28", text);
+                        self.refused.remove(&pair);
+                        judged = true;
+                    }
+                    if self.asked.len() < KEPT {
+                        self.asked.insert(id, pair);
+                    }
+                }
+                _ => {}
+            }
+        }
+        judged
+    }
+}

@@ -1,0 +1,91 @@
+//! Hooks of a run: those of a profile, or commands to the built-in device.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::cli::problem::Problem;
+use crate::engine::{HookOutcome, Operator};
+use crate::link::mqtt::BenchInfo;
+use crate::profile::{self, Profile};
+use crate::run::Bundle;
+use crate::run::device_driver::RunningDevice;
+use crate::run::hooks::{DeviceProcess, ProfileHooks};
+
+/// The hooks of a profile; starts the device if the profile says how.
+pub(super) fn of_profile(
+    profile: &Profile,
+    info: &BenchInfo,
+    bundle: &Bundle,
+    folder: &Path,
+) -> Result<ProfileHooks, Problem> {
+    let (host, port) = info
+        .device_address
+        .rsplit_once(':')
+        .unwrap_or((&info.device_address, "1883"));
+    let device = &profile.device;
+    let common: BTreeMap<String, String> = [
+        ("broker-host", host.to_owned()),
+        ("broker-port", port.to_owned()),
+        ("manufacturer", device.manufacturer.clone().unwrap_or_default()),
+        ("serial-number", device.serial_number.clone().unwrap_or_default()),
+        (
+            "vehicle",
+            profile.vehicles.serial_numbers.first().cloned().unwrap_or_default(),
+        ),
+        ("free-port", free_port()?),
+    ]
+    .into_iter()
+    .map(|(name, value)| (name.to_owned(), value))
+    .collect();
+    let mut process = device.command.as_ref().map(|command| {
+        let filled = command
+            .iter()
+            .map(|word| profile::fill(word, &common, str::to_owned))
+            .collect();
+        DeviceProcess::new(filled, folder.to_owned(), Some(bundle.folder().join("device.log")))
+    });
+    if let Some(process) = &mut process {
+        process
+            .start()
+            .map_err(|error| Problem::Environment(error.to_string()))?;
+    }
+    let attended = console::user_attended();
+    Ok(ProfileHooks::new(
+        profile.hooks.clone(),
+        common,
+        folder.to_owned(),
+        process,
+        attended,
+    ))
+}
+
+/// A port of this machine that nobody uses now.
+fn free_port() -> Result<String, Problem> {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0");
+    let address = listener.and_then(|listener| listener.local_addr());
+    let address = address.map_err(|error| Problem::Environment(format!("no port is free: {error}")))?;
+    Ok(address.port().to_string())
+}
+
+/// Hooks of the built-in device: commands to its driver.
+pub(super) struct Commands {
+    pub device: RunningDevice,
+    pub hooks: &'static [&'static str],
+}
+
+impl Operator for Commands {
+    fn hooks(&self) -> Vec<String> {
+        self.hooks.iter().map(|hook| (*hook).to_owned()).collect()
+    }
+
+    async fn run(&mut self, hook: &str, parameters: serde_json::Map<String, serde_json::Value>) -> HookOutcome {
+        if !self.hooks.contains(&hook) {
+            return HookOutcome::Missing;
+        }
+        if self.device.command(hook, serde_json::Value::Object(parameters)).await {
+            HookOutcome::Done("done by the built-in device".to_owned())
+        } else {
+            HookOutcome::Failed("the built-in device is not running any more".to_owned())
+        }
+    }
+}

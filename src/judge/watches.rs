@@ -1,0 +1,157 @@
+//! The monitors on duty, for every vehicle of a run.
+//!
+//! When an AGV is tested there is one vehicle. A master control has one topic tree for each vehicle it commands: every
+//! mock AGV gets monitors of its own, and what they find is put together. What belongs to no vehicle, such as the
+//! CONNECT packet, is shown to the monitors of the first one only.
+
+use std::sync::Arc;
+
+use super::monitor::MonitorJudge;
+use super::test::Ground;
+use super::timeline::Timeline;
+use crate::clock::Moment;
+use crate::journal::Entry;
+use crate::journal::event::{Event, Packet};
+use crate::report::result::MonitorResult;
+use crate::suite::model::Monitor;
+use crate::verdict::{Accumulated, Verdict};
+
+/// All monitors.
+pub(super) struct Watches {
+    first: Vec<MonitorJudge>,
+    /// Those of further vehicles, with what is known of them.
+    others: Vec<(Ground, Vec<MonitorJudge>)>,
+}
+
+/// A monitor and what it found on all vehicles.
+pub(super) struct Watched {
+    pub monitor: Arc<Monitor>,
+    pub result: MonitorResult,
+}
+
+impl Watched {
+    /// What it says about each requirement it is bound to, or found something about.
+    pub fn decisions(&self) -> Vec<(String, Verdict)> {
+        let found = self.result.findings.iter();
+        let mut all: Vec<(String, Verdict)> = found.map(|f| (f.requirement.clone(), f.verdict)).collect();
+        if self.result.judged > 0 {
+            let bound = self.monitor.checks.iter();
+            all.extend(bound.map(|binding| (binding.requirement.as_str().to_owned(), Verdict::Pass)));
+        }
+        all
+    }
+
+    fn absorb(&mut self, other: MonitorResult) {
+        self.result.judged += other.judged;
+        for finding in other.findings {
+            let known = self
+                .result
+                .findings
+                .iter_mut()
+                .find(|known| known.requirement == finding.requirement && known.verdict == finding.verdict);
+            match known {
+                Some(known) => known.count += finding.count,
+                None => self.result.findings.push(finding),
+            }
+        }
+        let verdicts: Accumulated = [self.result.verdict, other.verdict].into_iter().flatten().collect();
+        self.result.verdict = verdicts.get();
+    }
+}
+
+impl Watches {
+    /// Puts the monitors on duty. `ground` is that of the first vehicle.
+    pub fn begin(monitors: &[&Arc<Monitor>], ground: &Ground, others: Vec<Ground>, tap: bool) -> Self {
+        let start = |ground: &Ground| {
+            let all = monitors.iter();
+            all.filter_map(|monitor| MonitorJudge::start(monitor, ground, tap))
+                .collect()
+        };
+        let first = start(ground);
+        let others = others.into_iter().map(|ground| {
+            let own = start(&ground);
+            (ground, own)
+        });
+        Self {
+            first,
+            others: others.collect(),
+        }
+    }
+
+    /// Shows the next entry to those it concerns.
+    pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, timeline: &Timeline, ground: &Ground) {
+        let place = timeline.place(entry);
+        if place.is_none_or(|place| place.vehicle == 0) {
+            // What the harness's own vehicles say is context, and not the subject of any monitor.
+            let subject = subject.filter(|_| !matches!(entry.event(), Event::Sent { .. }));
+            for monitor in &mut self.first {
+                monitor.observe(entry, subject, ground);
+            }
+        }
+        if self.others.is_empty() {
+            return;
+        }
+        match place {
+            Some(place) => {
+                let own = place.vehicle.checked_sub(1).and_then(|at| self.others.get_mut(at));
+                let Some((ground, monitors)) = own else { return };
+                let subject = matches!(entry.event(), Event::Message { .. }).then_some(place.name.as_str());
+                for monitor in monitors {
+                    monitor.observe(entry, subject, ground);
+                }
+            }
+            None if is_of_connection(entry) => {}
+            None => {
+                for (ground, monitors) in &mut self.others {
+                    for monitor in monitors {
+                        monitor.observe(entry, None, ground);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The run has ended.
+    pub fn finish(&mut self, end: Moment, ground: &Ground) {
+        for monitor in &mut self.first {
+            monitor.finish(end, ground);
+        }
+        for (ground, monitors) in &mut self.others {
+            for monitor in monitors {
+                monitor.finish(end, ground);
+            }
+        }
+    }
+
+    /// What was found, monitor by monitor.
+    pub fn results(&self) -> Vec<Watched> {
+        let mut all: Vec<Watched> = self.first.iter().map(of).collect();
+        for monitor in self.others.iter().flat_map(|(_, monitors)| monitors) {
+            // All vehicles have the same monitors.
+            let known = all.iter_mut().find(|known| known.result.id == monitor.monitor().id);
+            if let Some(known) = known {
+                known.absorb(monitor.result());
+            }
+        }
+        all
+    }
+}
+
+fn of(monitor: &MonitorJudge) -> Watched {
+    Watched {
+        monitor: Arc::clone(monitor.monitor()),
+        result: monitor.result(),
+    }
+}
+
+/// Whether an entry is about a connection as a whole. That a connection is opened anew is of use to all.
+fn is_of_connection(entry: &Entry) -> bool {
+    match entry.event() {
+        Event::Packet {
+            packet: Packet::Connect { .. },
+            ..
+        } => false,
+        Event::Opened { .. } | Event::Packet { .. } | Event::Undecodable { .. } | Event::Closed { .. } => true,
+        _ => false,
+    }
+}

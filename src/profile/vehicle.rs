@@ -1,0 +1,201 @@
+//! The words of `vehicle:`: what a test may ask of the mock vehicles a master control is tested with.
+//!
+//! [`VEHICLE_WORDS`] is the one set of names; the reference AGV knows exactly these.
+
+/// A word a test may say to a mock vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VehicleWord {
+    /// Name, as in `vehicle: NAME`.
+    pub name: &'static str,
+    /// Names of the parameters a test may hand over.
+    pub parameters: &'static [&'static str],
+    /// What the vehicle does from then on.
+    pub doc: &'static str,
+}
+
+const fn word(name: &'static str, parameters: &'static [&'static str], doc: &'static str) -> VehicleWord {
+    VehicleWord { name, parameters, doc }
+}
+
+/// Every word there is: first what people do at a vehicle, then how it may deviate.
+pub const VEHICLE_WORDS: &[VehicleWord] = &[
+    word(
+        "reset",
+        &["nodeId"],
+        "It is as new from the factory and stands on the node, or where it started; a vehicle that is connected stays connected.",
+    ),
+    word("power-cycle", &[], "It is switched off hard and on again."),
+    word("shutdown", &[], "It ends its connection in good order and stays away."),
+    word("start", &[], "It connects after a shutdown or a break-off."),
+    word(
+        "break-off",
+        &[],
+        "Its connection is lost without a farewell, the broker publishes its last will, and it stays away until `start`; it drives on meanwhile.",
+    ),
+    word(
+        "stale-will",
+        &[],
+        "From its next connection on its last will is old: headerId 0 and a timestamp from long ago.",
+    ),
+    word("set-mode", &["mode"], "Its operating mode is switched."),
+    word(
+        "place-on",
+        &["nodeId"],
+        "It is put on a node and knows where it is; an order is given up.",
+    ),
+    word(
+        "move-to",
+        &["nodeId", "x", "y", "theta"],
+        "It is brought to a place by hand, which takes a mode for people.",
+    ),
+    word("push-out", &[], "It is moved off the way it was given."),
+    word("drive-manually", &[], "It is driven by hand for a short way."),
+    word("lose-position", &[], "It no longer knows where it is."),
+    word("find-position", &[], "It knows where it is again."),
+    word("halt", &[], "It stops where it is, as in traffic."),
+    word(
+        "stop-before",
+        &["nodeId"],
+        "It will stop on the edge that leads to the node, before it reaches it.",
+    ),
+    word("go-on", &[], "It drives on after `halt` or `stop-before`."),
+    word("place-obstacle", &["edgeId"], "An obstacle is put on an edge."),
+    word("remove-obstacle", &["edgeId"], "The obstacle is taken away."),
+    word("emergency-stop", &[], "An emergency stop is pressed."),
+    word(
+        "release-emergency-stop",
+        &[],
+        "The emergency stop is released and acknowledged.",
+    ),
+    word("enter-field", &[], "Somebody enters the protective field."),
+    word("leave-field", &[], "The protective field is left."),
+    word("press-pause", &[], "The pause button is pressed."),
+    word("release-pause", &[], "The pause is ended at the vehicle."),
+    word(
+        "block-pause",
+        &[],
+        "A pause or its end by a message is made impossible.",
+    ),
+    word(
+        "unblock-pause",
+        &[],
+        "A pause and its end by a message are possible again.",
+    ),
+    word(
+        "provoke-error",
+        &["errorLevel", "errorType"],
+        "It reports an error of its own; with FATAL it does not drive.",
+    ),
+    word("clear-error", &[], "Its own errors are gone."),
+    word("place-load", &["loadId", "loadType"], "A load is put on it."),
+    word("remove-load", &[], "Its loads are taken off."),
+    word("trigger", &["actionId"], "The trigger it waits for is given."),
+    word(
+        "use-lift",
+        &["mapId"],
+        "The lift with the vehicle in it is brought to another floor.",
+    ),
+    word(
+        "enable-map",
+        &["mapId", "mapVersion"],
+        "A map version it has is enabled at the vehicle.",
+    ),
+    word(
+        "set-battery",
+        &["charge", "charging"],
+        "Its battery has this charge in percent, and charges or does not.",
+    ),
+    word(
+        "request-new-base",
+        &["on"],
+        "Its states ask for a longer base, or no longer do.",
+    ),
+    word("answer-after", &["seconds"], "It takes messages only after that time."),
+    word(
+        "state-interval",
+        &["seconds"],
+        "It leaves at least that time between two states.",
+    ),
+    word(
+        "lose-states",
+        &["count"],
+        "Its next states are lost on the way, as many as said.",
+    ),
+    word("stay-silent", &[], "It publishes no state, though it is connected."),
+    word(
+        "ignore-orders",
+        &["count"],
+        "It ignores the next orders silently; all of them unless said.",
+    ),
+    word(
+        "reject-orders",
+        &["errorType", "errorLevel", "count", "references"],
+        "It rejects new orders with this error; all of them unless said.",
+    ),
+    word(
+        "reject-updates",
+        &["errorType", "errorLevel", "count", "references"],
+        "It rejects updates of its order with this error; all of them unless said.",
+    ),
+    word(
+        "hold-cancel",
+        &["seconds"],
+        "cancelOrder stays RUNNING that long, or until `well-behaved`.",
+    ),
+    word(
+        "fail-actions",
+        &["actionType", "errorType"],
+        "Actions end in FAILED, all or those of the type, with an error.",
+    ),
+    word(
+        "refuse-map",
+        &["errorType"],
+        "It refuses every downloadMap with this error.",
+    ),
+    word(
+        "declare",
+        &["factsheet"],
+        "Its factsheet is published with this merge patch laid over, and it goes by the limits there; an empty one restores it.",
+    ),
+    word(
+        "show",
+        &["state"],
+        "Its states are published with this merge patch laid over; an empty one ends it.",
+    ),
+    word(
+        "show-visualization",
+        &["visualization"],
+        "Its visualization messages are published with this merge patch laid over; an empty one ends it.",
+    ),
+    word(
+        "publish",
+        &["topic", "payload", "text"],
+        "It publishes a payload once on its own topic: an object is completed with a header, a text goes out as it is.",
+    ),
+    word(
+        "speak-version",
+        &["version"],
+        "The header of all its messages names this version.",
+    ),
+    word("well-behaved", &[], "All deviations end; its order and its place stay."),
+];
+
+/// The word of that name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static VehicleWord> {
+    VEHICLE_WORDS.iter().find(|word| word.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_unique_and_documented() {
+        for (at, word) in VEHICLE_WORDS.iter().enumerate() {
+            assert!(VEHICLE_WORDS[at + 1..].iter().all(|other| other.name != word.name));
+            assert!(word.doc.ends_with('.'), "{}", word.name);
+            assert_eq!(find(word.name), Some(word));
+        }
+    }
+}

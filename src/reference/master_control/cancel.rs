@@ -1,0 +1,86 @@
+//! Calling orders off: cancelOrder, its end, and only then what comes next.
+
+use serde_json::{Value, json};
+
+use super::Site;
+use super::faults::FaultName as F;
+use super::instant::ended;
+use super::vehicle::{Cancel, Transport, Vehicle};
+
+impl Site {
+    /// Calls the running order off once; `then` is what the vehicle is to do instead.
+    pub(super) fn cancel(&mut self, vehicle: &mut Vehicle, then: Option<Transport>) {
+        if let Some(cancel) = &mut vehicle.cancel {
+            cancel.then = then;
+            return;
+        }
+        let Some(running) = &vehicle.running else { return };
+        if running.message.is_null() {
+            // Nobody has heard of it yet.
+            vehicle.running = None;
+            vehicle.queue.extend(then);
+            return;
+        }
+        if self.faults.has(F::OrderInsteadOfCancel) {
+            vehicle.last_order = vehicle.running.take();
+            match then {
+                Some(transport) => vehicle.queue.push_front(transport),
+                None => stop_by_order(vehicle),
+            }
+            return;
+        }
+        if self.faults.has(F::NoNodes) {
+            let body =
+                json!({ "orderId": running.id, "orderUpdateId": running.update_id + 1, "nodes": [], "edges": [] });
+            self.publish(vehicle, "order", &body);
+        }
+        let Some(action_id) = self.instant(vehicle, "cancelOrder", &Value::Null) else {
+            return;
+        };
+        if self.faults.has(F::CancelNotAwaited) {
+            self.send_instants(vehicle);
+            vehicle.last_order = vehicle.running.take();
+            if let Some(transport) = then {
+                vehicle.queue.push_front(transport);
+            }
+            return;
+        }
+        vehicle.cancel = Some(Cancel { action_id, then });
+    }
+}
+
+/// `order-instead-of-cancel`: an order that ends where the vehicle is.
+fn stop_by_order(vehicle: &mut Vehicle) {
+    let last = vehicle.state.as_ref().map(|state| state.last_node_id.clone());
+    if let Some(to) = last.filter(|node| !node.is_empty()) {
+        vehicle.queue.push_front(Transport {
+            to,
+            ..Transport::default()
+        });
+    }
+}
+
+/// Goes on when the cancellation has ended and the order is over (ORD-CANCEL-01).
+pub(super) fn watch_cancel(vehicle: &mut Vehicle) {
+    let Some(cancel) = vehicle.cancel.clone() else { return };
+    let Some(finished) = ended(vehicle, &cancel.action_id) else {
+        return;
+    };
+    let Some(state) = &vehicle.state else { return };
+    let order_id = vehicle.running.as_ref().map(|running| running.id.as_str());
+    let other = order_id != Some(state.order_id.as_str());
+    let busy = !other && !state.route_empty();
+    if finished && busy {
+        return;
+    }
+    vehicle.cancel = None;
+    if busy {
+        // It could not be called off, and is driven to its end.
+        vehicle.queue.extend(cancel.then);
+        return;
+    }
+    vehicle.last_order = vehicle.running.take();
+    if let Some(transport) = cancel.then {
+        vehicle.queue.push_front(transport);
+    }
+}

@@ -1,0 +1,388 @@
+//! The running order: its acceptance, the extension of its base, and its end.
+
+use serde_json::{Value, json};
+
+use super::Site;
+use super::dispatch::Way;
+use super::faults::FaultName as F;
+use super::order::Window;
+use super::seen::State;
+use super::tolerances::ToleranceName as T;
+use super::vehicle::{MAX_QUEUE, Running, Transport, Vehicle};
+
+/// How often a faulty master control repeats a refused order.
+const FLOOD: u32 = 20;
+
+/// A transport is not begun more often than this.
+const MAX_BEGUN: u32 = 3;
+
+/// What has become of the running order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fate {
+    /// It goes on.
+    Runs,
+    /// It is done, or given up.
+    Over,
+    /// The vehicle does not have it any more, or refused it for where it stands.
+    Again,
+    /// The rest has to be called off.
+    CalledOff,
+}
+
+impl Site {
+    /// Looks after the running order.
+    pub(super) fn watch_order(&mut self, vehicle: &mut Vehicle) {
+        if vehicle.cancel.is_some() || !self.commandable(vehicle) {
+            return;
+        }
+        let Some(mut running) = vehicle.running.take() else {
+            return;
+        };
+        let Some(state) = vehicle.state.take() else {
+            vehicle.running = Some(running);
+            return;
+        };
+        let mut fate = self.fate(vehicle, &mut running, &state);
+        if fate == Fate::Runs && running.confirmed && !running.refused {
+            fate = self.supervise_trigger(vehicle, &mut running, &state);
+        }
+        vehicle.state = Some(state);
+        match fate {
+            Fate::Runs => {
+                if running.confirmed && !running.refused {
+                    self.extend_base(vehicle, &mut running);
+                }
+                vehicle.running = Some(running);
+            }
+            Fate::Over => {
+                vehicle.last_order = Some(running);
+            }
+            Fate::Again => {
+                let transport = again(&running, vehicle.state.as_ref());
+                if running.transport.begun < MAX_BEGUN {
+                    vehicle.queue.push_front(transport);
+                }
+                vehicle.last_order = Some(running);
+            }
+            Fate::CalledOff => {
+                vehicle.running = Some(running);
+                self.cancel(vehicle, None);
+            }
+        }
+    }
+
+    fn fate(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
+        let shown = state.order_id == running.id;
+        if shown {
+            running.accepted = true;
+            running.confirmed |= state.order_update_id >= running.update_id;
+        }
+        if !running.confirmed && !running.refused {
+            if let Some(kind) = refusal(running, state) {
+                if running.accepted {
+                    running.refused = true;
+                } else if self.faults.has(F::RefusedOrderRepeated) && running.resends < FLOOD {
+                    self.repeat_refused(vehicle, running);
+                } else if kind.to_ascii_lowercase().contains("noroute") && running.transport.begun < 2 {
+                    return Fate::Again;
+                } else {
+                    return Fate::Over;
+                }
+            } else if !self.send_again(vehicle, running) {
+                if !running.accepted {
+                    return Fate::Over;
+                }
+                running.refused = true;
+            }
+        }
+        if !running.accepted {
+            return Fate::Runs;
+        }
+        let alien = self.faults.has(F::OrderIdPerUpdate) || self.faults.has(F::OrderIdReused);
+        if !shown && !alien {
+            return Fate::Again;
+        }
+        progress(running, state)
+    }
+
+    /// Sends the unchanged message again when it was not seen in time; false when that was done often enough.
+    fn send_again(&mut self, vehicle: &mut Vehicle, running: &mut Running) -> bool {
+        let now = self.now.moment;
+        let lost = self.lost_after(running.sent_at);
+        if lost > now {
+            vehicle.at(lost);
+            return true;
+        }
+        if self.faults.has(F::LostOrderNotResent) {
+            return true;
+        }
+        if running.resends >= self.config.resend_limit {
+            return false;
+        }
+        if let Some(due) = self.next_order_at(vehicle) {
+            vehicle.at(due);
+            return true;
+        }
+        running.resends += 1;
+        running.sent_at = now;
+        vehicle.last_order_at = Some(now);
+        vehicle.at(self.lost_after(now));
+        if self.faults.has(F::ResentChanged) {
+            slower(&mut running.message, running.resends);
+        }
+        if !self.faults.has(F::OrdersNotSent) {
+            self.publish(vehicle, "order", &running.message);
+        }
+        true
+    }
+
+    /// `refused-order-repeated`: perhaps it likes it better this way.
+    fn repeat_refused(&mut self, vehicle: &mut Vehicle, running: &mut Running) {
+        running.resends += 1;
+        slower(&mut running.message, running.resends);
+        running.sent_at = self.now.moment;
+        self.publish(vehicle, "order", &running.message);
+    }
+
+    /// Extends the base before the vehicle has to halt at its end (ORD-UPD-02).
+    fn extend_base(&mut self, vehicle: &mut Vehicle, running: &mut Running) {
+        let Some(state) = &vehicle.state else { return };
+        let reached = running.reached(Some(state));
+        let ahead = running.released.saturating_sub(reached + 1);
+        let asked = state.new_base_request == Some(true) && !self.faults.has(F::NewBaseRequestIgnored);
+        let enough = if self.takes(T::SmallSteps) {
+            self.config.base_length - 1
+        } else {
+            1
+        };
+        let wanted = if self.faults.has(F::BaseExtendedLate) {
+            ahead == 0 && !state.driving
+        } else {
+            ahead <= enough || asked
+        };
+        if !(wanted || running.changed) || self.localization_shunned(vehicle) {
+            return;
+        }
+        let free = self.free_until(vehicle, running, running.released);
+        let least = running.released + usize::from(asked && wanted);
+        let target = (reached + 1).saturating_add(self.config.base_length.max(1)).max(least);
+        let target = if wanted { target.min(free) } else { running.released };
+        if target <= running.released && !running.changed {
+            return;
+        }
+        if let Some(due) = self.next_order_at(vehicle) {
+            vehicle.at(due);
+            return;
+        }
+        let fresh = running.released.min(target)..target;
+        let maps: Vec<String> = running.stops[fresh].iter().map(|stop| stop.map_id.clone()).collect();
+        if !self.maps_ready(vehicle, maps.iter().map(String::as_str)) {
+            return;
+        }
+        let window = Window {
+            first: if self.faults.has(F::BaseSentAgain) {
+                0
+            } else {
+                running.released.saturating_sub(1)
+            },
+            released: target.max(running.released),
+            end: free.min(target.max(running.released).saturating_add(self.config.horizon_length)),
+        };
+        running.update_id += 1;
+        match self.order_message(vehicle, running, window) {
+            Some((message, window)) if window.released > running.released || running.changed => {
+                running.released = window.released;
+                self.send_order(vehicle, running, message);
+            }
+            _ => running.update_id -= 1,
+        }
+    }
+
+    /// Calls the order off when a trigger does not come in time (ACT-39).
+    fn supervise_trigger(&self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
+        if self.faults.has(F::TriggerUnsupervised) {
+            return Fate::Runs;
+        }
+        let trigger = |action: &Value| {
+            let id = action["actionId"]
+                .as_str()
+                .filter(|_| action["actionType"] == "waitForTrigger")?;
+            let status = &state.action(id)?.action_status;
+            (status == "RUNNING").then(|| id.to_owned())
+        };
+        let waiting: Option<String> = running.actions().find_map(trigger);
+        let now = self.now.moment;
+        let known = running.waits.take();
+        running.waits = waiting.map(|id| match known {
+            Some((known, since)) if known == id => (id, since),
+            _ => (id, now),
+        });
+        let Some((_, since)) = &running.waits else {
+            return Fate::Runs;
+        };
+        let due = *since + self.config.trigger_timeout;
+        if due <= now {
+            return Fate::CalledOff;
+        }
+        vehicle.at(due);
+        Fate::Runs
+    }
+
+    /// Gives the running transport another destination: behind the base, or by calling it off.
+    pub(super) fn reroute(&mut self, vehicle: &mut Vehicle, to: &str) {
+        if self.config.node(to).is_none() {
+            return;
+        }
+        let Some(mut running) = vehicle.running.take() else {
+            match vehicle.queue.front_mut() {
+                Some(next) => to.clone_into(&mut next.to),
+                None => self.dispatch(
+                    vehicle,
+                    Transport {
+                        to: to.to_owned(),
+                        ..Transport::default()
+                    },
+                ),
+            }
+            return;
+        };
+        let mut transport = again(&running, vehicle.state.as_ref());
+        to.clone_into(&mut transport.to);
+        if running.is_whole() && self.faults.has(F::BaseReplaced) {
+            running.released = running.reached(vehicle.state.as_ref()) + 1;
+        }
+        let led = vehicle.cancel.is_none() && !running.is_whole() && !running.refused;
+        let led = led && self.lead_on(vehicle, &mut running, transport.clone());
+        vehicle.running = Some(running);
+        if !led {
+            self.cancel(vehicle, Some(transport));
+        }
+        vehicle.at(self.now.moment);
+    }
+
+    /// Replaces the way behind the base.
+    fn lead_on(&mut self, vehicle: &mut Vehicle, running: &mut Running, transport: Transport) -> bool {
+        let base = running.released;
+        let Some(end) = running.stops.get(base.saturating_sub(1)) else {
+            return false;
+        };
+        let here = end.id.clone();
+        let picks = running.stops.iter().take(base).any(|stop| {
+            let mut kinds = stop.actions.iter().filter_map(|action| action["actionType"].as_str());
+            kinds.any(|kind| kind == "pick")
+        });
+        let transport = Transport {
+            loaded: transport.loaded || picks,
+            ..transport
+        };
+        let mut way = Way {
+            stops: vec![super::vehicle::Stop::default()],
+            legs: Vec::new(),
+        };
+        let led = self.config.node(&here).is_some() && self.lead(vehicle, &mut way, &here, &transport).is_some();
+        // What is done at the end of the base is fixed; more cannot be done there.
+        if !led || way.stops.len() < 2 || !way.stops[0].actions.is_empty() || !self.names_fit(vehicle, &way) {
+            return false;
+        }
+        running.stops.truncate(base);
+        running.legs.truncate(base.saturating_sub(1));
+        running.stops.extend(way.stops.into_iter().skip(1));
+        running.legs.extend(way.legs);
+        running.transport = Transport {
+            begun: running.transport.begun,
+            loaded: running.transport.loaded,
+            ..transport
+        };
+        running.changed = true;
+        true
+    }
+
+    /// Closes a way. A base that leads over it is called off, a horizon led round it.
+    pub(super) fn block(&mut self, vehicle: &mut Vehicle, from: &str, to: &str) {
+        vehicle.blocked.insert((from.to_owned(), to.to_owned()));
+        let Some(running) = &vehicle.running else { return };
+        let reached = running.reached(vehicle.state.as_ref());
+        let mut ahead = running.legs.iter().enumerate().skip(reached);
+        let Some((index, _)) = ahead.find(|(_, leg)| leg.from == from && leg.to == to) else {
+            return;
+        };
+        if self.faults.has(F::BlockedEdgeUsed) {
+            return;
+        }
+        let transport = again(running, vehicle.state.as_ref());
+        if index + 1 < running.released {
+            self.cancel(vehicle, Some(transport));
+        } else if let Some(mut running) = vehicle.running.take() {
+            if !self.lead_on(vehicle, &mut running, transport) {
+                running.changed = true;
+            }
+            vehicle.running = Some(running);
+        }
+        vehicle.at(self.now.moment);
+    }
+
+    /// Queues a transport.
+    pub(super) fn dispatch(&mut self, vehicle: &mut Vehicle, transport: Transport) {
+        if vehicle.queue.len() < MAX_QUEUE {
+            vehicle.queue.push_back(transport);
+            vehicle.at(self.now.moment);
+        }
+    }
+}
+
+/// The transport as it is still to be done.
+fn again(running: &Running, state: Option<&State>) -> Transport {
+    let mut transport = running.transport.clone();
+    let mut picks = running.actions().filter(|action| action["actionType"] == "pick");
+    let picked = picks.any(|action| {
+        let id = action["actionId"].as_str().unwrap_or_default();
+        state
+            .and_then(|state| state.action(id))
+            .is_some_and(|action| action.action_status == "FINISHED")
+    });
+    transport.loaded |= picked;
+    transport
+}
+
+/// The errorType with which the vehicle refuses the message sent last.
+fn refusal<'a>(running: &Running, state: &'a State) -> Option<&'a str> {
+    let update = running.update_id.to_string();
+    let found = state.errors.iter().find(|error| {
+        let own = error.reference("orderId") == Some(running.id.as_str());
+        own && error.reference("orderUpdateId").is_none_or(|named| named == update)
+    });
+    found.map(|error| error.error_type.as_str())
+}
+
+/// Changes a message that must not be changed.
+fn slower(message: &mut Value, times: u32) {
+    let edges = message.get_mut("edges").and_then(Value::as_array_mut);
+    for edge in edges.into_iter().flatten() {
+        edge["maxSpeed"] = json!(1.0 / f64::from(times + 1));
+    }
+}
+
+/// How far an accepted order is.
+fn progress(running: &Running, state: &State) -> Fate {
+    let actions = || running.actions().filter_map(|action| action["actionId"].as_str());
+    let failed = actions().any(|id| state.action(id).is_some_and(|action| action.action_status == "FAILED"));
+    let open = actions().any(|id| state.action(id).is_none_or(|action| !action.is_terminal()));
+    let reached = running.reached(Some(state)) + 1;
+    let known = if running.confirmed { running.released } else { reached };
+    if state.route_empty() && reached < known && !failed {
+        return Fate::Again;
+    }
+    if state.route_empty() && (running.is_whole() || failed) && running.confirmed {
+        // Nothing is left to be driven. Actions that are not listed any more have ended as well.
+        let pending = actions().any(|id| state.action(id).is_some_and(|action| !action.is_terminal()));
+        return match (pending, open && state.action_states.is_empty()) {
+            (true, _) => Fate::Runs,
+            _ => Fate::Over,
+        };
+    }
+    let halted = !state.driving && !state.node_states.iter().any(|node| node.released);
+    if failed || (running.refused && halted) {
+        return Fate::CalledOff;
+    }
+    Fate::Runs
+}

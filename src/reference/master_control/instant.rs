@@ -1,0 +1,133 @@
+//! Instant actions: sent once the vehicle can be commanded, watched until they end.
+
+use serde_json::{Value, json};
+
+use super::Site;
+use super::faults::FaultName as F;
+use super::seen::ActionState;
+use super::vehicle::{Instant, MAX_INSTANT, Vehicle};
+
+/// Instant actions that do not go together with an order that is driven (IACT-02).
+const AGAINST_ORDER: [&str; 4] = ["initPosition", "startCharging", "stopCharging", "finePositioning"];
+
+impl Site {
+    /// Queues an instant action; its actionId, or nothing if the vehicle does not take it.
+    pub(super) fn instant(&mut self, vehicle: &mut Vehicle, kind: &str, given: &Value) -> Option<String> {
+        let contradicts = vehicle.running.is_some() && AGAINST_ORDER.contains(&kind);
+        if contradicts && !self.faults.has(F::PositionDuringOrder) {
+            return None;
+        }
+        if !self.offers(vehicle.factsheet.as_ref(), kind, "INSTANT") {
+            return None;
+        }
+        let action = self.action(vehicle, kind, given);
+        self.queue(vehicle, action)
+    }
+
+    /// Queues an action that is made already.
+    pub(super) fn queue(&mut self, vehicle: &mut Vehicle, action: Value) -> Option<String> {
+        if vehicle.instants.len() >= MAX_INSTANT {
+            let ended = vehicle.instants.iter().position(|instant| instant.sent_at.is_some())?;
+            vehicle.instants.remove(ended);
+        }
+        let id = action["actionId"].as_str()?.to_owned();
+        vehicle.instants.push_back(Instant {
+            action,
+            sent_at: None,
+            resends: 0,
+        });
+        vehicle.at(self.now.moment);
+        Some(id)
+    }
+
+    /// Sends what waits.
+    pub(super) fn send_instants(&mut self, vehicle: &mut Vehicle) {
+        let service = vehicle
+            .state
+            .as_ref()
+            .is_some_and(|state| matches!(state.operating_mode.as_str(), "SERVICE" | "TEACHIN"));
+        let despite = service && self.faults.has(F::ActionsInService) && self.reachable(vehicle);
+        // A paused or stopped vehicle takes actions; before the first state only questions are asked.
+        if !self.commandable(vehicle) && !despite {
+            return;
+        }
+        let now = self.now.moment;
+        let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| {
+            sheet.limit(&["instantActions", "instantActions.actions", "actions"])
+        });
+        loop {
+            let mut actions = Vec::new();
+            for instant in vehicle.instants.iter_mut().filter(|instant| instant.sent_at.is_none()) {
+                if actions.len() < limit.clamp(1, 10) {
+                    instant.sent_at = Some(now);
+                    actions.push(instant.action.clone());
+                }
+            }
+            if actions.is_empty() {
+                break;
+            }
+            self.publish(vehicle, "instantActions", &json!({ "actions": actions }));
+            vehicle.at(self.lost_after(now));
+        }
+    }
+
+    /// Forgets what has ended, and sends again what was lost.
+    pub(super) fn watch_instants(&mut self, vehicle: &mut Vehicle) {
+        let now = self.now.moment;
+        let awaited = vehicle.awaited();
+        let is_awaited = |instant: &Instant| awaited.iter().any(|id| id == instant.id());
+        let Vehicle { instants, state, .. } = vehicle;
+        let seen = |id: &str| state.as_ref().and_then(|state| state.action(id));
+        instants.retain(|instant| !seen(instant.id()).is_some_and(ActionState::is_terminal) || is_awaited(instant));
+        let mut wake = None;
+        for instant in instants.iter_mut() {
+            let Some(sent_at) = instant.sent_at else { continue };
+            if seen(instant.id()).is_some() {
+                continue;
+            }
+            let lost = self.lost_after(sent_at);
+            // A request is answered by what was asked for, and need not be listed.
+            let answered = matches!(instant.kind(), "stateRequest" | "factsheetRequest") && vehicle.state_at > sent_at;
+            if answered || instant.resends >= self.config.resend_limit {
+                instant.resends = u32::MAX;
+            } else if lost > now {
+                wake = Some(wake.map_or(lost, |wake: crate::clock::Moment| wake.min(lost)));
+            } else {
+                instant.resends += 1;
+                instant.sent_at = None;
+            }
+        }
+        instants.retain(|instant| instant.resends < u32::MAX || is_awaited(instant));
+        if let Some(wake) = wake {
+            vehicle.at(wake);
+        }
+    }
+}
+
+impl Vehicle {
+    /// actionIds somebody waits for the end of, and takes out.
+    fn awaited(&self) -> Vec<String> {
+        let cancel = self.cancel.iter().map(|cancel| &cancel.action_id);
+        let jobs = self.jobs.iter().map(|job| &job.action_id);
+        cancel.chain(jobs).chain(self.enabling.values()).cloned().collect()
+    }
+}
+
+/// How an instant action ended: `Some(true)` FINISHED, `Some(false)` FAILED or lost for good.
+pub(super) fn ended(vehicle: &mut Vehicle, id: &str) -> Option<bool> {
+    let seen = vehicle.state.as_ref().and_then(|state| state.action(id));
+    let end = match seen {
+        Some(action) if action.is_terminal() => Some(action.action_status == "FINISHED"),
+        Some(_) => None,
+        None => {
+            let watched = vehicle.instants.iter().find(|instant| instant.id() == id);
+            watched
+                .is_none_or(|instant| instant.resends == u32::MAX)
+                .then_some(false)
+        }
+    };
+    if end.is_some() {
+        vehicle.instants.retain(|instant| instant.id() != id);
+    }
+    end
+}

@@ -1,0 +1,195 @@
+//! Maps: rolled out ahead of their use, deleted before a repeated download, enabled before an order needs them.
+
+use serde_json::{Value, json};
+
+use super::Site;
+use super::config::SiteMap;
+use super::faults::FaultName as F;
+use super::instant::ended;
+use super::vehicle::{MapJob, Stage, Vehicle};
+
+/// More roll-outs than this are not under way at a vehicle.
+const MAX_JOBS: usize = 20;
+
+impl Site {
+    /// Begins to roll a map out.
+    pub(super) fn download_map(&mut self, vehicle: &mut Vehicle, map: SiteMap) {
+        let same = |job: &MapJob| (&job.map.map_id, &job.map.map_version) == (&map.map_id, &map.map_version);
+        if vehicle.jobs.iter().any(same) || vehicle.jobs.len() >= MAX_JOBS || !self.config.has("mapActions") {
+            return;
+        }
+        if let Some(action_id) = self.send_download(vehicle, &map) {
+            let stage = Stage::Download;
+            vehicle.jobs.push(MapJob { map, stage, action_id });
+        }
+    }
+
+    fn send_download(&mut self, vehicle: &mut Vehicle, map: &SiteMap) -> Option<String> {
+        let mut given = json!({
+            "mapId": map.map_id,
+            "mapVersion": map.map_version,
+            "mapDownloadLink": map.link,
+        });
+        if let Some(hash) = &map.hash {
+            given["mapHash"] = json!(hash);
+        }
+        self.instant(vehicle, "downloadMap", &given)
+    }
+
+    /// Enables or deletes a map version.
+    pub(super) fn map_action(
+        &mut self,
+        vehicle: &mut Vehicle,
+        kind: &str,
+        map_id: &str,
+        version: &str,
+    ) -> Option<String> {
+        if !self.config.has("mapActions") {
+            return None;
+        }
+        self.instant(vehicle, kind, &json!({ "mapId": map_id, "mapVersion": version }))
+    }
+
+    /// Follows the roll-outs. A duplicate is deleted before the download is repeated, once (MAP-28).
+    pub(super) fn watch_maps(&mut self, vehicle: &mut Vehicle) {
+        for mut job in std::mem::take(&mut vehicle.jobs) {
+            let Some(finished) = ended(vehicle, &job.action_id) else {
+                vehicle.jobs.push(job);
+                continue;
+            };
+            let next = match (job.stage, finished) {
+                (Stage::Download, false) if is_duplicate(vehicle, &job) => {
+                    if self.faults.has(F::DownloadRepeated) {
+                        job.stage = Stage::DownloadAgain;
+                        self.send_download(vehicle, &job.map)
+                    } else {
+                        job.stage = Stage::Delete;
+                        self.map_action(vehicle, "deleteMap", &job.map.map_id, &job.map.map_version)
+                    }
+                }
+                (Stage::Delete, true) => {
+                    job.stage = Stage::DownloadAgain;
+                    self.send_download(vehicle, &job.map)
+                }
+                _ => None,
+            };
+            if let Some(action_id) = next {
+                job.action_id = action_id;
+                vehicle.jobs.push(job);
+            }
+        }
+        let enabling: Vec<(String, String)> = vehicle.enabling.clone().into_iter().collect();
+        for (map_id, action_id) in enabling {
+            if action_id.is_empty() {
+                continue;
+            }
+            match ended(vehicle, &action_id) {
+                Some(true) => {
+                    vehicle.enabling.remove(&map_id);
+                }
+                // Not asked again on its own.
+                Some(false) => {
+                    vehicle.enabling.insert(map_id, String::new());
+                }
+                None => {}
+            }
+        }
+    }
+
+    /// Whether every map of a way can be used; sees to it where not (MAP-09).
+    pub(super) fn maps_ready<'a>(&mut self, vehicle: &mut Vehicle, maps: impl Iterator<Item = &'a str>) -> bool {
+        if self.faults.has(F::MapNotEnabled) || !self.config.has("mapActions") {
+            return true;
+        }
+        let mut ready = true;
+        for map_id in maps {
+            let Some(state) = &vehicle.state else { return false };
+            if state.map_enabled(map_id) {
+                vehicle.enabling.remove(map_id);
+                continue;
+            }
+            ready = false;
+            let on_board = state.maps.iter().flatten().filter(|map| map.map_id == map_id);
+            let mut versions: Vec<String> = on_board.map(|map| map.map_version.clone()).collect();
+            versions.sort();
+            let known = self.config.maps.iter().find(|map| map.map_id == map_id).cloned();
+            let preferred = known.as_ref().map(|map| map.map_version.clone());
+            let version = preferred
+                .filter(|version| versions.contains(version))
+                .or(versions.pop());
+            match (version, known) {
+                (Some(version), _) if !vehicle.enabling.contains_key(map_id) => {
+                    let action = self.map_action(vehicle, "enableMap", map_id, &version);
+                    vehicle.enabling.insert(map_id.to_owned(), action.unwrap_or_default());
+                }
+                (None, Some(map)) if !map.link.is_empty() && vehicle.fetched.insert(map.map_id.clone()) => {
+                    self.download_map(vehicle, map);
+                }
+                _ => {}
+            }
+        }
+        ready
+    }
+
+    /// Sets the vehicle to a place (MAP-27).
+    pub(super) fn init_position(&mut self, vehicle: &mut Vehicle, arguments: &Value) {
+        let node = arguments.get("nodeId").and_then(Value::as_str);
+        let node = node.and_then(|id| self.config.node(id)).cloned();
+        let position = vehicle.state.as_ref().and_then(|state| state.agv_position.clone());
+        let number = |key: &str, node: Option<f64>, reported: Option<f64>| {
+            let given = arguments.get(key).and_then(|value| {
+                value
+                    .as_f64()
+                    .or_else(|| value.as_str().and_then(|text| text.parse().ok()))
+            });
+            given
+                .filter(|number: &f64| number.is_finite())
+                .or(node)
+                .or(reported)
+                .unwrap_or(0.0)
+        };
+        let x = number(
+            "x",
+            node.as_ref().map(|node| node.x),
+            position.as_ref().map(|seen| seen.x),
+        );
+        let y = number(
+            "y",
+            node.as_ref().map(|node| node.y),
+            position.as_ref().map(|seen| seen.y),
+        );
+        let theta = number(
+            "theta",
+            node.as_ref().and_then(|node| node.theta),
+            position.as_ref().map(|seen| seen.theta),
+        );
+        let map_id = arguments
+            .get("mapId")
+            .and_then(Value::as_str)
+            .filter(|id| !id.is_empty());
+        let map_id = map_id
+            .map(str::to_owned)
+            .or(node.as_ref().map(|node| node.map_id.clone()));
+        let reported = position.map(|seen| seen.map_id).unwrap_or_default();
+        let map_id = map_id.unwrap_or_else(|| reported.clone());
+        if self.faults.has(F::NoPositionOnNewMap) && map_id != reported {
+            return;
+        }
+        let last = arguments.get("lastNodeId").and_then(Value::as_str).map(str::to_owned);
+        let nearest = || self.config.nearest(x, y, &map_id).map(|(node, _)| node.id.clone());
+        let last = last.or(node.map(|node| node.id)).or_else(nearest).unwrap_or_default();
+        let within = theta.sin().atan2(theta.cos());
+        let given = json!({ "x": x, "y": y, "theta": within, "mapId": map_id, "lastNodeId": last });
+        self.instant(vehicle, "initPosition", &given);
+    }
+}
+
+/// Whether a download failed because the map is on board already.
+fn is_duplicate(vehicle: &Vehicle, job: &MapJob) -> bool {
+    let Some(state) = &vehicle.state else { return false };
+    let named = state
+        .errors
+        .iter()
+        .any(|error| error.error_type.to_ascii_lowercase().contains("duplicate"));
+    named || state.has_map(&job.map.map_id, &job.map.map_version)
+}

@@ -1,0 +1,242 @@
+//! The reference master control: a small fleet manager as a sans-IO state machine.
+//!
+//! Written from the standard. The parts, by idea: `hearing` takes what the vehicles say into the picture of `vehicle`,
+//! read by `seen`; `dispatch` plans transports over the `layout`, `order` words their messages, `driving` extends
+//! the base, sends again what was lost and sees the end, `cancel` calls orders off; `instant` sends instant actions,
+//! made in `actions`, and `maps` rolls maps out; `commands` is what people ask for; `publish` and `wording` speak to
+//! the broker. Every deviation from good behaviour is declared in `faults`, every liberty in `tolerances`.
+
+mod actions;
+mod cancel;
+mod commands;
+mod config;
+mod dispatch;
+mod driving;
+pub mod faults;
+mod hearing;
+mod instant;
+pub mod lapses;
+mod layout;
+mod maps;
+mod order;
+mod publish;
+mod seen;
+#[cfg(test)]
+mod tests;
+pub mod tolerances;
+mod vehicle;
+mod wording;
+
+use std::collections::{BTreeMap, VecDeque};
+
+use crate::clock::{Moment, Stamp};
+use crate::reference::{ConnectOptions, Device, Input, Output};
+
+pub use commands::COMMANDS;
+pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig};
+pub use faults::{FAULTS, FaultName, find};
+pub use lapses::{LAPSES, lapse};
+pub use tolerances::{TOLERANCES, ToleranceName};
+
+use faults::Faults;
+use publish::Connection;
+use vehicle::Vehicle;
+
+/// More messages than this do not lie about unread.
+const MAX_INBOX: usize = 10_000;
+
+/// A fault that is not in [`FAULTS`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the reference master control has no fault `{0}`")]
+pub struct UnknownFault(pub String);
+
+/// What all vehicles share.
+#[derive(Clone, Debug)]
+struct Site {
+    config: MasterControlConfig,
+    faults: Faults,
+    /// The time of what is happening.
+    now: Stamp,
+    online: bool,
+    /// Tells the ids of one session from those of another; 0 until the first input.
+    session: u64,
+    /// Counts ids.
+    ids: u64,
+    /// What was decided and is still to be handed to the driver.
+    pending: Vec<Output>,
+}
+
+impl Site {
+    fn takes(&self, tolerance: ToleranceName) -> bool {
+        self.config.tolerances.has(tolerance)
+    }
+
+    /// An id no other order or action of this session, or an earlier one, has.
+    fn next_id(&mut self, vehicle: &Vehicle, what: &str) -> String {
+        self.ids += 1;
+        if self.faults.has(FaultName::ActionIdsRepeat) && what == "action" {
+            return (self.ids % 3).to_string();
+        }
+        if self.faults.has(FaultName::IdLimitIgnored) {
+            return format!("{what}-{}-{:064}", self.session, self.ids);
+        }
+        let number = format!("{}{:05}", self.session, self.ids);
+        let sheet = vehicle.factsheet.as_ref();
+        let numerical =
+            sheet.is_some_and(|sheet| sheet.ids_numerical) && !self.faults.has(FaultName::NumericalIdsIgnored);
+        let longest = sheet.and_then(|sheet| sheet.id_length).unwrap_or(usize::MAX);
+        let full = format!("{what}-{number}");
+        match () {
+            () if !numerical && full.len() <= longest => full,
+            () if number.len() <= longest => number,
+            () => self.ids.to_string(),
+        }
+    }
+}
+
+/// The reference master control.
+#[derive(Clone, Debug)]
+pub struct MasterControl {
+    site: Site,
+    fleet: Vec<Vehicle>,
+    /// Vehicle and topic name by full topic.
+    by_topic: BTreeMap<String, (usize, &'static str)>,
+    connection: Connection,
+    /// What has come and was not looked at yet, and when it will be.
+    inbox: VecDeque<(Moment, Input)>,
+}
+
+/// What a master control listens to.
+const HEARD: [&str; 4] = ["state", "connection", "factsheet", "visualization"];
+
+impl MasterControl {
+    /// A master control with some of [`FAULTS`], by name; without any it is faultless.
+    ///
+    /// It asks for its connection at the first [`Input::Time`] (a driver may also connect it unasked).
+    ///
+    /// # Errors
+    /// When there is no fault of a name.
+    pub fn new(config: MasterControlConfig, faults: &[&str]) -> Result<Self, UnknownFault> {
+        let faults = Faults::named(faults).map_err(UnknownFault)?;
+        let served = if faults.has(FaultName::FleetOfOne) {
+            1
+        } else {
+            usize::MAX
+        };
+        let fleet: Vec<Vehicle> = config
+            .vehicles
+            .iter()
+            .take(served)
+            .map(|vehicle| Vehicle {
+                config: vehicle.clone(),
+                ..Vehicle::default()
+            })
+            .collect();
+        let mut by_topic = BTreeMap::new();
+        for (index, vehicle) in fleet.iter().enumerate() {
+            for name in HEARD {
+                if let Some(topic) = vehicle.topic(name) {
+                    by_topic.insert(topic.to_owned(), (index, name));
+                }
+            }
+        }
+        Ok(Self {
+            site: Site {
+                config,
+                faults,
+                now: Stamp {
+                    moment: Moment::START,
+                    utc: jiff::Timestamp::UNIX_EPOCH,
+                },
+                online: false,
+                session: 0,
+                ids: 0,
+                pending: Vec::new(),
+            },
+            fleet,
+            by_topic,
+            connection: Connection::new(),
+            inbox: VecDeque::new(),
+        })
+    }
+
+    fn advance(&mut self, now: Stamp) {
+        if now.moment >= self.site.now.moment {
+            self.site.now = now;
+        }
+        if self.site.session == 0 {
+            self.site.session = u64::try_from(now.utc.as_second()).unwrap_or(1).max(1);
+        }
+    }
+
+    /// Does everything that is due now.
+    fn step(&mut self) {
+        let now = self.site.now.moment;
+        while self.inbox.front().is_some_and(|(due, _)| *due <= now) {
+            match self.inbox.pop_front() {
+                Some((_, Input::Message { topic, payload })) => self.message(&topic, &payload),
+                Some((_, Input::Command(name, arguments))) => self.command(&name, &arguments),
+                _ => {}
+            }
+        }
+        self.attempt_connection();
+        for vehicle in &mut self.fleet {
+            if vehicle.wake.is_some_and(|wake| wake <= now) {
+                vehicle.wake = None;
+                self.site.look_after(vehicle);
+            }
+        }
+    }
+}
+
+impl Site {
+    /// Looks what is to be done for a vehicle, and does it.
+    fn look_after(&mut self, vehicle: &mut Vehicle) {
+        if !self.online {
+            return;
+        }
+        self.miss_factsheet(vehicle);
+        self.watch_instants(vehicle);
+        self.watch_maps(vehicle);
+        cancel::watch_cancel(vehicle);
+        self.watch_order(vehicle);
+        self.begin_next(vehicle);
+        self.send_instants(vehicle);
+        let now = self.now.moment;
+        if vehicle.wake.is_some_and(|wake| wake <= now) {
+            // Never at once again: what is to be done next needs an input or time.
+            vehicle.wake = Some(now + std::time::Duration::from_millis(1));
+        }
+    }
+}
+
+impl Device for MasterControl {
+    fn connect_options(&mut self, now: Stamp) -> ConnectOptions {
+        self.options(now)
+    }
+
+    fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {
+        self.advance(now);
+        match input {
+            Input::Connected => self.connected(),
+            Input::ConnectionLost => self.connection_lost(),
+            Input::Message { .. } | Input::Command(..) => {
+                if self.inbox.len() < MAX_INBOX {
+                    let due = now.moment + self.site.config.answers_after;
+                    self.inbox.push_back((due, input));
+                }
+            }
+            Input::Time | Input::Download { .. } => {}
+        }
+        self.step();
+        out.append(&mut self.site.pending);
+    }
+
+    fn wake_up(&self) -> Option<Moment> {
+        let vehicles = self.fleet.iter().filter_map(|vehicle| vehicle.wake);
+        let vehicles = vehicles.min().filter(|_| self.site.online);
+        let inbox = self.inbox.front().map(|(due, _)| *due);
+        let attempt = self.connection.attempt_at.filter(|_| !self.connection.online);
+        vehicles.into_iter().chain(inbox).chain(attempt).min()
+    }
+}

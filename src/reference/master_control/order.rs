@@ -1,0 +1,265 @@
+//! The order message: nodes and edges as a vehicle wants them, within its limits.
+
+use serde_json::{Value, json};
+
+use super::Site;
+use super::faults::FaultName as F;
+use super::layout::distance;
+use super::seen::Factsheet;
+use super::tolerances::ToleranceName as T;
+use super::vehicle::{Leg, Running, Stop, Vehicle};
+
+/// Which part of a way a message holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Window {
+    /// Index of the first node.
+    pub(super) first: usize,
+    /// Index behind the last released node.
+    pub(super) released: usize,
+    /// Index behind the last node.
+    pub(super) end: usize,
+}
+
+impl Site {
+    /// The message of this window, and the window it became within the limits of the vehicle. `None` when not even
+    /// the first step fits.
+    pub(super) fn order_message(
+        &self,
+        vehicle: &Vehicle,
+        running: &Running,
+        window: Window,
+    ) -> Option<(Value, Window)> {
+        let sheet = vehicle.factsheet.as_ref();
+        let mut window = window;
+        if let Some(sheet) = sheet.filter(|_| !self.faults.has(F::ArrayLimitIgnored)) {
+            let nodes = sheet.limit(&["order.nodes", "nodes"]);
+            let nodes = nodes.min(sheet.limit(&["order.edges", "edges"]).saturating_add(1));
+            let end = window.first.saturating_add(nodes);
+            window.end = window.end.min(end);
+            window.released = window.released.min(end);
+        }
+        let longest = sheet
+            .and_then(|sheet| sheet.message)
+            .filter(|_| !self.faults.has(F::MessageLimitIgnored))
+            .unwrap_or(usize::MAX);
+        loop {
+            let message = self.message(vehicle, running, window);
+            // The header comes on top.
+            let length = message.to_string().len() + 300;
+            if window.released <= window.first {
+                return None;
+            }
+            if length <= longest {
+                return Some((message, window));
+            }
+            if window.end <= window.first + 1 {
+                return None;
+            }
+            window.end -= 1;
+            window.released = window.released.min(window.end);
+        }
+    }
+
+    fn message(&self, vehicle: &Vehicle, running: &Running, window: Window) -> Value {
+        let sheet = vehicle.factsheet.as_ref();
+        let nodes: Vec<Value> = (window.first..window.end)
+            .filter_map(|index| {
+                let stop = running.stops.get(index)?;
+                Some(self.node(sheet, stop, index, index < window.released))
+            })
+            .collect();
+        let edges: Vec<Value> = (window.first..window.end.saturating_sub(1))
+            .filter_map(|index| {
+                let ends = (running.stops.get(index)?, running.stops.get(index + 1)?);
+                Some(self.edge(
+                    sheet,
+                    running.legs.get(index)?,
+                    ends,
+                    index,
+                    index + 1 < window.released,
+                ))
+            })
+            .collect();
+        let mut message = json!({ "orderId": running.id, "orderUpdateId": running.update_id });
+        if let Some(zones) = &self.config.zone_set
+            && sheet.is_none_or(|sheet| wants(sheet, "order.zoneSetId"))
+        {
+            message["zoneSetId"] = json!(zones);
+        }
+        message["nodes"] = Value::Array(nodes);
+        message["edges"] = Value::Array(edges);
+        message
+    }
+
+    fn node(&self, sheet: Option<&Factsheet>, stop: &Stop, index: usize, released: bool) -> Value {
+        let field = |name: &str, value: Option<Value>, default: Value| {
+            self.field(sheet, &format!("order.nodes.{name}"), value, default)
+        };
+        let mut node = json!({ "nodeId": stop.id, "sequenceId": 2 * index, "released": released });
+        if let Some(text) = field("nodeDescription", self.described("node", &stop.id), json!(stop.id)) {
+            node["nodeDescription"] = text;
+        }
+        let mut position = json!({ "x": stop.x, "y": stop.y });
+        let theta = stop.theta.map(|theta| json!(theta));
+        if let Some(theta) = field("nodePosition.theta", theta, json!(std::f64::consts::FRAC_PI_2)) {
+            position["theta"] = theta;
+        }
+        let deviation = stop.deviation_xy.map(|metres| json!(metres));
+        if let Some(deviation) = field("nodePosition.allowedDeviationXY", deviation, json!(0.3)) {
+            position["allowedDeviationXY"] = deviation;
+        }
+        let turn = stop.deviation_theta.map(|radians| json!(radians));
+        if let Some(turn) = field("nodePosition.allowedDeviationTheta", turn, json!(std::f64::consts::PI)) {
+            position["allowedDeviationTheta"] = turn;
+        }
+        position["mapId"] = json!(stop.map_id);
+        if let Some(text) = field("nodePosition.mapDescription", None, json!(stop.map_id)) {
+            position["mapDescription"] = text;
+        }
+        node["nodePosition"] = position;
+        node["actions"] = json!(stop.actions);
+        node
+    }
+
+    fn edge(&self, sheet: Option<&Factsheet>, leg: &Leg, ends: (&Stop, &Stop), index: usize, released: bool) -> Value {
+        let (from, to) = ends;
+        let mut edge = json!({
+            "edgeId": leg.id,
+            "sequenceId": 2 * index + 1,
+            "released": released,
+            "startNodeId": from.id,
+            "endNodeId": to.id,
+        });
+        let length = distance((from.x, from.y), (to.x, to.y));
+        let number = |value: Option<f64>| value.map(|value| json!(value));
+        let corridor = leg.corridor.filter(|(left, right)| *left > 0.0 || *right > 0.0);
+        let curved = corridor.is_some() || self.faults.has(F::TrajectoryUnasked);
+        let fields = [
+            ("edgeDescription", self.described("edge", &leg.id), json!(leg.id)),
+            ("maxSpeed", number(leg.max_speed), json!(1.0)),
+            ("maxHeight", number(leg.max_height), json!(10.0)),
+            ("minHeight", number(leg.min_height), json!(0.0)),
+            ("orientation", None, json!(0.0)),
+            ("orientationType", None, json!("TANGENTIAL")),
+            (
+                "direction",
+                leg.direction.as_ref().map(|text| json!(text)),
+                json!("straight"),
+            ),
+            ("rotationAllowed", None, json!(true)),
+            ("maxRotationSpeed", None, json!(1.0)),
+            ("length", None, json!(length)),
+            (
+                "trajectory",
+                curved.then(|| self.straight(from, to)),
+                self.straight(from, to),
+            ),
+            (
+                "corridor",
+                corridor.map(|widths| self.corridor(widths)),
+                self.corridor((0.5, 0.5)),
+            ),
+        ];
+        for (name, value, default) in fields {
+            if let Some(value) = self.field(sheet, &format!("order.edges.{name}"), value, default) {
+                edge[name] = value;
+            }
+        }
+        self.corridor_only_on_a_curve(leg, &mut edge);
+        edge["actions"] = json!(leg.actions);
+        edge
+    }
+
+    /// A corridor goes with a trajectory, or not at all (CORR-02).
+    fn corridor_only_on_a_curve(&self, leg: &Leg, edge: &mut Value) {
+        let Some(fields) = edge.as_object_mut() else { return };
+        if !fields.contains_key("trajectory") {
+            fields.remove("corridor");
+        }
+        if self.faults.has(F::CorridorWithoutTrajectory) {
+            fields.remove("trajectory");
+            fields.insert("corridor".into(), self.corridor(leg.corridor.unwrap_or((0.5, 0.5))));
+        }
+        if self.faults.has(F::CorridorZero) && !fields.contains_key("corridor") {
+            let none = json!({ "leftWidth": 0.0, "rightWidth": 0.0 });
+            fields.insert("corridor".into(), none);
+        }
+    }
+
+    fn corridor(&self, (left, right): (f64, f64)) -> Value {
+        let mut corridor = json!({ "leftWidth": left, "rightWidth": right, "corridorRefPoint": "KINEMATICCENTER" });
+        if self.faults.has(F::CorridorNegative) {
+            corridor["rightWidth"] = json!(-right);
+        }
+        if self.faults.has(F::CorridorPointUnknown) {
+            corridor["corridorRefPoint"] = json!("KINEMATIC_CENTER");
+        }
+        if self.faults.has(F::CorridorOneSided)
+            && let Some(fields) = corridor.as_object_mut()
+        {
+            fields.remove("leftWidth");
+        }
+        corridor
+    }
+
+    /// The straight line between two nodes, as a curve.
+    fn straight(&self, from: &Stop, to: &Stop) -> Value {
+        let aside = if self.faults.has(F::CurveBesideNodes) { 3.0 } else { 0.0 };
+        let begins = if self.faults.has(F::CorridorApart) { 2.0 } else { aside };
+        let mut curve = json!({
+            "degree": 1,
+            "knotVector": [0.0, 0.0, 1.0, 1.0],
+            "controlPoints": [
+                { "x": from.x + begins, "y": from.y + begins, "weight": 1.0 },
+                { "x": to.x + aside, "y": to.y + aside, "weight": 1.0 },
+            ],
+        });
+        if self.faults.has(F::KnotsShort) {
+            curve["knotVector"] = json!([0.0, 0.0, 1.0]);
+        }
+        if self.faults.has(F::KnotsBeyondOne) {
+            curve["knotVector"] = json!([0.0, 0.0, 2.0, 2.0]);
+        }
+        if self.faults.has(F::KnotsMissing)
+            && let Some(fields) = curve.as_object_mut()
+        {
+            fields.remove("knotVector");
+        }
+        curve
+    }
+
+    /// A description, for a master control that likes to give them.
+    fn described(&self, what: &str, id: &str) -> Option<Value> {
+        let wanted = self.takes(T::DescriptionsEverywhere)
+            || self.faults.has(F::DescriptionsUnasked)
+            || self.faults.has(F::NotUtf8);
+        wanted.then(|| json!(format!("{what} {id} in allée 1")))
+    }
+
+    /// An optional field: what the layout says where the vehicle supports it, or the default where it demands it.
+    fn field(&self, sheet: Option<&Factsheet>, name: &str, value: Option<Value>, default: Value) -> Option<Value> {
+        let everywhere = match name {
+            "order.edges.trajectory" => self.faults.has(F::TrajectoryUnasked),
+            "order.nodes.nodeDescription" | "order.edges.edgeDescription" => {
+                self.faults.has(F::DescriptionsUnasked) || self.faults.has(F::NotUtf8)
+            }
+            _ => false,
+        };
+        let Some(sheet) = sheet else {
+            // What an unknown vehicle makes of it is unknown too.
+            let harmless = name.starts_with("order.nodes") || name == "order.edges.maxSpeed" || everywhere;
+            return value.filter(|_| harmless);
+        };
+        match sheet.support(name) {
+            Some("REQUIRED") => value.or_else(|| (!self.faults.has(F::RequiredOmitted)).then_some(default)),
+            Some(_) => value,
+            None if everywhere => value,
+            None => None,
+        }
+    }
+}
+
+/// Whether the vehicle has a use for an optional parameter.
+fn wants(sheet: &Factsheet, name: &str) -> bool {
+    sheet.support(name).is_some()
+}

@@ -1,0 +1,207 @@
+//! One vehicle as the master control sees it, and what it is to do.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use serde_json::Value;
+
+use crate::clock::Moment;
+
+use super::config::VehicleConfig;
+use super::seen::{Factsheet, State};
+
+/// More transports than this do not wait for one vehicle.
+pub(super) const MAX_QUEUE: usize = 200;
+/// More instant actions than this do not wait for one vehicle.
+pub(super) const MAX_INSTANT: usize = 100;
+
+/// What the connection topic says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Presence {
+    #[default]
+    Unknown,
+    Online,
+    Away,
+}
+
+/// A transport somebody asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Transport {
+    /// Where a load is picked.
+    pub(super) from: Option<String>,
+    /// Where it ends.
+    pub(super) to: String,
+    pub(super) load_type: Option<String>,
+    /// An action to be performed at the destination.
+    pub(super) action: Option<String>,
+    pub(super) parameters: Value,
+    /// The load is picked already.
+    pub(super) loaded: bool,
+    /// How often it was begun.
+    pub(super) begun: u32,
+}
+
+/// A node of the way that is driven.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Stop {
+    pub(super) id: String,
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) theta: Option<f64>,
+    pub(super) map_id: String,
+    pub(super) deviation_xy: Option<f64>,
+    pub(super) deviation_theta: Option<f64>,
+    pub(super) actions: Vec<Value>,
+}
+
+/// An edge of the way that is driven.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Leg {
+    pub(super) id: String,
+    pub(super) from: String,
+    pub(super) to: String,
+    pub(super) max_speed: Option<f64>,
+    pub(super) max_height: Option<f64>,
+    pub(super) min_height: Option<f64>,
+    pub(super) direction: Option<String>,
+    pub(super) corridor: Option<(f64, f64)>,
+    pub(super) actions: Vec<Value>,
+}
+
+/// The order the vehicle drives.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Running {
+    pub(super) transport: Transport,
+    pub(super) id: String,
+    pub(super) update_id: u32,
+    /// All nodes of the way, from the first one on; the sequenceId is twice the index.
+    pub(super) stops: Vec<Stop>,
+    /// The edge behind the node of the same index.
+    pub(super) legs: Vec<Leg>,
+    /// Number of nodes released.
+    pub(super) released: usize,
+    /// The message sent last, without header.
+    pub(super) message: Value,
+    pub(super) sent_at: Moment,
+    pub(super) resends: u32,
+    /// A state has shown the message sent last.
+    pub(super) confirmed: bool,
+    /// A state has shown the order.
+    pub(super) accepted: bool,
+    /// The vehicle does not take updates of this order.
+    pub(super) refused: bool,
+    /// The way behind the base has changed and is not sent yet.
+    pub(super) changed: bool,
+    /// actionId of the running waitForTrigger, and since when.
+    pub(super) waits: Option<(String, Moment)>,
+}
+
+impl Running {
+    /// All actions of the way so far released.
+    pub(super) fn actions(&self) -> impl Iterator<Item = &Value> {
+        let nodes = self.stops.iter().take(self.released).flat_map(|stop| &stop.actions);
+        let legs = self.legs.iter().take(self.released.saturating_sub(1));
+        nodes.chain(legs.flat_map(|leg| &leg.actions))
+    }
+
+    /// Index of the node the vehicle has reached.
+    pub(super) fn reached(&self, state: Option<&State>) -> usize {
+        let sequence = state.filter(|state| state.order_id == self.id);
+        let sequence = sequence.map_or(0, |state| state.last_node_sequence_id / 2);
+        usize::try_from(sequence)
+            .unwrap_or(usize::MAX)
+            .min(self.stops.len().saturating_sub(1))
+    }
+
+    /// Whether every node of the way is released.
+    pub(super) fn is_whole(&self) -> bool {
+        self.released >= self.stops.len()
+    }
+}
+
+/// A cancellation under way.
+#[derive(Clone, Debug)]
+pub(super) struct Cancel {
+    pub(super) action_id: String,
+    /// What is to be done instead.
+    pub(super) then: Option<Transport>,
+}
+
+/// An instant action: waiting to be sent, or sent and watched.
+#[derive(Clone, Debug)]
+pub(super) struct Instant {
+    pub(super) action: Value,
+    pub(super) sent_at: Option<Moment>,
+    pub(super) resends: u32,
+}
+
+impl Instant {
+    pub(super) fn id(&self) -> &str {
+        self.action.get("actionId").and_then(Value::as_str).unwrap_or_default()
+    }
+
+    pub(super) fn kind(&self) -> &str {
+        self.action
+            .get("actionType")
+            .and_then(Value::as_str)
+            .unwrap_or_default()
+    }
+}
+
+/// How far the roll-out of a map is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    Download,
+    Delete,
+    DownloadAgain,
+}
+
+/// The roll-out of a map.
+#[derive(Clone, Debug)]
+pub(super) struct MapJob {
+    pub(super) map: super::config::SiteMap,
+    pub(super) stage: Stage,
+    pub(super) action_id: String,
+}
+
+/// A vehicle.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Vehicle {
+    pub(super) config: VehicleConfig,
+    pub(super) presence: Presence,
+    /// Timestamp of the connection message seen last (`old-will-ignored` only).
+    pub(super) heard: String,
+    pub(super) state: Option<State>,
+    pub(super) state_at: Moment,
+    pub(super) factsheet: Option<Factsheet>,
+    /// Since when a factsheet is missed, and whether it was asked for.
+    pub(super) missed: Option<(Moment, bool)>,
+    pub(super) queue: VecDeque<Transport>,
+    pub(super) running: Option<Running>,
+    pub(super) cancel: Option<Cancel>,
+    pub(super) instants: VecDeque<Instant>,
+    pub(super) jobs: Vec<MapJob>,
+    /// Maps that were asked to be enabled for an order, with the actionId.
+    pub(super) enabling: BTreeMap<String, String>,
+    /// Maps that were rolled out because an order needs them.
+    pub(super) fetched: BTreeSet<String>,
+    /// Edges it may not use, by start and end.
+    pub(super) blocked: BTreeSet<(String, String)>,
+    pub(super) header_ids: BTreeMap<&'static str, u32>,
+    pub(super) last_order_at: Option<Moment>,
+    /// When it wants to be looked at next.
+    pub(super) wake: Option<Moment>,
+    /// The order given up last: its message (`refused-order-repeated`, `next-order-starts-elsewhere`).
+    pub(super) last_order: Option<Running>,
+}
+
+impl Vehicle {
+    /// Asks to be looked at again then.
+    pub(super) fn at(&mut self, moment: Moment) {
+        self.wake = Some(self.wake.map_or(moment, |wake| wake.min(moment)));
+    }
+
+    /// The full topic of a topic name.
+    pub(super) fn topic(&self, name: &str) -> Option<&str> {
+        self.config.topics.get(name).map(String::as_str)
+    }
+}

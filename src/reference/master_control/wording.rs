@@ -1,0 +1,369 @@
+//! How messages are worded: where defects and liberties of the text of a message stand.
+
+use serde_json::{Map, Value, json};
+
+use super::faults::{FaultName as F, Faults};
+use super::tolerances::{ToleranceName as T, Tolerances};
+
+/// Stands for a token no JSON writer produces.
+const NAN: &str = "@NaN@";
+
+/// Applies what changes the content of a message.
+pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, message: &mut Value) {
+    if name == "order" {
+        order(faults, message);
+    }
+    for pointer in ["nodes", "edges"] {
+        for element in elements(message, pointer) {
+            for action in elements(element, "actions") {
+                self::action(faults, name, action);
+            }
+        }
+    }
+    for action in elements(message, "actions") {
+        self::action(faults, name, action);
+    }
+    if name == "instantActions"
+        && faults.has(F::ActionsRenamed)
+        && let Some(actions) = message.as_object_mut().and_then(|message| message.remove("actions"))
+    {
+        message["instantActions"] = actions;
+    }
+    if tolerances.has(T::VendorFields)
+        && let Some(message) = message.as_object_mut()
+    {
+        message.insert("vendorTrace".into(), json!({ "thread": 4, "module": "dispatcher" }));
+    }
+}
+
+/// The text of a message.
+pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -> Vec<u8> {
+    let mut message = message.clone();
+    if tolerances.has(T::KeysReordered)
+        && let Value::Object(members) = &message
+    {
+        message = Value::Object(members.iter().rev().map(|(k, v)| (k.clone(), v.clone())).collect());
+    }
+    let mut text = if tolerances.has(T::PrettyPrinted) {
+        serde_json::to_vec_pretty(&message).unwrap_or_default()
+    } else {
+        message.to_string().into_bytes()
+    };
+    if faults.has(F::NanCoordinate) {
+        text = String::from_utf8_lossy(&text)
+            .replace(&format!("\"{NAN}\""), "NaN")
+            .into_bytes();
+    }
+    if faults.has(F::NotUtf8) {
+        // é in Latin-1
+        text = replaced(&text, "é".as_bytes(), &[0xe9]);
+    }
+    if faults.has(F::NulAfterJson) {
+        text.push(0);
+    }
+    text
+}
+
+fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
+    let Some(at) = bytes.windows(from.len().max(1)).position(|window| window == from) else {
+        return bytes.to_vec();
+    };
+    [&bytes[..at], to, &replaced(&bytes[at + from.len()..], from, to)].concat()
+}
+
+fn elements<'a>(value: &'a mut Value, key: &str) -> impl Iterator<Item = &'a mut Value> {
+    value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
+}
+
+fn remove(value: &mut Value, key: &str) -> Option<Value> {
+    value.as_object_mut().and_then(|object| object.shift_remove(key))
+}
+
+fn order(faults: Faults, message: &mut Value) {
+    let first = message.pointer("/nodes/0/sequenceId").and_then(Value::as_u64);
+    let update = first.is_some_and(|sequence| sequence > 0);
+    identity(faults, update, message);
+    if update {
+        stitching(faults, message);
+    }
+    numbering(faults, first.unwrap_or(0), message);
+    graph(faults, message);
+    for node in elements(message, "nodes") {
+        self::node(faults, node);
+    }
+    for edge in elements(message, "edges") {
+        self::edge(faults, edge);
+    }
+    if faults.has(F::EmptyArraysOmitted) {
+        for pointer in ["nodes", "edges"] {
+            for element in elements(message, pointer) {
+                without_empty(element);
+            }
+        }
+        without_empty(message);
+    }
+}
+
+fn without_empty(value: &mut Value) {
+    if let Some(object) = value.as_object_mut() {
+        object.retain(|_, member| member.as_array().is_none_or(|array| !array.is_empty()));
+    }
+}
+
+fn identity(faults: Faults, update: bool, message: &mut Value) {
+    let id = message["orderId"].as_str().unwrap_or_default().to_owned();
+    let number = message["orderUpdateId"].as_u64().unwrap_or_default();
+    if faults.has(F::OrderIdWithSpace) {
+        message["orderId"] = json!(format!("Order {id}"));
+    }
+    if faults.has(F::OrderIdReused) {
+        message["orderId"] = json!("transport");
+    }
+    if faults.has(F::OrderIdPerUpdate) && update {
+        message["orderId"] = json!(format!("{id}-{number}"));
+    }
+    if faults.has(F::UpdateIdKept) {
+        message["orderUpdateId"] = json!(0);
+    }
+    if faults.has(F::UpdateIdFalls) {
+        message["orderUpdateId"] = json!(1000_u64.saturating_sub(number));
+    }
+    if faults.has(F::UpdateIdMissing) && !update {
+        remove(message, "orderUpdateId");
+    }
+    if faults.has(F::ZoneSetEmpty) {
+        message["zoneSetId"] = json!("");
+    }
+}
+
+/// Defects of the first node of an update.
+fn stitching(faults: Faults, message: &mut Value) {
+    let id = format!("added-{}", message["orderUpdateId"]);
+    if let Some(node) = elements(message, "nodes").next() {
+        if faults.has(F::StitchingMoved)
+            && let Some(x) = node.pointer_mut("/nodePosition/x")
+        {
+            *x = json!(x.as_f64().unwrap_or_default() + 0.3);
+        }
+        if faults.has(F::StitchingActionsDropped) {
+            node["actions"] = json!([]);
+        }
+        if faults.has(F::StitchingActionAdded)
+            && let Some(actions) = node["actions"].as_array_mut()
+        {
+            actions.push(json!({ "actionType": "beep", "actionId": id, "blockingType": "NONE" }));
+        }
+    }
+    if faults.has(F::StitchingMissing) {
+        for key in ["nodes", "edges"] {
+            if let Some(list) = message[key]
+                .as_array_mut()
+                .filter(|list| list.len() > 1 || key == "edges")
+                && !list.is_empty()
+            {
+                list.remove(0);
+            }
+        }
+    }
+}
+
+fn numbering(faults: Faults, first: u64, message: &mut Value) {
+    let changed = |sequence: u64| match () {
+        () if faults.has(F::SequenceFromOne) => sequence + 1,
+        () if faults.has(F::SequencePerKind) => sequence / 2,
+        () if faults.has(F::SequenceRestarts) => sequence.saturating_sub(first),
+        () => sequence,
+    };
+    for key in ["nodes", "edges"] {
+        for element in elements(message, key) {
+            let Some(sequence) = element["sequenceId"].as_u64() else {
+                continue;
+            };
+            element["sequenceId"] = json!(changed(sequence));
+            if key == "edges" && faults.has(F::SequenceIdFraction) {
+                element["sequenceId"] = json!(sequence);
+                if let Ok(number) = sequence.to_string().parse::<f64>() {
+                    element["sequenceId"] = json!(number - 0.5);
+                }
+            }
+        }
+    }
+}
+
+fn graph(faults: Faults, message: &mut Value) {
+    let text = |value: Option<&Value>| value.and_then(Value::as_str).unwrap_or_default().to_owned();
+    let nodes = message["nodes"].as_array().cloned().unwrap_or_default();
+    let start = text(nodes.first().map(|node| &node["nodeId"]));
+    let end = text(nodes.last().map(|node| &node["nodeId"]));
+    for edge in elements(message, "edges") {
+        if faults.has(F::EdgeEndsSwapped) {
+            let (from, to) = (edge["startNodeId"].clone(), edge["endNodeId"].clone());
+            edge["startNodeId"] = to;
+            edge["endNodeId"] = from;
+        }
+        if faults.has(F::EdgeEndsOfOrder) {
+            edge["startNodeId"] = json!(start);
+            edge["endNodeId"] = json!(end);
+        }
+    }
+    if faults.has(F::EdgeMissing)
+        && let Some(edges) = message["edges"].as_array_mut()
+    {
+        edges.pop();
+    }
+    if faults.has(F::EdgeReleasedAlone)
+        && let Some(edge) = elements(message, "edges").find(|edge| edge["released"] == json!(false))
+    {
+        edge["released"] = json!(true);
+    }
+    if faults.has(F::ReleasedBehindHorizon)
+        && let Some(node) = message["nodes"].as_array_mut().and_then(|nodes| nodes.last_mut())
+    {
+        node["released"] = json!(true);
+    }
+}
+
+fn node(faults: Faults, node: &mut Value) {
+    if let Some(position) = node.get_mut("nodePosition").and_then(Value::as_object_mut) {
+        self::position(faults, position);
+    }
+    if faults.has(F::PositionMissing) {
+        remove(node, "nodePosition");
+    }
+    if faults.has(F::ReleasedMissing) && node["released"] == json!(false) {
+        remove(node, "released");
+    }
+    element(faults, node);
+}
+
+/// Defects nodes and edges share.
+fn element(faults: Faults, element: &mut Value) {
+    if faults.has(F::BooleansAsWords)
+        && let Some(released) = element.get("released").and_then(Value::as_bool)
+    {
+        element["released"] = json!(if released { "TRUE" } else { "FALSE" });
+    }
+    if faults.has(F::SnakeCaseKeys)
+        && let Some(sequence) = remove(element, "sequenceId")
+    {
+        element["sequence_id"] = sequence;
+    }
+}
+
+fn position(faults: Faults, position: &mut Map<String, Value>) {
+    let number = |position: &Map<String, Value>, key: &str| position.get(key).and_then(Value::as_f64);
+    let scaled = |position: &mut Map<String, Value>, key: &str, factor: f64| {
+        if let Some(number) = number(position, key) {
+            position.insert(key.to_owned(), json!(number * factor));
+        }
+    };
+    if faults.has(F::MirroredMap) {
+        scaled(position, "y", -1.0);
+    }
+    if faults.has(F::Millimetres) {
+        scaled(position, "x", 1000.0);
+        scaled(position, "y", 1000.0);
+    }
+    if faults.has(F::ThetaInDegrees) {
+        let theta = number(position, "theta").unwrap_or(std::f64::consts::FRAC_PI_2);
+        position.insert("theta".into(), json!(theta.to_degrees()));
+    }
+    if faults.has(F::DeviationNegative) && !position.contains_key("allowedDeviationXY") {
+        position.insert("allowedDeviationXY".into(), json!(-1.0));
+    }
+    if faults.has(F::NumbersAsText) {
+        for key in ["x", "y"] {
+            if let Some(number) = number(position, key) {
+                position.insert(key.to_owned(), json!(number.to_string()));
+            }
+        }
+    }
+    if faults.has(F::NanCoordinate) && !position.contains_key("theta") {
+        position.insert("theta".into(), json!(NAN));
+    }
+    if faults.has(F::MapIdMissing) {
+        position.shift_remove("mapId");
+    }
+}
+
+fn edge(faults: Faults, edge: &mut Value) {
+    if faults.has(F::EdgeWithoutEnds) {
+        remove(edge, "startNodeId");
+        remove(edge, "endNodeId");
+    }
+    if faults.has(F::EdgeIdMissing) {
+        remove(edge, "edgeId");
+    }
+    if faults.has(F::NullForNothing) && edge["actions"].as_array().is_some_and(Vec::is_empty) {
+        edge["actions"] = Value::Null;
+    }
+    element(faults, edge);
+}
+
+fn action(faults: Faults, name: &str, action: &mut Value) {
+    let kind = action["actionType"].as_str().unwrap_or_default().to_owned();
+    if let Some(blocking) = action["blockingType"].as_str().map(str::to_owned) {
+        if faults.has(F::LowerCaseEnums) {
+            action["blockingType"] = json!(blocking.to_ascii_lowercase());
+        }
+        if faults.has(F::BlockingTypeUnknown) {
+            action["blockingType"] = json!("EXCLUSIVE");
+        }
+        if faults.has(F::BlockingTypeMissing) {
+            remove(action, "blockingType");
+        }
+    }
+    if name == "instantActions" && faults.has(F::ActionIdMissing) {
+        remove(action, "actionId");
+    }
+    let left_out = [
+        (F::LastNodeMissing, "initPosition", "lastNodeId"),
+        (F::LoadTypeMissing, "pick", "loadType"),
+        (F::DeviceMissing, "pick", "lhd"),
+        (F::DownloadWithoutLink, "downloadMap", "mapDownloadLink"),
+        (F::DownloadWithoutId, "downloadMap", "mapId"),
+        (F::DownloadWithoutVersion, "downloadMap", "mapVersion"),
+    ];
+    if let Some(parameters) = action.get_mut("actionParameters").and_then(Value::as_array_mut) {
+        for (fault, of, key) in left_out {
+            if faults.has(fault) && kind == of {
+                parameters.retain(|parameter| parameter["key"] != json!(key));
+            }
+        }
+        for parameter in parameters.iter_mut() {
+            self::parameter(faults, &kind, parameter);
+        }
+        if faults.has(F::ParametersAsObject) {
+            let members = parameters.iter().filter_map(|parameter| {
+                let key = parameter["key"].as_str()?;
+                Some((key.to_owned(), parameter["value"].clone()))
+            });
+            let members: Map<String, Value> = members.collect();
+            action["actionParameters"] = Value::Object(members);
+        }
+    }
+}
+
+fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
+    let key = parameter["key"].as_str().unwrap_or_default().to_owned();
+    if faults.has(F::StationTypeRenamed) && key == "stationType" {
+        parameter["key"] = json!("station_type");
+    }
+    if faults.has(F::PoseAsText)
+        && kind == "initPosition"
+        && let Some(number) = parameter["value"].as_f64()
+    {
+        parameter["value"] = json!(number.to_string());
+    }
+    if faults.has(F::DeviceUnknown) && key == "lhd" {
+        parameter["value"] = json!("1");
+    }
+    if faults.has(F::ParameterNull) {
+        parameter["value"] = Value::Null;
+    }
+    if faults.has(F::ParameterWithoutKey)
+        && let Some(key) = remove(parameter, "key")
+    {
+        parameter["name"] = key;
+    }
+}

@@ -1,0 +1,154 @@
+//! No false accusation of a master control: whatever liberty a good one takes, and whatever the timing, none fails.
+//!
+//! Unlike a vehicle, a master control chooses what it sends: one that sends no horizon gives nothing to judge where a
+//! horizon is needed, so that inconclusive is the right word there. The list of these is a snapshot.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::fmt::Write as _;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use vda5050_tck::pack::{Pack, Role};
+use vda5050_tck::reference::master_control::TOLERANCES;
+use vda5050_tck::report::result::RunResult;
+use vda5050_tck::run::{Library, VirtualRun, decided, run_silently};
+use vda5050_tck::verdict::Verdict;
+
+/// Runs everything on all cores; the results come in the order of the requests.
+fn run_all(library: &Library, pack: &Pack, requests: &[VirtualRun]) -> Vec<RunResult> {
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let at = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(request) = requests.get(at) else { break };
+                    let finished = run_silently(library, pack, request.clone()).unwrap();
+                    results.lock().unwrap().push((at, finished.result));
+                }
+            });
+        }
+    });
+    let mut results = results.into_inner().unwrap();
+    results.sort_by_key(|(at, _)| *at);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+fn with(library: &Library, pack: &Pack, tolerances: &[&str]) -> VirtualRun {
+    let mut request = VirtualRun::of_role(Role::MasterControl, library, pack);
+    for name in tolerances {
+        request.device.tolerate(name).unwrap();
+    }
+    request
+}
+
+/// What is worse than a pass, by requirement and place; `Err` names what is worse than inconclusive.
+fn blemishes(result: &RunResult) -> Result<Vec<String>, String> {
+    let mut mild = Vec::new();
+    let mut worse = String::new();
+    for (decider, verdict) in decided(result) {
+        let line = format!("{} {} {}", verdict.word(), decider.requirement, decider.place);
+        match verdict {
+            Verdict::Pass => {}
+            Verdict::Warning | Verdict::Inconclusive => mild.push(line),
+            Verdict::Error | Verdict::Fail => {
+                let _ = writeln!(worse, "  {line}");
+            }
+        }
+    }
+    mild.sort();
+    mild.dedup();
+    if worse.is_empty() { Ok(mild) } else { Err(worse) }
+}
+
+/// Runs with each of these sets of tolerances. Nothing may fail; gives what was not a pass.
+fn accused(sets: &[Vec<&str>]) -> String {
+    let library = Library::load(None).unwrap();
+    let pack = library.rules.packs.latest();
+    let requests: Vec<VirtualRun> = sets.iter().map(|set| with(&library, pack, set)).collect();
+    let mut worse = String::new();
+    let mut mild = String::new();
+    for (set, result) in sets.iter().zip(run_all(&library, pack, &requests)) {
+        let name = set.join(" + ");
+        match blemishes(&result) {
+            Ok(lines) => {
+                for line in lines {
+                    let _ = writeln!(mild, "{name}: {line}");
+                }
+            }
+            Err(lines) => {
+                let _ = write!(worse, "{name}:\n{lines}");
+            }
+        }
+    }
+    assert!(
+        worse.is_empty(),
+        "a master control is accused that does nothing wrong\n{worse}"
+    );
+    mild
+}
+
+#[test]
+fn whatever_liberties_it_takes_nothing_fails() {
+    const SETS: usize = 4;
+    let mut sets = vec![Vec::new(); SETS];
+    for (at, tolerance) in TOLERANCES.iter().enumerate() {
+        sets[at % SETS].push(tolerance.name);
+    }
+    accused(&sets);
+}
+
+#[test]
+#[ignore = "takes a minute; CI runs it"]
+fn with_each_tolerance_nothing_fails() {
+    let sets: Vec<Vec<&str>> = TOLERANCES.iter().map(|tolerance| vec![tolerance.name]).collect();
+    insta::assert_snapshot!(accused(&sets));
+}
+
+#[test]
+fn whatever_the_seed_the_verdicts_are_the_same() {
+    same_verdicts(0..4);
+}
+
+#[test]
+#[ignore = "takes a minute; CI runs it"]
+fn with_fifty_seeds_the_verdicts_are_the_same() {
+    same_verdicts(0..50);
+}
+
+fn same_verdicts(seeds: std::ops::Range<u64>) {
+    let library = Library::load(None).unwrap();
+    let pack = library.rules.packs.latest();
+    let requests: Vec<VirtualRun> = seeds
+        .map(|seed| {
+            let mut request = with(&library, pack, &[]);
+            request.seed = seed;
+            request.jitter = Duration::from_millis(2 * (seed % 5));
+            request.coalesce = Duration::from_millis(seed % 4);
+            request
+        })
+        .collect();
+    let verdicts = |result: &RunResult| -> Vec<String> {
+        let tests = result
+            .tests
+            .iter()
+            .map(|test| format!("{} {:?}", test.id, test.verdict));
+        let requirements = result
+            .requirements
+            .iter()
+            .map(|one| format!("{} {:?}", one.id, one.verdict));
+        tests.chain(requirements).collect()
+    };
+    let mut first: Option<Vec<String>> = None;
+    for (seed, result) in run_all(&library, pack, &requests).iter().enumerate() {
+        match blemishes(result) {
+            Ok(mild) => assert!(mild.is_empty(), "seed {seed}: {mild:#?}"),
+            Err(worse) => panic!("seed {seed}:\n{worse}"),
+        }
+        let verdicts = verdicts(result);
+        let first = first.get_or_insert_with(|| verdicts.clone());
+        assert_eq!(*first, verdicts, "seed {seed}");
+    }
+}
