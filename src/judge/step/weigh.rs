@@ -47,7 +47,7 @@ impl Weighing {
             bound.is_ok_and(|pattern| pattern.is_some_and(|pattern| pattern.looks_back()))
         });
         Self {
-            topic: verb.topic.clone(),
+            topic: verb.subject().into_owned(),
             mark: position.mark,
             judges: !verb.assert.is_empty(),
             patient: looks_back,
