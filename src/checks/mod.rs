@@ -38,6 +38,7 @@ mod traffic;
 mod trajectory;
 mod visualization;
 
+use std::cell::RefCell;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
@@ -61,6 +62,21 @@ pub struct CheckContext<'a> {
     pub with: &'a Map<String, Value>,
     /// The run's bindings: `time`, `device`, ….
     pub bindings: &'a Map<String, Value>,
+    /// What all checks of the same entries work out once.
+    pub shared: &'a Shared,
+}
+
+/// What several checks want to know of the same entries, worked out by the first that asks. One for each series of
+/// entries: the monitors of a vehicle share one, a check in a test has its own.
+#[derive(Default)]
+pub struct Shared {
+    walked: RefCell<motion::Walked>,
+}
+
+impl std::fmt::Debug for Shared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Shared").finish_non_exhaustive()
+    }
 }
 
 impl CheckContext<'_> {

@@ -320,6 +320,7 @@ impl Trace {
             identity: ("acme", &self.serial),
             with: &self.with,
             bindings: &bindings,
+            shared: &super::Shared::default(),
         };
         let mut running = (find(name).expect("known check").start)(&context);
         let mut findings = Vec::new();

@@ -10,7 +10,7 @@ use serde_json::Map;
 use super::decide::mood;
 use super::step::shown_path;
 use super::test::Ground;
-use crate::checks::{self, CheckContext, CheckFinding, Running};
+use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
@@ -49,7 +49,7 @@ enum Watching {
 
 impl MonitorJudge {
     /// Puts a monitor on duty; `None` when it is not meant for this version.
-    pub fn start(monitor: &Arc<Monitor>, ground: &Ground, tap: bool) -> Option<Self> {
+    pub fn start(monitor: &Arc<Monitor>, ground: &Ground, bindings: &Bindings, tap: bool) -> Option<Self> {
         let wanted = monitor
             .checks
             .iter()
@@ -60,7 +60,7 @@ impl MonitorJudge {
         let rule = if monitor.needs.contains(&Need::Tap) && !tap {
             Watching::Off
         } else {
-            Self::watch(&monitor.rule, ground).unwrap_or(Watching::Off)
+            Self::watch(&monitor.rule, ground, bindings).unwrap_or(Watching::Off)
         };
         Some(Self {
             monitor: Arc::clone(monitor),
@@ -70,31 +70,28 @@ impl MonitorJudge {
         })
     }
 
-    fn watch(rule: &Rule, ground: &Ground) -> Option<Watching> {
-        let mut bindings = ground.bindings.clone();
-        bindings.insert("vda".to_owned(), ground.pack.vocabulary().clone());
-        let bindings = Bindings::from(bindings);
+    fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings) -> Option<Watching> {
         Some(match rule {
             Rule::Always { topic, when, pattern } => Watching::Pattern {
                 topic: topic.clone(),
-                when: when.as_ref().map(|when| when.bind(&bindings)).transpose().ok()?,
-                pattern: pattern.bind(&bindings).ok()?,
+                when: when.as_ref().map(|when| when.bind(bindings)).transpose().ok()?,
+                pattern: pattern.bind(bindings).ok()?,
                 forbidden: false,
             },
             Rule::Never { topic, pattern } => Watching::Pattern {
                 topic: topic.clone(),
                 when: None,
-                pattern: pattern.bind(&bindings).ok()?,
+                pattern: pattern.bind(bindings).ok()?,
                 forbidden: true,
             },
             Rule::Check(check) => {
                 let definition = checks::find(&check.name)?;
                 let mut with = Map::new();
                 for (name, term) in &check.with {
-                    with.insert(name.clone(), term.bind(&bindings).ok()?);
+                    with.insert(name.clone(), term.bind(bindings).ok()?);
                 }
                 Watching::Check {
-                    running: (definition.start)(&context(ground, &with)),
+                    running: (definition.start)(&context(ground, &with, &Shared::default())),
                     with,
                 }
             }
@@ -102,12 +99,12 @@ impl MonitorJudge {
     }
 
     /// Shows it one entry.
-    pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground) {
+    pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground, shared: &Shared) {
         let mut found = Vec::new();
         match &mut self.rule {
             Watching::Off => {}
             Watching::Check { running, with } => {
-                if running.observe(entry, &context(ground, with), &mut found) {
+                if running.observe(entry, &context(ground, with, shared), &mut found) {
                     self.judged += 1;
                 }
             }
@@ -141,10 +138,10 @@ impl MonitorJudge {
     }
 
     /// The run has ended.
-    pub fn finish(&mut self, end: Moment, ground: &Ground) {
+    pub fn finish(&mut self, end: Moment, ground: &Ground, shared: &Shared) {
         let mut found = Vec::new();
         if let Watching::Check { running, with } = &mut self.rule {
-            running.finish(end, &context(ground, with), &mut found);
+            running.finish(end, &context(ground, with, shared), &mut found);
         }
         self.keep(found, ground);
     }
@@ -221,7 +218,7 @@ fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String
     }
 }
 
-fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>) -> CheckContext<'a> {
+fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>, shared: &'a Shared) -> CheckContext<'a> {
     CheckContext {
         pack: &ground.pack,
         topics: &ground.topics,
@@ -229,5 +226,6 @@ fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>) -> 
         identity: (&ground.identity.0, &ground.identity.1),
         with,
         bindings: &ground.bindings,
+        shared,
     }
 }

@@ -84,13 +84,14 @@ impl RunJudge {
         } else {
             Role::MasterControl
         };
+        let bindings = Arc::new(header.bindings.clone());
         let ground_of = |topics: &BTreeMap<String, String>, manufacturer: &str, serial_number: &str| Ground {
             pack: Arc::clone(pack),
             catalogue: Arc::clone(&rules.catalogue),
             topics: topics.clone(),
             role,
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
-            bindings: header.bindings.clone(),
+            bindings: Arc::clone(&bindings),
         };
         // What a master control sends names the vehicle it is for.
         let mut of_vehicles = header
@@ -144,9 +145,9 @@ impl RunJudge {
             Event::Planned { plan } => self.plan = (**plan).clone(),
             // Outside a test, a variable gets its value for the whole run.
             Event::Bound { name, value } if self.current.is_none() => {
-                let mut bindings = crate::pattern::Bindings::from(std::mem::take(&mut self.ground.bindings));
+                let mut bindings = crate::pattern::Bindings::above(vec![Arc::clone(&self.ground.bindings)]);
                 bindings.set(name, value.clone());
-                self.ground.bindings.clone_from(bindings.as_map());
+                self.ground.bindings = Arc::new(bindings.to_map());
             }
             Event::TestBegun { test, bindings } => {
                 self.break_off("the run went on without ending this test");

@@ -36,7 +36,7 @@ pub struct Ground {
     /// Manufacturer and serial number; of the vehicle that is commanded, when a master control is tested.
     pub identity: (String, String),
     /// `time`, `device`.
-    pub bindings: Map<String, Value>,
+    pub bindings: Arc<Map<String, Value>>,
 }
 
 /// A test being judged.
@@ -69,9 +69,7 @@ struct Running {
 impl TestJudge {
     /// Begins a test with its `TestBegun` entry.
     pub fn begin(test: &Arc<Test>, ground: &Ground, entry: &Entry, own: &Value) -> Self {
-        let mut bindings = ground.bindings.clone();
-        bindings.insert("vda".to_owned(), ground.pack.vocabulary().clone());
-        let mut bindings = Bindings::from(bindings);
+        let mut bindings = Bindings::above(vec![ground.pack.words(), Arc::clone(&ground.bindings)]);
         if let Some(own) = own.as_object() {
             bindings.extend(own);
         }

@@ -9,18 +9,51 @@ use std::sync::Arc;
 use super::monitor::MonitorJudge;
 use super::test::Ground;
 use super::timeline::Timeline;
+use crate::checks::Shared;
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
+use crate::pattern::Bindings;
 use crate::report::result::MonitorResult;
 use crate::suite::model::Monitor;
 use crate::verdict::{Accumulated, Verdict};
 
 /// All monitors.
 pub(super) struct Watches {
-    first: Vec<MonitorJudge>,
+    first: Watch,
     /// Those of further vehicles, with what is known of them.
-    others: Vec<(Ground, Vec<MonitorJudge>)>,
+    others: Vec<(Ground, Watch)>,
+}
+
+/// The monitors of one vehicle.
+struct Watch {
+    monitors: Vec<MonitorJudge>,
+    shared: Shared,
+}
+
+impl Watch {
+    fn begin(monitors: &[&Arc<Monitor>], ground: &Ground, tap: bool) -> Self {
+        let bindings = Bindings::above(vec![ground.pack.words(), Arc::clone(&ground.bindings)]);
+        let all = monitors.iter();
+        Self {
+            monitors: all
+                .filter_map(|monitor| MonitorJudge::start(monitor, ground, &bindings, tap))
+                .collect(),
+            shared: Shared::default(),
+        }
+    }
+
+    fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground) {
+        for monitor in &mut self.monitors {
+            monitor.observe(entry, subject, ground, &self.shared);
+        }
+    }
+
+    fn finish(&mut self, end: Moment, ground: &Ground) {
+        for monitor in &mut self.monitors {
+            monitor.finish(end, ground, &self.shared);
+        }
+    }
 }
 
 /// A monitor and what it found on all vehicles.
@@ -62,18 +95,12 @@ impl Watched {
 impl Watches {
     /// Puts the monitors on duty. `ground` is that of the first vehicle.
     pub fn begin(monitors: &[&Arc<Monitor>], ground: &Ground, others: Vec<Ground>, tap: bool) -> Self {
-        let start = |ground: &Ground| {
-            let all = monitors.iter();
-            all.filter_map(|monitor| MonitorJudge::start(monitor, ground, tap))
-                .collect()
-        };
-        let first = start(ground);
         let others = others.into_iter().map(|ground| {
-            let own = start(&ground);
+            let own = Watch::begin(monitors, &ground, tap);
             (ground, own)
         });
         Self {
-            first,
+            first: Watch::begin(monitors, ground, tap),
             others: others.collect(),
         }
     }
@@ -84,9 +111,7 @@ impl Watches {
         if place.is_none_or(|place| place.vehicle == 0) {
             // What the harness's own vehicles say is context, and not the subject of any monitor.
             let subject = subject.filter(|_| !matches!(entry.event(), Event::Sent { .. }));
-            for monitor in &mut self.first {
-                monitor.observe(entry, subject, ground);
-            }
+            self.first.observe(entry, subject, ground);
         }
         if self.others.is_empty() {
             return;
@@ -94,18 +119,14 @@ impl Watches {
         match place {
             Some(place) => {
                 let own = place.vehicle.checked_sub(1).and_then(|at| self.others.get_mut(at));
-                let Some((ground, monitors)) = own else { return };
+                let Some((ground, watch)) = own else { return };
                 let subject = matches!(entry.event(), Event::Message { .. }).then_some(place.name.as_str());
-                for monitor in monitors {
-                    monitor.observe(entry, subject, ground);
-                }
+                watch.observe(entry, subject, ground);
             }
             None if is_of_connection(entry) => {}
             None => {
-                for (ground, monitors) in &mut self.others {
-                    for monitor in monitors {
-                        monitor.observe(entry, None, ground);
-                    }
+                for (ground, watch) in &mut self.others {
+                    watch.observe(entry, None, ground);
                 }
             }
         }
@@ -113,20 +134,16 @@ impl Watches {
 
     /// The run has ended.
     pub fn finish(&mut self, end: Moment, ground: &Ground) {
-        for monitor in &mut self.first {
-            monitor.finish(end, ground);
-        }
-        for (ground, monitors) in &mut self.others {
-            for monitor in monitors {
-                monitor.finish(end, ground);
-            }
+        self.first.finish(end, ground);
+        for (ground, watch) in &mut self.others {
+            watch.finish(end, ground);
         }
     }
 
     /// What was found, monitor by monitor.
     pub fn results(&self) -> Vec<Watched> {
-        let mut all: Vec<Watched> = self.first.iter().map(of).collect();
-        for monitor in self.others.iter().flat_map(|(_, monitors)| monitors) {
+        let mut all: Vec<Watched> = self.first.monitors.iter().map(of).collect();
+        for monitor in self.others.iter().flat_map(|(_, watch)| &watch.monitors) {
             // All vehicles have the same monitors.
             let known = all.iter_mut().find(|known| known.result.id == monitor.monitor().id);
             if let Some(known) = known {

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::step::Holds;
 use super::timeline::Timeline;
-use crate::checks::{self, CheckContext, CheckFinding, Running};
+use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::journal::Entry;
 use crate::pack::{Pack, Role};
 use crate::pattern::Bindings;
@@ -38,6 +38,7 @@ pub struct Scene<'a> {
 /// A named check running over a window.
 pub(super) struct CheckWindow {
     running: Box<dyn Running>,
+    shared: Shared,
     with: Map<String, Value>,
     findings: Vec<CheckFinding>,
     /// Those of them that are about the window.
@@ -78,9 +79,11 @@ impl CheckWindow {
                 .map_err(|unbound| super::step::unbound_text(&unbound))?;
             with.insert(name.clone(), value);
         }
-        let running = (definition.start)(&context(scene, &with));
+        let shared = Shared::default();
+        let running = (definition.start)(&context(scene, &with, &shared));
         Ok(Self {
             running,
+            shared,
             with,
             findings: Vec::new(),
             told: Vec::new(),
@@ -97,7 +100,7 @@ impl CheckWindow {
             let before = self.findings.len();
             let judged = self
                 .running
-                .observe(next, &context(scene, &self.with), &mut self.findings);
+                .observe(next, &context(scene, &self.with, &self.shared), &mut self.findings);
             if next.seq() == entry.seq() {
                 let here = self.findings.iter().skip(before);
                 self.told
@@ -149,7 +152,7 @@ impl CheckWindow {
     pub(super) fn finish(&mut self, end: crate::clock::Moment, scene: &Scene<'_>) -> Option<(Holds, String)> {
         let before = self.findings.len();
         self.running
-            .finish(end, &context(scene, &self.with), &mut self.findings);
+            .finish(end, &context(scene, &self.with, &self.shared), &mut self.findings);
         self.told.extend(self.findings.iter().skip(before).cloned());
         match self.worst(before, None)? {
             Said::Wrong(holds, message) => Some((holds, message)),
@@ -158,7 +161,7 @@ impl CheckWindow {
     }
 }
 
-fn context<'a>(scene: &'a Scene<'_>, with: &'a Map<String, Value>) -> CheckContext<'a> {
+fn context<'a>(scene: &'a Scene<'_>, with: &'a Map<String, Value>, shared: &'a Shared) -> CheckContext<'a> {
     CheckContext {
         pack: scene.pack,
         topics: scene.topics,
@@ -166,6 +169,7 @@ fn context<'a>(scene: &'a Scene<'_>, with: &'a Map<String, Value>) -> CheckConte
         identity: scene.identity,
         with,
         bindings: scene.run_bindings,
+        shared,
     }
 }
 
@@ -195,6 +199,7 @@ mod tests {
     fn sorted(told: Vec<CheckFinding>) -> Option<Vec<Option<(u64, Said)>>> {
         let window = CheckWindow {
             running: Box::new(Silent),
+            shared: Shared::default(),
             with: Map::new(),
             findings: Vec::new(),
             told,

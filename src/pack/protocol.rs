@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::{AssetFile, Assets, MessageSchema, Role, Version};
 use crate::diagnostic::{Diagnostic, Source};
@@ -73,6 +73,7 @@ pub struct Pack {
     topics: Vec<TopicRule>,
     schemas: BTreeMap<String, MessageSchema>,
     vocabulary: Value,
+    words: Arc<Map<String, Value>>,
     topic_template: String,
     features: BTreeMap<String, bool>,
 }
@@ -131,8 +132,11 @@ impl Pack {
             let schema = read_schema(assets, &path)?;
             schemas.insert(topic.name.to_string(), schema);
         }
+        let vocabulary = read_vocabulary(assets, &format!("{folder}/vocabulary.yaml"))?;
+        let words = Map::from_iter([("vda".to_owned(), vocabulary.clone())]);
         Ok(Self {
-            vocabulary: read_vocabulary(assets, &format!("{folder}/vocabulary.yaml"))?,
+            vocabulary,
+            words: Arc::new(words),
             id: protocol.id,
             version,
             topics: protocol.topic,
@@ -163,6 +167,12 @@ impl Pack {
     #[must_use]
     pub fn vocabulary(&self) -> &Value {
         &self.vocabulary
+    }
+
+    /// The vocabulary as the variable `vda` of every test and monitor.
+    #[must_use]
+    pub fn words(&self) -> Arc<Map<String, Value>> {
+        Arc::clone(&self.words)
     }
 
     /// One word of the vocabulary: `error.outdatedUpdate`. `None` if there is no such entry or it is not a text

@@ -1,5 +1,7 @@
 //! The values of variables, and filling them into terms.
 
+use std::sync::Arc;
+
 use serde_json::{Map, Value};
 
 use super::ast::{Piece, Term, TermKind};
@@ -9,8 +11,13 @@ use crate::diagnostic::Span;
 ///
 /// A member may itself have dots in its name, so that `course.a` can be a text and `course.a.x` a number:
 /// the longest member name that fits wins.
+///
+/// What all tests of a run share lies below a test's own values, and is not copied for each of them.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Bindings(Map<String, Value>);
+pub struct Bindings {
+    own: Map<String, Value>,
+    below: Vec<Arc<Map<String, Value>>>,
+}
 
 impl Bindings {
     /// No variables at all.
@@ -22,36 +29,62 @@ impl Bindings {
     /// The value of `name`: member names joined by dots; array indices as `[0]` or `.0`.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Value> {
-        find_in(&self.0, name)
+        find_in(&self.own, name).or_else(|| self.below.iter().find_map(|values| find_in(values, name)))
+    }
+
+    /// Nothing yet, above values that are shared; of those the first that knows a name counts.
+    #[must_use]
+    pub fn above(below: Vec<Arc<Map<String, Value>>>) -> Self {
+        Self { own: Map::new(), below }
+    }
+
+    /// An object that is about to be changed here has to be whole.
+    fn bring_up(&mut self, name: &str) {
+        let shared = self.below.iter().find_map(|values| values.get(name));
+        if let Some(shared @ Value::Object(_)) = shared.filter(|_| !self.own.contains_key(name)) {
+            self.own.insert(name.to_owned(), shared.clone());
+        }
     }
 
     /// Gives `name` a value. Objects are made on the way; where the way is blocked by a value that is no
     /// object, the rest of the name becomes one dotted member beside it.
     pub fn set(&mut self, name: &str, value: Value) {
-        set_in(&mut self.0, name, value);
+        if let Some((first, _)) = name.split_once('.') {
+            self.bring_up(first);
+        }
+        set_in(&mut self.own, name, value);
     }
 
     /// Lays another set over this one, name by name of the top level, objects member by member.
     pub fn extend(&mut self, other: &Map<String, Value>) {
-        lay_over(&mut self.0, other);
+        for name in other
+            .iter()
+            .filter(|(_, value)| value.is_object())
+            .map(|(name, _)| name)
+        {
+            self.bring_up(name);
+        }
+        lay_over(&mut self.own, other);
     }
 
-    /// The values as a JSON object, as the journal keeps them.
+    /// All values as a JSON object.
     #[must_use]
-    pub fn as_map(&self) -> &Map<String, Value> {
-        &self.0
-    }
-
-    /// The values as a JSON value.
-    #[must_use]
-    pub fn to_value(&self) -> Value {
-        Value::Object(self.0.clone())
+    pub fn to_map(&self) -> Map<String, Value> {
+        let mut all = Map::new();
+        for values in self.below.iter().rev() {
+            all.extend(values.iter().map(|(name, value)| (name.clone(), value.clone())));
+        }
+        all.extend(self.own.clone());
+        all
     }
 }
 
 impl From<Map<String, Value>> for Bindings {
     fn from(values: Map<String, Value>) -> Self {
-        Self(values)
+        Self {
+            own: values,
+            below: Vec::new(),
+        }
     }
 }
 
@@ -59,7 +92,7 @@ impl From<Value> for Bindings {
     /// Anything but an object holds no variables.
     fn from(value: Value) -> Self {
         match value {
-            Value::Object(values) => Self(values),
+            Value::Object(values) => Self::from(values),
             _ => Self::default(),
         }
     }

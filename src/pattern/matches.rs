@@ -97,6 +97,17 @@ impl Bound {
         }
     }
 
+    /// The members of the message below which a `$hasNew` stands: two messages in which they are the same are the same
+    /// baseline. `None` when the pattern is not one of members.
+    #[must_use]
+    pub fn members_that_look_back(&self) -> Option<Vec<&str>> {
+        let BoundKind::Object(members) = &self.kind else {
+            return None;
+        };
+        let looking = members.iter().filter(|(_, member)| member.looks_back());
+        Some(looking.map(|(name, _)| name.as_str()).collect())
+    }
+
     /// Whether a `$hasNew` stands anywhere in the pattern, so that the baseline matters.
     #[must_use]
     pub fn looks_back(&self) -> bool {

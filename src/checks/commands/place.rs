@@ -17,9 +17,16 @@ pub(in crate::checks) const START: Check = Check {
     name: "commands/start",
     decides: &["ORD-03"],
     doc: "A new order for an idle vehicle begins at its lastNodeId, or at a place whose allowedDeviationXY covers the \
-          reported position. Any state that may still have been under way will do.",
-    arguments: &[],
-    start: |_| Box::new(Start::new(Rule::Start)),
+          reported position. Any state that may still have been under way will do. With `settled`, a vehicle that was \
+          set up a moment ago is judged as well: the test has waited until its states show where it stands.",
+    arguments: &["settled"],
+    start: |context| {
+        let settled = context.with.get("settled") == Some(&Value::Bool(true));
+        Box::new(Start {
+            settled,
+            ..Start::new(Rule::Start)
+        })
+    },
 };
 
 /// `commands/start-on-node`.
@@ -58,6 +65,8 @@ enum Rule {
 
 struct Start {
     rule: Rule,
+    /// The one who asks knows that the vehicle stands where it says.
+    settled: bool,
     traffic: Traffic,
     sheets: Sheets,
     vehicle: Vehicle,
@@ -72,6 +81,7 @@ impl Start {
     fn new(rule: Rule) -> Self {
         Self {
             rule,
+            settled: false,
             traffic: Traffic::default(),
             sheets: Sheets::default(),
             vehicle: Vehicle::default(),
@@ -210,8 +220,12 @@ impl Running for Start {
         let mut judged = false;
         let begins = number(order, "orderUpdateId").is_none_or(|update| update == 0);
         if let Some(node) = nodes.first().filter(|_| is_new && begins) {
-            let recent: Vec<&Seen> = self.vehicle.recent(entry, context).collect();
-            let settled = !self.vehicle.unsettled(entry, context) && !self.traffic.disturbed;
+            let mut recent: Vec<&Seen> = self.vehicle.recent(entry, context).collect();
+            if self.settled {
+                // The newest may have crossed the order on its way.
+                recent.truncate(2);
+            }
+            let settled = self.settled || (!self.vehicle.unsettled(entry, context) && !self.traffic.disturbed);
             let idle = recent.first().is_some_and(|seen| seen.is_idle());
             if settled && idle && node.get("nodeId").is_some_and(Value::is_string) {
                 let mut found = Found::new(entry, findings);

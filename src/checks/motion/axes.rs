@@ -50,14 +50,15 @@ impl Running for Axes {
         let Some(step) = self.way.step(entry, context) else {
             return false;
         };
-        let now = step.now;
+        let now = &step.now;
         if !now.base_done || !now.stands() {
             return false;
         }
         let Some((place, pose)) = now
             .node
             .place
-            .zip(now.pose)
+            .as_ref()
+            .zip(now.pose.as_ref())
             .filter(|(place, pose)| place.map == pose.map)
         else {
             return false;
@@ -69,7 +70,7 @@ impl Running for Axes {
         let reported = (pose.x - was.x, pose.y - was.y);
         let length = ordered.0.hypot(ordered.1);
         let vague = |place: &Place| place.deviation.is_some_and(|allowed| allowed > ALIKE / 2.0 * length);
-        if from.map != place.map || length < SHORTEST || vague(&from) || vague(&place) {
+        if from.map != place.map || length < SHORTEST || vague(&from) || vague(place) {
             return false;
         }
         // A way that looks the same in the mirror proves nothing.

@@ -99,7 +99,7 @@ impl Running for EdgeSpeed {
             }
         }
         if self.entered.as_ref().is_none_or(|entered| !now.same_lane(entered)) {
-            self.entered = Some(step.now);
+            self.entered = Some(step.now.clone());
             self.kept = false;
         }
         judged

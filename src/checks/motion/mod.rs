@@ -28,6 +28,7 @@ pub(super) use node_theta::NODE_THETA;
 pub(super) use node_tolerance::NODE_TOLERANCE;
 pub(super) use rotation_place::ROTATION_PLACE;
 pub(super) use velocity_sign::VELOCITY_SIGN;
+pub(super) use way::Walked;
 
 use super::CheckFinding;
 use crate::verdict::Verdict;

@@ -114,7 +114,7 @@ impl Running for ModeSpeed {
         let Some(step) = self.way.step(entry, context) else {
             return false;
         };
-        let now = step.now;
+        let now = &step.now;
         let mode = entry.json().map(|state| text(state, "operatingMode").to_owned());
         let mode = mode.filter(|mode| matches!(mode.as_str(), "AUTOMATIC" | "SEMIAUTOMATIC"));
         let Some(mode) = mode.filter(|_| step.before.is_some() || now.lane.is_some()) else {
@@ -136,7 +136,7 @@ impl Running for ModeSpeed {
             reported: now.velocity.speed(),
             took: None,
         };
-        self.present = now.lane.is_some().then_some((now, mode, drive));
+        self.present = now.lane.is_some().then(|| (now.clone(), mode, drive));
         judged
     }
 }

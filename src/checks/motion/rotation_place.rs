@@ -29,7 +29,7 @@ impl Running for RotationPlace {
         let Some(step) = self.way.step(entry, context) else {
             return false;
         };
-        let now = step.now;
+        let now = &step.now;
         let Some((lane, pose)) = now.lane.as_ref().zip(now.pose.as_ref()) else {
             return false;
         };
@@ -53,7 +53,7 @@ impl Running for RotationPlace {
         let judged = was.is_some() || wanted.is_some();
         findings.extend(text.map(|text| found(now.seq, text)));
         if was.is_none() {
-            self.first = Some(now);
+            self.first = Some(now.clone());
         }
         judged
     }

@@ -1,6 +1,7 @@
 //! Where the vehicle is on its way, state by state: pose, velocity, and the edge it says it is on.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -139,9 +140,38 @@ impl Plan {
     }
 }
 
-/// Follows the vehicle over its orders.
+/// Follows the vehicle over its orders. All checks that look at the same entries look over the same shoulder, so that
+/// each state is read once for all of them.
 #[derive(Default)]
-pub(super) struct Way {
+pub(super) struct Way;
+
+impl Way {
+    /// What a state shows, if the vehicle can be held to its order.
+    pub fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Arc<Step>> {
+        context.shared.walked.borrow_mut().step(entry, context)
+    }
+}
+
+/// The way as far as it was followed, and what the newest entry showed.
+#[derive(Default)]
+pub(in crate::checks) struct Walked {
+    walk: Walk,
+    newest: Option<u64>,
+    step: Option<Arc<Step>>,
+}
+
+impl Walked {
+    fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Arc<Step>> {
+        if self.newest != Some(entry.seq()) {
+            self.newest = Some(entry.seq());
+            self.step = self.walk.step(entry, context).map(Arc::new);
+        }
+        self.step.clone()
+    }
+}
+
+#[derive(Default)]
+struct Walk {
     shown: Shown,
     traffic: Traffic,
     plans: VecDeque<Plan>,
@@ -154,9 +184,9 @@ pub(super) struct Step {
     pub before: Option<View>,
 }
 
-impl Way {
+impl Walk {
     /// Learns from an entry; gives back what a state shows, if the vehicle can be held to its order.
-    pub fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Step> {
+    fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Step> {
         self.traffic.note(entry);
         if let Some(plan) = to_vehicle("order", entry, context).and_then(Plan::read)
             && self.plans.back() != Some(&plan)

@@ -148,11 +148,19 @@ fn is_novel(entry: &Entry, topic: &str, mark: u64, selector: &Selector, scene: &
     };
     let all = scene.timeline.of(topic);
     let before = &all[..all.partition_point(|entry| entry.seq() < mark)];
-    before
-        .iter()
-        .rev()
-        .take(LOOK_BACK)
-        .all(|older| pattern.matches(&message, older.json()))
+    // Most messages show what the one before showed: only where they differ is there anything to compare.
+    let members = pattern.members_that_look_back();
+    let mut compared: Option<Vec<Option<&Value>>> = None;
+    before.iter().rev().take(LOOK_BACK).all(|older| {
+        if let (Some(members), Some(json)) = (&members, older.json()) {
+            let shown: Vec<_> = members.iter().map(|member| json.get(member)).collect();
+            if compared.as_ref() == Some(&shown) {
+                return true;
+            }
+            compared = Some(shown);
+        }
+        pattern.matches(&message, older.json())
+    })
 }
 
 /// Whether a new element repeats a text of what was sent that was in no state before: the identifier of an order or of

@@ -40,7 +40,7 @@ impl MasterControl {
                 vehicle.factsheet = Some(Factsheet::read(&message));
                 vehicle.missed = None;
             }
-            _ if self.site.faults.has(F::VisualizationObeyed) => visualization_obeyed(vehicle, &message),
+            _ if self.site.faults.has(F::VisualizationObeyed) => self.site.visualization_obeyed(vehicle, &message),
             // Visualization is for display, and there is none (VIS-03).
             _ => return,
         }
@@ -87,8 +87,38 @@ impl Site {
         vehicle.presence = presence;
     }
 
+    /// `visualization-obeyed`: believes the visualization as if it were the state.
+    fn visualization_obeyed(&self, vehicle: &mut Vehicle, message: &Value) {
+        let position = message.get("agvPosition").cloned();
+        let Some(position) = position.and_then(|position| serde_json::from_value::<Position>(position).ok()) else {
+            return;
+        };
+        let Some(state) = &mut vehicle.state else {
+            return;
+        };
+        let Some(running) = &vehicle.running else {
+            if let Some((node, _)) = self.config.nearest(position.x, position.y, &position.map_id) {
+                vehicle.shown_at = Some(node.id.clone());
+                state.last_node_id.clone_from(&node.id);
+            }
+            return;
+        };
+        let released = &running.stops[..running.released.min(running.stops.len())];
+        let stops = released.iter().enumerate();
+        let mut near =
+            stops.filter(|(_, stop)| super::layout::distance((stop.x, stop.y), (position.x, position.y)) < 0.5);
+        if let Some((index, _)) = near.next_back() {
+            let sequence = u32::try_from(2 * index).unwrap_or(u32::MAX);
+            state.last_node_sequence_id = state.last_node_sequence_id.max(sequence);
+        }
+    }
+
     fn state_heard(&mut self, vehicle: &mut Vehicle, state: State) {
         let back = vehicle.state.as_ref().is_some_and(|before| !before.takes_orders()) && state.takes_orders();
+        let mut state = state;
+        if let Some(shown_at) = vehicle.shown_at.as_ref().filter(|_| vehicle.running.is_none()) {
+            state.last_node_id.clone_from(shown_at);
+        }
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
         if back {
@@ -135,23 +165,5 @@ impl Site {
         let Some(state) = &vehicle.state else { return false };
         let manual = !state.takes_orders() && self.faults.has(F::OrdersInManual);
         self.reachable(vehicle) && (state.takes_orders() || manual)
-    }
-}
-
-/// `visualization-obeyed`: believes the visualization as if it were the state.
-fn visualization_obeyed(vehicle: &mut Vehicle, message: &Value) {
-    let position = message.get("agvPosition").cloned();
-    let Some(position) = position.and_then(|position| serde_json::from_value::<Position>(position).ok()) else {
-        return;
-    };
-    let (Some(running), Some(state)) = (&vehicle.running, &mut vehicle.state) else {
-        return;
-    };
-    let released = &running.stops[..running.released.min(running.stops.len())];
-    let stops = released.iter().enumerate();
-    let mut near = stops.filter(|(_, stop)| super::layout::distance((stop.x, stop.y), (position.x, position.y)) < 0.5);
-    if let Some((index, _)) = near.next_back() {
-        let sequence = u32::try_from(2 * index).unwrap_or(u32::MAX);
-        state.last_node_sequence_id = state.last_node_sequence_id.max(sequence);
     }
 }

@@ -190,6 +190,8 @@ pub(super) struct Vehicle {
     pub(super) last_order_at: Option<Moment>,
     /// When it wants to be looked at next.
     pub(super) wake: Option<Moment>,
+    /// The node where the visualization shows it (`visualization-obeyed`).
+    pub(super) shown_at: Option<String>,
     /// The order given up last: its message (`refused-order-repeated`, `next-order-starts-elsewhere`).
     pub(super) last_order: Option<Running>,
 }
