@@ -123,9 +123,13 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     path: format!("natural traffic instead of hook `{hook}`"),
                 })?;
             }
+            let later = occurrence.at.moment > until;
             let seq = self.recorder.record(occurrence)?.seq();
             if came {
                 break Some(format!("#{seq} came by itself"));
+            }
+            if later {
+                break None;
             }
         };
         let ok = detail.is_some();

@@ -6,6 +6,7 @@
 
 mod compose;
 mod hands;
+mod map_file;
 mod operator;
 mod recorder;
 mod route;
@@ -21,13 +22,9 @@ pub use recorder::{RecordError, Recorder};
 
 use crate::clock::Moment;
 use crate::journal::event::{Event, Occurrence, Payload, StepEnd};
-use crate::judge::{JudgeError, Progress};
+use crate::judge::{JudgeError, Progress, TestJudge};
 use crate::link::{Link, LinkError, Offer, Outgoing};
-use crate::pattern::Bindings;
 use crate::suite::model::{Section, Step, Test, Verb};
-
-/// The map file that is served when a test names none.
-const BUILT_IN_MAP: &[u8] = b"vda5050-tck built-in map\nresolution 0.05\norigin 0 0 0\n";
 
 /// Why a run cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -98,11 +95,16 @@ impl<L: Link, O: Operator> Engine<L, O> {
         Ok(self.recorder.record(occurrence)?.seq())
     }
 
-    /// Records everything that has already happened.
+    /// Records everything that has already happened. A device that talks without end does not hold it up: what comes
+    /// meanwhile is left for later.
     pub async fn drain(&mut self) -> Result<(), EngineError> {
         let now = self.link.now().moment;
         while let Some(occurrence) = self.link.next(now).await? {
+            let later = occurrence.at.moment > now;
             self.recorder.record(occurrence)?;
+            if later {
+                break;
+            }
         }
         Ok(())
     }
@@ -123,7 +125,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
             };
             match happened {
                 Some(occurrence) => {
+                    let later = occurrence.at.moment > until;
                     self.recorder.record(occurrence)?;
+                    if later {
+                        return Ok(done(&self.recorder));
+                    }
                 }
                 None => return Ok(done(&self.recorder)),
             }
@@ -319,11 +325,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
             let Some(test) = self.recorder.judge().current() else {
                 return Ok(StepEnd::Broken("no test is running".to_owned()));
             };
-            let until = match test.progress() {
-                Progress::Decided => return Ok(StepEnd::Decided),
-                Progress::Pending(until) => until,
-                Progress::NeedsProbe(ends) if !probed => ends,
-                Progress::NeedsProbe(ends) => test.probe_until().unwrap_or(ends),
+            let Some(until) = time_for(test, probed) else {
+                return Ok(StepEnd::Decided);
             };
             let probing = matches!(test.progress(), Progress::NeedsProbe(_)) && !probed;
             // The postamble runs even when the user has asked to stop: a device must not be left driving.
@@ -340,17 +343,21 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     continue;
                 }
             };
-            match happened {
-                Some(occurrence) => {
-                    self.recorder.record(occurrence)?;
+            if let Some(occurrence) = happened {
+                let now = occurrence.at.moment;
+                self.recorder.record(occurrence)?;
+                // The time is up even if a device never stops talking.
+                let test = self.recorder.judge().current();
+                if test.is_some_and(|test| time_for(test, probed).is_none_or(|until| now <= until)) {
+                    continue;
                 }
-                None if probing => {
-                    probed = true;
-                    let probe = self.link.probe().await?;
-                    self.note(Event::ProbeSent { probe })?;
-                }
-                None => return Ok(StepEnd::Deadline),
             }
+            if !probing {
+                return Ok(StepEnd::Deadline);
+            }
+            probed = true;
+            let probe = self.link.probe().await?;
+            self.note(Event::ProbeSent { probe })?;
         }
     }
 
@@ -361,11 +368,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
             .current()
             .map(|test| test.bindings().clone())
             .unwrap_or_default();
-        let body = match map_file(serve, &bindings) {
+        let body = match map_file::content(serve, &bindings) {
             Ok(body) => body,
             Err(why) => return Ok(StepEnd::Broken(why)),
         };
-        let sha256 = sha256(&body);
+        let sha256 = map_file::sha256(&body);
         let offer = Offer {
             name: serve.name.clone(),
             body,
@@ -386,6 +393,16 @@ impl<L: Link, O: Operator> Engine<L, O> {
 }
 
 /// Whether a step of a postamble comes from the state that cancels whatever is left.
+/// Until when a step has to be waited for; `None` when it is decided.
+fn time_for(test: &TestJudge, probed: bool) -> Option<Moment> {
+    match test.progress() {
+        Progress::Decided => None,
+        Progress::Pending(until) => Some(until),
+        Progress::NeedsProbe(ends) if !probed => Some(ends),
+        Progress::NeedsProbe(ends) => Some(test.probe_until().unwrap_or(ends)),
+    }
+}
+
 fn is_cancelling(step: &Step) -> bool {
     step.path.contains("/cancel-order[")
 }
@@ -398,23 +415,4 @@ fn is_calling_off(step: &Step) -> bool {
 /// Whether a step of a postamble waits for the vehicle to drive what was released to it.
 fn is_driving_on(step: &Step) -> bool {
     step.path.contains("/base-done[")
-}
-
-fn map_file(serve: &crate::suite::model::Serve, bindings: &Bindings) -> Result<bytes::Bytes, String> {
-    let Some(term) = &serve.file else {
-        // Every offer is a file of its own, so that two versions of a map differ.
-        let mut body = BUILT_IN_MAP.to_vec();
-        body.extend_from_slice(serve.name.as_bytes());
-        return Ok(body.into());
-    };
-    let path = term.bind(bindings).map_err(|unbound| unbound.to_string())?;
-    let path = path.as_str().ok_or("a file name is a text")?;
-    std::fs::read(path)
-        .map(Into::into)
-        .map_err(|error| format!("cannot read the map file {path}: {error}"))
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    use sha2::Digest as _;
-    crate::journal::event::hex(&sha2::Sha256::digest(bytes))
 }

@@ -33,6 +33,11 @@ pub trait Operator {
         None
     }
 
+    /// How long a hook takes when nobody has to be asked, for the estimate before a run.
+    fn usual_time(&self) -> Duration {
+        Duration::from_secs(1)
+    }
+
     /// Sets a mock AGV; they are counted from 0. `false` when there is none of that number.
     async fn vehicle(&mut self, number: usize, what: &str, with: Value) -> bool {
         let _ = (number, what, with);

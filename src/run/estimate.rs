@@ -15,8 +15,6 @@ use crate::suite::model::{Extent, Step, Test, TimeTerm, Verb};
 
 /// From a message to its answer, by a device that is not slow.
 const EXCHANGE: Duration = Duration::from_millis(50);
-/// A hook, when nobody has to be asked.
-const HOOK: Duration = Duration::from_secs(1);
 /// Half again as long as the usual keep-alive of 15 s.
 const KEEP_ALIVE: Duration = Duration::from_millis(22_500);
 /// Of a vehicle that does not say how fast it is, in metres per second.
@@ -30,11 +28,18 @@ pub(super) struct Estimate<'a> {
     pub(super) time: Option<&'a Value>,
     /// Mean time from one node to the next.
     pub(super) edge: Duration,
+    /// Of a hook, when nobody has to be asked.
+    pub(super) hook: Duration,
 }
 
 impl<'a> Estimate<'a> {
     /// From the time limits, the factsheet and the floor.
-    pub(super) fn of(time: Option<&'a Value>, factsheet: Option<&Value>, layout: Option<&Layout>) -> Self {
+    pub(super) fn of(
+        time: Option<&'a Value>,
+        factsheet: Option<&Value>,
+        layout: Option<&Layout>,
+        hook: Duration,
+    ) -> Self {
         let fastest = Pace::of(factsheet).fastest().unwrap_or(SPEED);
         let mut seconds = Vec::new();
         for edge in layout.into_iter().flat_map(Layout::edges) {
@@ -51,6 +56,7 @@ impl<'a> Estimate<'a> {
         Self {
             time,
             edge: Duration::from_secs_f64(mean.clamp(0.0, 3_600.0)),
+            hook,
         }
     }
 
@@ -75,7 +81,7 @@ impl<'a> Estimate<'a> {
                 Extent::Until(_) => EXCHANGE,
             },
             Verb::Link(link) if matches!(link.fault, LinkFault::Silence { .. }) => KEEP_ALIVE,
-            Verb::Operator(_) => HOOK,
+            Verb::Operator(_) => self.hook,
             Verb::Expect(_) | Verb::Action(_) | Verb::Retained(_) => EXCHANGE,
             Verb::Link(_) | Verb::Serve(_) | Verb::Vehicle(_) => Duration::ZERO,
         }
@@ -120,7 +126,7 @@ mod tests {
         let time = json!({ "quiet": 200 });
         let of = |speed: f64, moving: bool| {
             let sheet = json!({ "physicalParameters": { "speedMax": speed } });
-            let estimate = Estimate::of(Some(&time), Some(&sheet), Some(&layout));
+            let estimate = Estimate::of(Some(&time), Some(&sheet), Some(&layout), Duration::from_secs(1));
             estimate.of_tests(tests.iter().map(|test| &**test).filter(|test| test.moves == moving))
         };
         assert!(of(0.5, true) > of(2.0, true) * 2);

@@ -68,6 +68,10 @@ impl<O: Operator> Operator for WithFleet<O> {
         self.operator.natural_traffic(hook)
     }
 
+    fn usual_time(&self) -> Duration {
+        self.operator.usual_time()
+    }
+
     async fn vehicle(&mut self, number: usize, what: &str, with: Value) -> bool {
         match self.vehicles.get(number) {
             Some(vehicle) => vehicle.command(what, with).await,

@@ -193,6 +193,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             times,
             self.setup.capabilities.factsheet.as_ref(),
             self.setup.layout.as_ref(),
+            self.engine.operator.usual_time(),
         );
         let planned = self.setup.tests.iter().zip(&plan.tests);
         let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);

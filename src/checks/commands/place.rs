@@ -220,7 +220,10 @@ impl Running for Start {
         let mut judged = false;
         let begins = number(order, "orderUpdateId").is_none_or(|update| update == 0);
         if let Some(node) = nodes.first().filter(|_| is_new && begins) {
-            let mut recent: Vec<&Seen> = self.vehicle.recent(entry, context).collect();
+            // A state may overtake the order it answers.
+            let own = text(order, "orderId");
+            let recent = self.vehicle.recent(entry, context);
+            let mut recent: Vec<&Seen> = recent.filter(|seen| seen.order != own).collect();
             if self.settled {
                 // The newest may have crossed the order on its way.
                 recent.truncate(2);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
 
 use crate::cli::problem::Problem;
 use crate::engine::{HookOutcome, Operator};
@@ -87,5 +88,9 @@ impl Operator for Commands {
         } else {
             HookOutcome::Failed("the built-in device is not running any more".to_owned())
         }
+    }
+
+    fn usual_time(&self) -> Duration {
+        Duration::from_millis(1)
     }
 }

@@ -21,12 +21,12 @@ faults! {
     // Transport
     OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
     StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
-    HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07"] "Drives into the horizon while the link is down.";
+    HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07", "MQTT-04"] "Drives into the horizon while the link is down.";
     OldMqtt "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1.";
     StateQosOne "state-qos-1" ["MQTT-07"] "Publishes the state with QoS 1.";
     FactsheetQosTwo "factsheet-qos-2" ["MQTT-07"] "Publishes the factsheet with QoS 2.";
     ConnectionQosZero "connection-qos-0" ["MQTT-08"] "Publishes the connection topic with QoS 0.";
-    NeverReconnects "never-reconnects" ["MQTT-10"] "Does not connect again after a broken link.";
+    NeverReconnects "never-reconnects" ["MQTT-10", "STATE-02"] "Does not connect again after a broken link.";
     NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10"] "Sends the terminating zero byte of its string with every periodic state.";
     MisspelledTopic "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore.";
     OtherSerialNumber "other-serial-number" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
@@ -54,7 +54,7 @@ faults! {
     FieldMisspelled "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore.";
     ModeLowerCase "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case.";
     LatinOneText "latin-1-text" ["JSON-03"] "Encodes the text of its periodic states in Latin-1.";
-    BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15"] "Sends charging as a word in quotes.";
+    BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15", "ACT-19"] "Sends charging as a word in quotes.";
     NanVelocity "nan-velocity" ["JSON-08", "MQTT-02"] "Writes NaN as turning speed into its periodic states.";
     NanAsText "nan-as-text" ["JSON-08", "STATE-MSG-05"] "Writes the word NaN as turning speed into its periodic states.";
     ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15", "JSON-06"] "Estimates its reach in fractions of a metre.";
@@ -108,8 +108,8 @@ faults! {
     FirstNodeRefused "first-node-refused" ["ORD-04"] "Refuses orders that begin where it stands.";
     DeviationIgnored "deviation-ignored" ["ORD-05", "ORD-CANCEL-16"] "Counts itself as on the first node only when it stands exactly there.";
     StopsBeforeEndOfBase "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base.";
-    HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05"] "Drives into the horizon without waiting for its release.";
-    HorizonSlippedInto "horizon-slipped-into" ["ORD-07"] "Stops at the decision point and rolls on into the horizon a moment later.";
+    HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05", "MQTT-04"] "Drives into the horizon without waiting for its release.";
+    HorizonSlippedInto "horizon-slipped-into" ["ORD-07", "MQTT-04"] "Stops at the decision point and rolls on into the horizon a moment later.";
     HorizonDemanded "horizon-demanded" ["ORD-10"] "Refuses new orders without a horizon.";
     GraphUnchecked "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense.";
     SingleNodeRefused "single-node-refused" ["ORD-13"] "Refuses orders with one node.";
@@ -181,7 +181,7 @@ faults! {
     DuplicateReported "duplicate-reported" ["ORD-REJ-13"] "Raises an error for an order that is sent twice.";
     DuplicateExecuted "duplicate-executed" ["ORD-REJ-13"] "Begins an order again when it is sent twice.";
     UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
-    MemoryUnchecked "memory-unchecked" ["ORD-REJ-15"] "Takes over orders larger than its stated limits, cut to what fits.";
+    MemoryUnchecked "memory-unchecked" ["ORD-REJ-15", "STATE-12"] "Takes over orders larger than its stated limits, cut to what fits.";
     OrientationUnchecked "orientation-unchecked" ["ORD-REJ-16"] "Accepts edges with an orientation it cannot take.";
     RejectionSilent "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order.";
 
@@ -203,7 +203,7 @@ faults! {
     DirectionMistaken "direction-mistaken" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the branch beside the one it is told.";
     CorridorOverrun "corridor-overrun" ["CORR-01", "CORR-03"] "Drives round an obstacle as if its corridor were twice as wide.";
     CorridorContourIgnored "corridor-contour-ignored" ["CORR-03", "CORR-01"] "Keeps only its centre inside a corridor that is meant for its contour.";
-    CorridorExitDrivenOn "corridor-exit-driven-on" ["CORR-06"] "Drives on when it finds itself outside its corridor.";
+    CorridorExitDrivenOn "corridor-exit-driven-on" ["CORR-06", "CORR-07"] "Drives on when it finds itself outside its corridor.";
     CorridorExitSilent "corridor-exit-silent" ["CORR-07"] "Stops outside its corridor and does not say why.";
     PlannedPathMissing "planned-path-missing" ["STATE-14"] "Plans its path and does not report it.";
     PlannedPathOfBaseOnly "planned-path-of-base-only" ["STATE-14"] "Reports the path it planned for the base only.";
@@ -218,11 +218,11 @@ faults! {
     MapListedTwice "map-listed-twice" ["MAP-07"] "Lists the map it uses twice.";
     UnknownMapAccepted "unknown-map-accepted" ["MAP-08"] "Accepts orders on maps it does not have.";
     PositionMapStale "position-map-stale" ["MAP-11"] "Names a map in its position that is not on board.";
-    MapStatusMisspelled "map-status-misspelled" ["MAP-12"] "Says ACTIVE where ENABLED is meant.";
+    MapStatusMisspelled "map-status-misspelled" ["MAP-12", "MAP-24"] "Says ACTIVE where ENABLED is meant.";
     DisabledMapUsed "disabled-map-used" ["MAP-13"] "Drives on maps that are disabled.";
-    MapsReportedEmpty "maps-reported-empty" ["MAP-15"] "Reports no maps although it drives on one.";
+    MapsReportedEmpty "maps-reported-empty" ["MAP-15", "MAP-20"] "Reports no maps although it drives on one.";
     DownloadNeverRunning "download-never-running" ["MAP-17"] "Keeps downloadMap INITIALIZING while it downloads.";
-    DownloadFinishedEarly "download-finished-early" ["MAP-18", "MAP-21"] "Reports downloadMap FINISHED when the first byte arrives.";
+    DownloadFinishedEarly "download-finished-early" ["MAP-18", "MAP-21", "MAP-17"] "Reports downloadMap FINISHED when the first byte arrives.";
     DownloadFailureFinished "download-failure-finished" ["MAP-19"] "Reports downloadMap FINISHED when the server does not have the map.";
     DownloadFailureSilent "download-failure-silent" ["MAP-19"] "Raises no error when a download fails.";
     DownloadEnables "download-enables" ["MAP-20"] "Enables a map as soon as it is downloaded.";
@@ -250,13 +250,13 @@ faults! {
     LiftMapStale "lift-map-stale" ["MAP-35", "ACT-23"] "Keeps its old mapId when an action of an order puts it on another floor.";
 
     // Actions
-    ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07"] "Never begins the actions of an order.";
+    ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07", "ORD-06"] "Never begins the actions of an order.";
     VendorPauseListed "vendor-pause-listed" ["ACT-05"] "Lists its pause as StartPause and StopPause.";
     PickParameterRenamed "pick-parameter-renamed" ["ACT-06"] "Calls the station type of a pick station_type in its factsheet.";
     UndescribedStatus "undescribed-status" ["ACT-41"] "Reports instant actions INITIALIZING that have no preparation.";
     PickPreparedAsRunning "pick-prepared-as-running" ["ACT-33", "ASTATE-02"] "Reports a pick RUNNING while it only prepares for it.";
     FieldDoesNotPause "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated.";
-    FieldPauseStuck "field-pause-stuck" ["ACT-34"] "Does not go on with its actions when its protective field is free again.";
+    FieldPauseStuck "field-pause-stuck" ["ACT-34", "ASTATE-04"] "Does not go on with its actions when its protective field is free again.";
     EdgeActionOutlivesEdge "edge-action-outlives-edge" ["ACT-02", "NODE-05"] "Lets the actions of an edge run on behind its end.";
     EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
@@ -308,7 +308,7 @@ faults! {
     StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
     SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
     OrderWithoutState "order-without-state" ["STATE-03"] "Does not send a state when an order arrives.";
-    LoadWithoutState "load-without-state" ["STATE-04", "ACT-28"] "Does not send a state when its load changes.";
+    LoadWithoutState "load-without-state" ["STATE-04", "ACT-28", "ACT-01"] "Does not send a state when its load changes.";
     ErrorWithoutState "error-without-state" ["STATE-05"] "Does not send a state when an error appears.";
     NodeWithoutState "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node.";
     ModeWithoutState "mode-without-state" ["STATE-07"] "Does not send a state when its operating mode changes.";
@@ -336,10 +336,10 @@ faults! {
     InstantActionListedTwice "instant-action-listed-twice" ["STATE-MSG-09"] "Lists instant actions twice.";
     FinishedActionsRemoved "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done.";
     RunningInstantDropped "running-instant-dropped" ["STATE-MSG-11"] "Removes running instant actions from its states when a new order is accepted.";
-    NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13"] "Leaves the sequenceId out of its node states.";
+    NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13", "STATE-12"] "Leaves the sequenceId out of its node states.";
     HorizonReportedReleased "horizon-reported-released" ["STATE-MSG-13"] "Reports the nodes and edges of the horizon as released.";
     DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
-    StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05"] "Says DONE where FINISHED is meant.";
+    StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant.";
     ChargeGoodBad "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent.";
     ChargeMissing "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state.";
     EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
@@ -347,7 +347,7 @@ faults! {
 
     // Traversal
     TraversalSplit "traversal-split" ["NODE-03"] "Removes the node state and updates the last node in two states.";
-    LastNodeStale "last-node-stale" ["NODE-03", "STATE-MSG-04"] "Reports the new lastNodeId with the old lastNodeSequenceId.";
+    LastNodeStale "last-node-stale" ["NODE-03", "STATE-MSG-04", "STATE-06"] "Reports the new lastNodeId with the old lastNodeSequenceId.";
     NodeActionsEarly "node-actions-early" ["NODE-04", "ASTATE-02"] "Begins the actions of a node when it sets out for it.";
     EdgeStatesStay "edge-states-stay" ["NODE-05", "STATE-12"] "Keeps the edge it has left in its states.";
     EdgeActionsLate "edge-actions-late" ["NODE-06", "ACT-02"] "Begins the actions of an edge at its end.";
@@ -361,7 +361,7 @@ faults! {
     InitializingFromStart "initializing-from-start" ["ASTATE-03", "ASTATE-02"] "Reports all actions INITIALIZING when the order is accepted.";
     PausedWithoutPause "paused-without-pause" ["ASTATE-04"] "Reports actions PAUSED that only wait for others.";
     PauseToWaiting "pause-to-waiting" ["ASTATE-05"] "Puts running actions back to WAITING in a pause.";
-    FailsAfterFinished "fails-after-finished" ["ASTATE-06"] "Reports finished actions FAILED when their order is cancelled.";
+    FailsAfterFinished "fails-after-finished" ["ASTATE-06", "ORD-CANCEL-12"] "Reports finished actions FAILED when their order is cancelled.";
     ListReversed "list-reversed" ["BLOCK-01"] "Performs the actions of a node from the last to the first.";
     NoneAborted "none-aborted" ["ACT-01", "BLOCK-02"] "Breaks off the actions of type NONE of a node when it drives on.";
     SoftDrives "soft-drives" ["BLOCK-03"] "Drives while a SOFT action runs.";
@@ -373,10 +373,10 @@ faults! {
 
     // Errors and modes
     ErrorsOmitted "errors-omitted" ["STATE-MSG-01", "ERR-01", "JSON-10"] "Leaves the errors array out when there is no error.";
-    ErrorLevelUnknown "error-level-unknown" ["ERR-02"] "Reports warnings with the level ERROR.";
+    ErrorLevelUnknown "error-level-unknown" ["ERR-02", "ORD-CANCEL-19"] "Reports warnings with the level ERROR.";
     WarningBlocks "warning-blocks" ["ERR-03", "ORD-06", "ORD-FLOW-12"] "Does not drive while it reports a warning.";
     EmergencyStopWarning "emergency-stop-warning" ["ERR-04"] "Reports the emergency stop as a WARNING.";
-    ReferenceValueNumeric "reference-value-numeric" ["ERR-05"] "Gives numbers as reference values of errors.";
+    ReferenceValueNumeric "reference-value-numeric" ["ERR-05", "ORD-REJ-14"] "Gives numbers as reference values of errors.";
     ErrorsOmittedOnRequest "errors-omitted-on-request" ["ORD-REJ-03", "ORD-REJ-08", "ERR-01"] "Answers a stateRequest without its errors.";
     OwnErrorForgotten "own-error-forgotten" ["ERR-04", "ERR-01"] "Forgets an error of its own a moment later, although its cause is still there.";
     OwnErrorKept "own-error-kept" ["ERR-01", "ERR-04"] "Keeps its errors for a minute, also when their cause is gone.";

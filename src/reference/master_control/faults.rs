@@ -60,22 +60,22 @@ faults! {
     NumbersAsText "numbers-as-text" ["JSON-06", "ORD-MSG-05"] "Writes coordinates as strings.";
     BooleansAsWords "booleans-as-words" ["JSON-07", "ORD-MSG-05"] "Writes released as a word.";
     NanCoordinate "nan-coordinate" ["JSON-08", "MQTT-02"] "Writes NaN where it does not know an orientation.";
-    SequenceIdFraction "sequence-id-fraction" ["JSON-09", "ORD-UPD-11"] "Numbers edges half-way between their nodes.";
+    SequenceIdFraction "sequence-id-fraction" ["JSON-09", "ORD-UPD-11", "ORD-MSG-18"] "Numbers edges half-way between their nodes.";
     NullForNothing "null-for-nothing" ["JSON-10", "JSON-06"] "Writes null where an edge has no actions.";
 
     // The order message
     UpdateIdMissing "order-update-id-missing" ["ORD-MSG-01"] "Leaves orderUpdateId out of its first message.";
     OrderIdReused "order-id-reused" ["ORD-MSG-02"] "Gives the same orderId to all orders of a vehicle.";
-    ZoneSetEmpty "zone-set-empty" ["ORD-MSG-03"] "Sends an empty zoneSetId.";
-    ReleasedMissing "released-missing" ["ORD-MSG-05"] "Leaves released out of the nodes of the horizon.";
-    MapIdMissing "map-id-missing" ["ORD-MSG-05"] "Leaves mapId out of nodePosition.";
+    ZoneSetEmpty "zone-set-empty" ["ORD-MSG-03", "OPT-03"] "Sends an empty zoneSetId.";
+    ReleasedMissing "released-missing" ["ORD-MSG-05", "JSON-10"] "Leaves released out of the nodes of the horizon.";
+    MapIdMissing "map-id-missing" ["ORD-MSG-05", "JSON-10"] "Leaves mapId out of nodePosition.";
     EmptyArraysOmitted "empty-arrays-omitted" ["ORD-MSG-06", "JSON-10"] "Leaves out arrays that have no element.";
     OneIdTwoPlaces "one-id-two-places" ["ORD-MSG-07"] "Gives the nodeId of a layout node to the place where a vehicle stands between nodes.";
     PositionMissing "node-position-missing" ["OPT-05", "ORD-MSG-08"] "Leaves nodePosition out.";
     ThetaInDegrees "theta-in-degrees" ["ORD-MSG-09", "MAP-02"] "Gives orientations in degrees.";
-    DeviationNegative "deviation-negative" ["ORD-MSG-09"] "Uses -1 as allowedDeviationXY where none is wanted.";
-    MirroredMap "mirrored-map" ["MAP-01"] "Lets the y axis point the other way, as on a screen.";
-    Millimetres "millimetres" ["MAP-02", "MAP-01"] "Gives coordinates in millimetres.";
+    DeviationNegative "deviation-negative" ["ORD-MSG-09", "JSON-09"] "Uses -1 as allowedDeviationXY where none is wanted.";
+    MirroredMap "mirrored-map" ["MAP-01", "ORD-MSG-30"] "Lets the y axis point the other way, as on a screen.";
+    Millimetres "millimetres" ["MAP-02", "MAP-01", "ORD-MSG-30"] "Gives coordinates in millimetres.";
     BlockingTypeMissing "blocking-type-missing" ["ORD-MSG-15"] "Leaves blockingType out of its actions.";
     ActionIdMissing "action-id-missing" ["ORD-MSG-15", "IACT-01"] "Leaves actionId out of instant actions.";
     BlockingTypeUnknown "blocking-type-unknown" ["ORD-MSG-16", "JSON-02"] "Uses a blocking type the protocol does not have.";

@@ -80,15 +80,17 @@ impl Site {
         }
         let enabling: Vec<(String, String)> = vehicle.enabling.clone().into_iter().collect();
         for (map_id, action_id) in enabling {
+            let enabled = vehicle.state.as_ref().is_some_and(|state| state.map_enabled(&map_id));
+            if enabled {
+                vehicle.enabling.remove(&map_id);
+                continue;
+            }
             if action_id.is_empty() {
                 continue;
             }
             match ended(vehicle, &action_id) {
-                Some(true) => {
-                    vehicle.enabling.remove(&map_id);
-                }
-                // Not asked again on its own.
-                Some(false) => {
+                // Not asked again on its own, even if the vehicle says it is done and shows no map.
+                Some(_) => {
                     vehicle.enabling.insert(map_id, String::new());
                 }
                 None => {}
