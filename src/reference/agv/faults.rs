@@ -203,7 +203,7 @@ faults! {
     DirectionMistaken "direction-mistaken" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the branch beside the one it is told.";
     CorridorOverrun "corridor-overrun" ["CORR-01", "CORR-03"] "Drives round an obstacle as if its corridor were twice as wide.";
     CorridorContourIgnored "corridor-contour-ignored" ["CORR-03", "CORR-01"] "Keeps only its centre inside a corridor that is meant for its contour.";
-    CorridorExitDrivenOn "corridor-exit-driven-on" ["CORR-06", "CORR-07"] "Drives on when it finds itself outside its corridor.";
+    CorridorExitDrivenOn "corridor-exit-driven-on" ["CORR-06"] "Drives on when it finds itself outside its corridor.";
     CorridorExitSilent "corridor-exit-silent" ["CORR-07"] "Stops outside its corridor and does not say why.";
     PlannedPathMissing "planned-path-missing" ["STATE-14"] "Plans its path and does not report it.";
     PlannedPathOfBaseOnly "planned-path-of-base-only" ["STATE-14"] "Reports the path it planned for the base only.";

@@ -48,6 +48,14 @@ impl MasterControl {
     }
 }
 
+/// `visualization-obeyed`: the vehicle is where the visualization shows it, whatever its state says.
+fn believe(shown_at: Option<&(String, Position)>, state: &mut State) {
+    if let Some((node, position)) = shown_at {
+        state.last_node_id.clone_from(node);
+        state.agv_position = Some(position.clone());
+    }
+}
+
 impl Header {
     fn deserialized(message: &Value) -> Option<Self> {
         serde::Deserialize::deserialize(message).ok()
@@ -98,8 +106,8 @@ impl Site {
         };
         let Some(running) = &vehicle.running else {
             if let Some((node, _)) = self.config.nearest(position.x, position.y, &position.map_id) {
-                vehicle.shown_at = Some(node.id.clone());
-                state.last_node_id.clone_from(&node.id);
+                vehicle.shown_at = Some((node.id.clone(), position));
+                believe(vehicle.shown_at.as_ref(), state);
             }
             return;
         };
@@ -113,11 +121,10 @@ impl Site {
         }
     }
 
-    fn state_heard(&mut self, vehicle: &mut Vehicle, state: State) {
+    fn state_heard(&mut self, vehicle: &mut Vehicle, mut state: State) {
         let back = vehicle.state.as_ref().is_some_and(|before| !before.takes_orders()) && state.takes_orders();
-        let mut state = state;
-        if let Some(shown_at) = vehicle.shown_at.as_ref().filter(|_| vehicle.running.is_none()) {
-            state.last_node_id.clone_from(shown_at);
+        if vehicle.running.is_none() {
+            believe(vehicle.shown_at.as_ref(), &mut state);
         }
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;

@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::clock::Moment;
 
 use super::config::VehicleConfig;
-use super::seen::{Factsheet, State};
+use super::seen::{Factsheet, Position, State};
 
 /// More transports than this do not wait for one vehicle.
 pub(super) const MAX_QUEUE: usize = 200;
@@ -190,8 +190,8 @@ pub(super) struct Vehicle {
     pub(super) last_order_at: Option<Moment>,
     /// When it wants to be looked at next.
     pub(super) wake: Option<Moment>,
-    /// The node where the visualization shows it (`visualization-obeyed`).
-    pub(super) shown_at: Option<String>,
+    /// The node and place where the visualization shows it (`visualization-obeyed`).
+    pub(super) shown_at: Option<(String, Position)>,
     /// The order given up last: its message (`refused-order-repeated`, `next-order-starts-elsewhere`).
     pub(super) last_order: Option<Running>,
 }
