@@ -5,6 +5,7 @@
 //! with its vehicle.
 
 mod actions;
+mod asked;
 mod axes;
 mod cancelled;
 mod capability;
@@ -25,6 +26,7 @@ mod trajectories;
 mod vehicle;
 
 pub(super) use actions::{IN_FACTSHEET, LOAD_DEVICE, SCOPES};
+pub(super) use asked::NOT_ASKED;
 pub(super) use axes::AXES;
 pub(super) use cancelled::BASE_KEPT;
 pub(super) use capability::{OPTIONAL, REQUIRED};
@@ -93,9 +95,14 @@ impl<'e> Command<'e> {
     }
 
     /// Every action in it, with its scope in the words of a factsheet.
+    ///
+    /// Instant actions count under the name that older versions gave their array, too: what must not come does not
+    /// become right by a wrong name.
     fn actions(self) -> Vec<(&'static str, &'e Value)> {
         match self {
-            Self::Instant(message) => elements(message, "actions")
+            Self::Instant(message) => ["actions", "instantActions"]
+                .into_iter()
+                .flat_map(|list| elements(message, list))
                 .take(ELEMENTS)
                 .map(|action| ("INSTANT", action))
                 .collect(),
