@@ -5,6 +5,7 @@
 //! comes from there. The only async logic of a test is here.
 
 mod compose;
+mod flood;
 mod hands;
 mod operator;
 mod recorder;
@@ -87,9 +88,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
         }
     }
 
-    /// Whether the user has asked to stop.
+    /// Whether the user has asked to stop, or the device floods the harness.
     pub fn interrupted(&self) -> bool {
-        *self.interrupt.borrow()
+        *self.interrupt.borrow() || self.recorder.flood().is_some()
     }
 
     /// Records something the harness itself did or found.
@@ -327,7 +328,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             };
             let probing = matches!(test.progress(), Progress::NeedsProbe(_)) && !probed;
             // The postamble runs even when the user has asked to stop: a device must not be left driving.
-            if section != Section::Finally && self.interrupted() {
+            if self.recorder.flood().is_some() || (section != Section::Finally && self.interrupted()) {
                 return Ok(StepEnd::Interrupted);
             }
             let happened = tokio::select! {

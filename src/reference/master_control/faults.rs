@@ -155,6 +155,7 @@ faults! {
     MessageLimitIgnored "message-limit-ignored" ["FACT-12"] "Sends longer messages than the vehicle takes.";
     IdLimitIgnored "id-limit-ignored" ["FACT-12"] "Sends longer ids than the vehicle takes.";
     NumericalIdsIgnored "numerical-ids-ignored" ["FACT-12"] "Sends ids with letters to a vehicle that takes digits only.";
+    OrderRepeatedForEver "order-repeated-for-ever" ["FACT-13"] "Sends an order to a vehicle that wants time between orders hundreds of times in every second, for ever.";
     OrderIntervalIgnored "order-interval-ignored" ["FACT-13"] "Does not keep the interval between orders.";
 
     // Maps

@@ -200,6 +200,7 @@ impl Site {
         self.watch_maps(vehicle);
         cancel::watch_cancel(vehicle);
         self.watch_order(vehicle);
+        self.repeat_for_ever(vehicle);
         self.begin_next(vehicle);
         self.send_instants(vehicle);
         let now = self.now.moment;
