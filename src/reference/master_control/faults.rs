@@ -131,6 +131,7 @@ faults! {
     NextOrderAhead "next-order-ahead" ["ORD-CANCEL-17", "ORD-03"] "Begins the order behind a cancelled one at the node the vehicle has not reached.";
 
     // Actions
+    FailedActionRepeated "failed-action-repeated" ["ORD-MSG-17"] "Tries an action that has failed again under its old actionId.";
     StationTypeRenamed "station-type-renamed" ["ACT-06", "ACT-31"] "Gives the station type of pick and drop under a key of its own.";
     VendorActionRenamed "vendor-action-renamed" ["ACT-07", "FACT-15"] "Writes actions of the manufacturer with a capital letter.";
     PickAtOnce "pick-at-once" ["ACT-08", "FACT-15"] "Sends pick as an instant action.";
