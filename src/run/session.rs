@@ -79,9 +79,8 @@ pub async fn run<L: Link, O: Operator>(
     };
     let (partial, reason) = match &end {
         End::Completed => (false, None),
-        End::NoDevice(why) => (true, Some(why.clone())),
+        End::NoDevice(why) | End::Flooded(why) => (true, Some(why.clone())),
         End::Interrupted => (true, Some("interrupted by the user".to_owned())),
-        End::Flooded(why) => (true, Some(why.clone())),
         End::Broken(error) => (true, Some(error.to_string())),
     };
     let recorded = engine.note(Event::RunEnded { partial, reason });

@@ -152,7 +152,7 @@ impl Site {
         let Some((message, due)) = vehicle.repeated.take() else {
             return;
         };
-        let next = if due > now { due } else { now + Duration::from_millis(1) };
+        let next = if due > now { due } else { now + Duration::from_millis(2) };
         vehicle.repeated = Some((message.clone(), next));
         vehicle.at(next);
         if due <= now {

@@ -77,6 +77,9 @@ impl Site {
         if self.faults.has(FaultName::ActionIdsRepeat) && what == "action" {
             return (self.ids % 3).to_string();
         }
+        if self.faults.has(FaultName::OrderIdWithSpace) && what == "order" {
+            return format!("Order {}-{}", self.session, self.ids);
+        }
         if self.faults.has(FaultName::IdLimitIgnored) {
             return format!("{what}-{}-{:064}", self.session, self.ids);
         }
