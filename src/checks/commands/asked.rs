@@ -11,8 +11,8 @@ use crate::journal::Entry;
 pub(in crate::checks) const NOT_ASKED: Check = Check {
     name: "commands/not-asked",
     decides: &["ACT-08", "FACT-15", "IACT-02", "INFO-02", "MODE-04"],
-    doc: "No instant action of the `types` is sent, or none but those of `except`. The actions are looked for in the \
-          array `instantActions` as well, as older versions called it: under that name they are as wrong.",
+    doc: "No instant action of the `types` is sent, or none but those of `except`. Without an \
+          array `actions` they are looked for in `instantActions`, as older versions called it: there they are as wrong.",
     arguments: &["types", "except"],
     start: |context| {
         let list = |name: &str| -> Option<Vec<String>> {

@@ -96,16 +96,16 @@ impl<'e> Command<'e> {
 
     /// Every action in it, with its scope in the words of a factsheet.
     ///
-    /// Instant actions count under the name that older versions gave their array, too: what must not come does not
+    /// Where there is no array `actions`, the name that older versions gave it counts: what must not come does not
     /// become right by a wrong name.
     fn actions(self) -> Vec<(&'static str, &'e Value)> {
         match self {
-            Self::Instant(message) => ["actions", "instantActions"]
-                .into_iter()
-                .flat_map(|list| elements(message, list))
-                .take(ELEMENTS)
-                .map(|action| ("INSTANT", action))
-                .collect(),
+            Self::Instant(message) => {
+                let named = message.get("actions").is_some_and(Value::is_array);
+                let list = if named { "actions" } else { "instantActions" };
+                let all = elements(message, list).take(ELEMENTS);
+                all.map(|action| ("INSTANT", action)).collect()
+            }
             Self::Order(order) => {
                 let of = |list, scope| {
                     elements(order, list)
