@@ -1,9 +1,11 @@
 //! No false accusation of a master control: whatever liberty a good one takes, and whatever the timing, none fails.
 //!
-//! Unlike a vehicle, a master control chooses what it sends: one that sends no horizon gives nothing to judge where a
-//! horizon is needed, so that inconclusive is the right word there. The list of these is a snapshot.
+//! Unlike a vehicle, a master control chooses what it sends: one that releases the whole way at once gives nothing to
+//! judge where an update is needed, so that inconclusive is the right word there. Each of these stands in a table with
+//! the reason.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -104,7 +106,37 @@ fn whatever_liberties_it_takes_nothing_fails() {
 #[ignore = "takes a minute; CI runs it"]
 fn with_each_tolerance_nothing_fails() {
     let sets: Vec<Vec<&str>> = TOLERANCES.iter().map(|tolerance| vec![tolerance.name]).collect();
-    insta::assert_snapshot!(accused(&sets));
+    let excused = undecided();
+    let found = accused(&sets);
+    let found: Vec<&str> = found.lines().collect();
+    let new: Vec<_> = found.iter().filter(|line| !excused.contains_key(**line)).collect();
+    assert!(
+        new.is_empty(),
+        "these are no pass, and have no reason in the table:\n{new:#?}"
+    );
+    let old: Vec<_> = excused.keys().filter(|key| !found.contains(&key.as_str())).collect();
+    assert!(
+        old.is_empty(),
+        "these are decided by now; take them out of the table:\n{old:#?}"
+    );
+}
+
+/// What is not a pass with a tolerance, as [`accused`] words it, and why it cannot be.
+fn undecided() -> BTreeMap<String, String> {
+    let table = include_str!("qualification/master-control-undecided.tsv");
+    let rows = table.lines().filter(|line| !line.starts_with('#'));
+    rows.map(|line| {
+        let columns: Vec<&str> = line.split('\t').collect();
+        let [tolerance, verdict, requirement, place, reason] = columns[..] else {
+            panic!("five columns are wanted: {line}");
+        };
+        assert!(reason.len() > 15, "no reason: {line}");
+        (
+            format!("{tolerance}: {verdict} {requirement} {place}"),
+            reason.to_owned(),
+        )
+    })
+    .collect()
 }
 
 #[test]
@@ -126,7 +158,7 @@ fn same_verdicts(seeds: std::ops::Range<u64>) {
             let mut request = with(&library, pack, &[]);
             request.seed = seed;
             request.jitter = Duration::from_millis(2 * (seed % 5));
-            request.coalesce = Duration::from_millis(seed % 4);
+            request.coalesce = Duration::from_millis(5 * (seed % 4));
             request
         })
         .collect();

@@ -8,7 +8,7 @@
 )]
 
 use vda5050_tck::pack::{Pack, Role};
-use vda5050_tck::run::{BuiltIn, Decider, Library, Qualification, qualify};
+use vda5050_tck::run::{BuiltIn, Decider, Library, Qualification, VirtualRun, decided, qualify, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 /// What is excused on one side of the interface.
@@ -187,5 +187,31 @@ fn the_older_version_passes_without_a_fault_too() {
             pack.version,
             outcome.deciders.len()
         );
+    }
+}
+
+/// Older versions call the array of instant actions otherwise. A master control that still does so must not pass where
+/// something must not come.
+#[test]
+fn what_must_not_come_is_found_under_the_older_name_of_the_array() {
+    let library = library();
+    let pack = library.rules.packs.latest();
+    for (fault, test, requirement) in [
+        ("pick-at-once", "actions/order-only", "ACT-08"),
+        ("pick-at-once", "capabilities/scope", "FACT-15"),
+        ("scope-ignored", "instant-actions/not-offered", "FACT-15"),
+        ("position-during-order", "instant-actions/position-under-way", "IACT-02"),
+        ("actions-in-service", "modes/no-actions[service]", "MODE-04"),
+        ("information-obeyed", "reported/information-dispatch", "INFO-02"),
+    ] {
+        let mut request = VirtualRun::of_role(Role::MasterControl, &library, pack);
+        request.tests.retain(|one| one.id == test);
+        request.complete = false;
+        request.faults = vec!["actions-renamed".to_owned(), fault.to_owned()];
+        let result = run_silently(&library, pack, request).expect("a run").result;
+        let found = decided(&result).into_iter().any(|(decider, verdict)| {
+            verdict == Verdict::Fail && decider.requirement == requirement && decider.place.starts_with(test)
+        });
+        assert!(found, "{fault} is not found by {test}");
     }
 }

@@ -240,6 +240,7 @@ static REGISTRY: &[Check] = &[
     commands::DOWNLOADS,
     commands::DUPLICATES,
     commands::MODES,
+    commands::NOT_ASKED,
 ];
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! comes from there. The only async logic of a test is here.
 
 mod compose;
+mod flood;
 mod hands;
 mod map_file;
 mod operator;
@@ -84,9 +85,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
         }
     }
 
-    /// Whether the user has asked to stop.
+    /// Whether the user has asked to stop, or the device floods the harness.
     pub fn interrupted(&self) -> bool {
-        *self.interrupt.borrow()
+        *self.interrupt.borrow() || self.recorder.flood().is_some()
     }
 
     /// Records something the harness itself did or found.
@@ -209,13 +210,19 @@ impl<L: Link, O: Operator> Engine<L, O> {
         !self.cancels || self.device_is_gone() || vehicle::is_idle_since(judge, since)
     }
 
-    /// Whether the master control has nothing left to call off: the vehicle is idle, and was not told to be awkward,
-    /// which may have kept it from what the master control still wants.
+    /// Whether the master control has nothing left to call off: the vehicle is idle, was not told to be awkward, which
+    /// may have kept it from what the master control still wants, and an order has come since the last thing asked for.
     fn spares_calling_off(&self, begun: u64) -> bool {
+        let judge = self.recorder.judge();
         let entries = self.recorder.journal().entries();
         let mut own = entries.iter().rev().take_while(|entry| entry.seq() > begun);
-        let awkward = own.any(|entry| matches!(entry.event(), Event::Vehicle { .. }));
-        !awkward && vehicle::has_nothing_to_do(self.recorder.judge())
+        let answered = judge.timeline().of("order").last().map_or(0, |order| order.seq());
+        let open = own.any(|entry| match entry.event() {
+            Event::Vehicle { .. } => true,
+            Event::Hook { .. } => entry.seq() > answered,
+            _ => false,
+        });
+        !open && vehicle::has_nothing_to_do(judge)
     }
 
     /// Whether the tap has seen the device go.
@@ -330,7 +337,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             };
             let probing = matches!(test.progress(), Progress::NeedsProbe(_)) && !probed;
             // The postamble runs even when the user has asked to stop: a device must not be left driving.
-            if section != Section::Finally && self.interrupted() {
+            if self.recorder.flood().is_some() || (section != Section::Finally && self.interrupted()) {
                 return Ok(StepEnd::Interrupted);
             }
             let happened = tokio::select! {
@@ -407,9 +414,10 @@ fn is_cancelling(step: &Step) -> bool {
     step.path.contains("/cancel-order[")
 }
 
-/// Whether a step of a postamble comes from the state in which a master control calls off what it still wants.
+/// Whether a step of a postamble comes from the state in which a master control calls off what it still wants. The
+/// pause in it is kept: a master control has to hear that the vehicle is done before somebody moves it.
 fn is_calling_off(step: &Step) -> bool {
-    step.path.contains("/called-off[")
+    step.path.contains("/called-off[") && !step.path.contains("/settled[")
 }
 
 /// Whether a step of a postamble waits for the vehicle to drive what was released to it.

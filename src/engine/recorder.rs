@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::flood::FloodGuard;
 use crate::journal::event::Occurrence;
 use crate::journal::file::JournalWriter;
 use crate::journal::{Entry, Journal};
@@ -23,6 +24,7 @@ pub struct Recorder {
     journal: Journal,
     writer: Option<JournalWriter>,
     judge: RunJudge,
+    guard: FloodGuard,
 }
 
 impl Recorder {
@@ -35,7 +37,14 @@ impl Recorder {
         }
         let mut judge = RunJudge::begin(rules, &entry)?;
         judge.observe(&entry)?;
-        Ok(Self { journal, writer, judge })
+        let mut guard = FloodGuard::default();
+        guard.observe(&entry);
+        Ok(Self {
+            journal,
+            writer,
+            judge,
+            guard,
+        })
     }
 
     /// Records one occurrence: file first, then the judge.
@@ -45,7 +54,13 @@ impl Recorder {
             writer.write(&entry.record)?;
         }
         self.judge.observe(&entry)?;
+        self.guard.observe(&entry);
         Ok(entry)
+    }
+
+    /// Why the run has to end, when the device sends more than can be kept.
+    pub fn flood(&self) -> Option<&str> {
+        self.guard.over()
     }
 
     /// The judge of this run.

@@ -31,18 +31,17 @@ pub fn is_idle_since(judge: &RunJudge, seq: u64) -> bool {
     is_without_order(state) && actions.is_some_and(|actions| actions.iter().all(is_over))
 }
 
-/// Whether a mock AGV has done everything it was sent: it is idle, and its last state is about the last order.
+/// Whether a mock AGV has done everything it was sent: it is idle, no action is under way, and its last state is about
+/// the last order.
 #[must_use]
 pub fn has_nothing_to_do(judge: &RunJudge) -> bool {
     let Some(order) = judge.timeline().of("order").last() else {
         return is_idle(judge);
     };
-    let Some(state) = last_state(judge).filter(|state| state.seq() > order.seq()) else {
-        return false;
-    };
+    let Some(state) = last_state(judge) else { return false };
     let same =
         |name: &str| order.json().and_then(|order| order.get(name)) == state.json().and_then(|state| state.get(name));
-    is_idle(judge) && same("orderId") && same("orderUpdateId")
+    is_idle_since(judge, order.seq()) && same("orderId") && same("orderUpdateId")
 }
 
 /// Whether any connection of the device that the tap has seen is open. A master control may have one for each vehicle.

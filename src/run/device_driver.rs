@@ -17,6 +17,7 @@ use tokio::time::{Instant, sleep_until};
 use super::device_peer::outgoing;
 use crate::clock::{Moment, WallClock};
 use crate::journal::event::{Direction, Event, Payload, Source};
+use crate::link::Outgoing;
 use crate::link::mqtt::Reporter;
 use crate::link::mqtt::client::{Client, ClientEvent, ClientOptions};
 use crate::link::mqtt::endpoint::Endpoint;
@@ -27,6 +28,8 @@ use crate::reference::{Device, Download, Input, Output, Publication};
 const LEAST_WAKE: Duration = Duration::from_millis(1);
 /// Largest file a device fetches.
 const LARGEST_FILE: u64 = 256 << 20;
+/// How long a broker may take to publish a last will.
+const WILL_LIMIT: Duration = Duration::from_secs(5);
 /// How long a file may take once its first byte is here.
 const TRANSFER_LIMIT: Duration = Duration::from_secs(120);
 
@@ -100,6 +103,7 @@ pub async fn run_device<D: Device>(
         sent,
         connection: None,
         client_id: String::new(),
+        will: None,
         established: false,
         downloads,
     };
@@ -115,6 +119,7 @@ struct Driver<D> {
     sent: Option<Reporter>,
     connection: Option<(Client, mpsc::Receiver<ClientEvent>)>,
     client_id: String,
+    will: Option<Outgoing>,
     established: bool,
     downloads: mpsc::UnboundedSender<Progress>,
 }
@@ -190,7 +195,11 @@ impl<D: Device> Driver<D> {
                 }
                 Output::Drop => {
                     self.established = false;
+                    let witness = self.witness().await;
                     self.connection = None;
+                    if let Some((witness, will)) = witness {
+                        tokio::spawn(testify(witness, will));
+                    }
                 }
                 Output::Raw(bytes) => {
                     let (endpoint, id) = (self.endpoint.clone(), format!("{}-raw", self.client_id));
@@ -207,13 +216,14 @@ impl<D: Device> Driver<D> {
     fn connect(&mut self) {
         let options = self.device.connect_options(self.clock.now());
         self.client_id.clone_from(&options.client_id);
+        self.will = options.will.map(outgoing);
         self.established = false;
         self.connection = Some(Client::open(&ClientOptions {
             endpoint: self.endpoint.clone(),
             client_id: options.client_id,
             keep_alive: options.keep_alive,
             clean_session: options.clean_session,
-            will: options.will.map(outgoing),
+            will: self.will.clone(),
             subscriptions: options.subscriptions,
         }));
     }
@@ -224,16 +234,69 @@ impl<D: Device> Driver<D> {
         };
         let message = outgoing(publication);
         if let Some(reporter) = &self.sent {
-            let event = Event::Sent {
-                topic: message.topic.clone(),
-                qos: message.qos,
-                retain: message.retain,
-                payload: Payload::keep(message.payload.clone()),
-            };
-            reporter.report(Source::Harness, Some(Direction::ToDevice), event).await;
+            report(reporter, &message).await;
         }
         client.publish(message);
     }
+
+    /// Somebody who listens for the last will of a device of the harness. It is the broker that sends it, so it counts
+    /// as sent when it comes.
+    async fn witness(&mut self) -> Option<(Witness, Outgoing)> {
+        let (reporter, will) = (self.sent.clone()?, self.will.clone()?);
+        self.connection.as_ref()?;
+        let (client, mut events) = Client::open(&ClientOptions {
+            endpoint: self.endpoint.clone(),
+            client_id: format!("{}-will", self.client_id),
+            keep_alive: Duration::from_secs(30),
+            clean_session: true,
+            will: None,
+            subscriptions: vec![(will.topic.clone(), 2)],
+        });
+        let listens = async { while !matches!(events.recv().await, Some(ClientEvent::Connected) | None) {} };
+        let _ = tokio::time::timeout(WILL_LIMIT, listens).await;
+        let witness = Witness {
+            client,
+            events,
+            reporter,
+        };
+        Some((witness, will))
+    }
+}
+
+/// A client that listens for a last will.
+struct Witness {
+    client: Client,
+    events: mpsc::Receiver<ClientEvent>,
+    reporter: Reporter,
+}
+
+/// Reports the last will when it comes; what else there is on its topic was published by the device itself.
+async fn testify(mut witness: Witness, will: Outgoing) {
+    let comes = async {
+        while let Some(event) = witness.events.recv().await {
+            match event {
+                ClientEvent::Message { payload, .. } if payload == will.payload => return true,
+                ClientEvent::Lost(_) => return false,
+                _ => {}
+            }
+        }
+        false
+    };
+    if tokio::time::timeout(WILL_LIMIT, comes).await.unwrap_or(false) {
+        report(&witness.reporter, &will).await;
+    }
+    witness.client.disconnect().await;
+}
+
+/// Reports what a device of the harness has sent.
+async fn report(reporter: &Reporter, message: &Outgoing) {
+    let event = Event::Sent {
+        topic: message.topic.clone(),
+        qos: message.qos,
+        retain: message.retain,
+        payload: Payload::keep(message.payload.clone()),
+    };
+    reporter.report(Source::Harness, Some(Direction::ToDevice), event).await;
 }
 
 async fn next_event(connection: &mut Option<(Client, mpsc::Receiver<ClientEvent>)>) -> ClientEvent {

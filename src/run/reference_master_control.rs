@@ -131,6 +131,7 @@ impl ReferenceMasterControl {
             .map_err(|unknown| UnknownName(unknown.to_string()))?;
         let later = self.config.answers_after.saturating_sub(before);
         self.time.quiet += later * 2;
+        self.time.settle += later * 2;
         self.time.drive += later * 8;
         Ok(())
     }

@@ -48,6 +48,8 @@ pub enum End {
     NoDevice(String),
     /// The user stopped it.
     Interrupted,
+    /// The device sent more than can be kept.
+    Flooded(String),
     /// Link, journal or host broke.
     Broken(EngineError),
 }
@@ -77,7 +79,7 @@ pub async fn run<L: Link, O: Operator>(
     };
     let (partial, reason) = match &end {
         End::Completed => (false, None),
-        End::NoDevice(why) => (true, Some(why.clone())),
+        End::NoDevice(why) | End::Flooded(why) => (true, Some(why.clone())),
         End::Interrupted => (true, Some("interrupted by the user".to_owned())),
         End::Broken(error) => (true, Some(error.to_string())),
     };
@@ -110,11 +112,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
 
     async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
         if let Err(why) = self.admit().await? {
-            let end = if self.engine.interrupted() {
-                End::Interrupted
-            } else {
-                End::NoDevice(why.clone())
-            };
+            let end = self.stopped().unwrap_or_else(|| End::NoDevice(why.clone()));
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
                 gate: Gate::Unobservable(why.clone()),
@@ -136,13 +134,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let runs = plan.tests.iter().filter(|planned| planned.gate == Gate::Runs).count();
         let mut number = 0;
         let mut gone: Option<String> = None;
-        let mut end = End::Completed;
         for (at, test) in tests.iter().enumerate() {
             if plan.tests[at].gate != Gate::Runs {
                 continue;
             }
             if self.engine.interrupted() {
-                end = End::Interrupted;
                 break;
             }
             number += 1;
@@ -177,10 +173,13 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             }
         }
         self.record_plan(&plan)?;
-        if self.engine.interrupted() {
-            end = End::Interrupted;
-        }
-        Ok(end)
+        Ok(self.stopped().unwrap_or(End::Completed))
+    }
+
+    /// How the run ended before its time, if it did.
+    fn stopped(&self) -> Option<End> {
+        let flooded = self.engine.recorder.flood().map(|why| End::Flooded(why.to_owned()));
+        flooded.or(self.engine.interrupted().then_some(End::Interrupted))
     }
 
     /// Says how long the run will take; in virtual time it is over before that is read.

@@ -5,6 +5,7 @@
 //! with its vehicle.
 
 mod actions;
+mod asked;
 mod axes;
 mod cancelled;
 mod capability;
@@ -25,6 +26,7 @@ mod trajectories;
 mod vehicle;
 
 pub(super) use actions::{IN_FACTSHEET, LOAD_DEVICE, SCOPES};
+pub(super) use asked::NOT_ASKED;
 pub(super) use axes::AXES;
 pub(super) use cancelled::BASE_KEPT;
 pub(super) use capability::{OPTIONAL, REQUIRED};
@@ -93,12 +95,17 @@ impl<'e> Command<'e> {
     }
 
     /// Every action in it, with its scope in the words of a factsheet.
+    ///
+    /// Where there is no array `actions`, the name that older versions gave it counts: what must not come does not
+    /// become right by a wrong name.
     fn actions(self) -> Vec<(&'static str, &'e Value)> {
         match self {
-            Self::Instant(message) => elements(message, "actions")
-                .take(ELEMENTS)
-                .map(|action| ("INSTANT", action))
-                .collect(),
+            Self::Instant(message) => {
+                let named = message.get("actions").is_some_and(Value::is_array);
+                let list = if named { "actions" } else { "instantActions" };
+                let all = elements(message, list).take(ELEMENTS);
+                all.map(|action| ("INSTANT", action)).collect()
+            }
             Self::Order(order) => {
                 let of = |list, scope| {
                     elements(order, list)

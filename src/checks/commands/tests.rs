@@ -639,6 +639,23 @@ fn the_schema_names_the_requirements_of_commands() {
     assert_eq!(schema(snake), ["JSON-01"]);
 }
 
+#[test]
+fn an_instant_action_that_must_not_come_is_found_under_the_older_name_of_the_array_too() {
+    for list in ["actions", "instantActions"] {
+        let mut trace = begun();
+        trace.with.insert("types".into(), json!(["pick"]));
+        let pause = json!({ list: [action("startPause", "a1", &json!([]))] });
+        trace.commands("instantActions", &pause).wait(1.0);
+        assert_eq!(trace.judge("commands/not-asked").summary(), [""; 0]);
+        trace.commands("instantActions", &json!({ list: [action("pick", "a2", &pick())] }));
+        assert_eq!(trace.judge("commands/not-asked").findings.len(), 1);
+        trace.with = serde_json::Map::new();
+        trace.with.insert("except".into(), json!(["pick"]));
+        let found = trace.judge("commands/not-asked").findings;
+        assert!(found.len() == 1 && found[0].message.contains("startPause"));
+    }
+}
+
 /// Values as they may come: names the checks look for, with anything in them.
 fn anything() -> impl Strategy<Value = Value> {
     let leaf = prop_oneof![

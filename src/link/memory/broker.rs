@@ -134,6 +134,11 @@ impl Broker {
         deliveries
     }
 
+    /// The last will of a client.
+    pub(super) fn will_of(&self, client: Client) -> Option<&Outgoing> {
+        self.present.get(&client)?.will.as_ref()
+    }
+
     /// A client goes. Its will is published unless it said DISCONNECT; returns who gets it.
     pub(super) fn leave(&mut self, client: Client, orderly: bool) -> Vec<(Client, Delivery)> {
         let Some(session) = self.present.remove(&client) else {

@@ -3,9 +3,32 @@
 use super::packets::Up;
 use super::peer::PeerInput;
 use super::{MemoryLink, Task};
-use crate::journal::event::{Close, Direction};
+use crate::journal::event::{Close, Direction, Event, Payload, Source};
 
 impl MemoryLink {
+    /// The broker lets a connection go. The last will of a peer of the harness is one of its messages, like any other.
+    pub(super) fn leave(&mut self, id: u64, orderly: bool) {
+        let plug = self
+            .connections
+            .get(&id)
+            .and_then(|connection| self.plugs.get(connection.peer));
+        let will = self
+            .broker
+            .will_of(id)
+            .filter(|_| !orderly && plug.is_some_and(|plug| plug.own));
+        if let Some(will) = will {
+            let event = Event::Sent {
+                topic: will.topic.clone(),
+                qos: will.qos,
+                retain: will.retain,
+                payload: Payload::keep(will.payload.clone()),
+            };
+            self.report(Source::Harness, Some(Direction::ToDevice), event);
+        }
+        let deliveries = self.broker.leave(id, orderly);
+        self.distribute(deliveries);
+    }
+
     pub(super) fn lose(&mut self, peer: usize, id: u64) {
         if let Some(plug) = self.plugs.get_mut(peer)
             && plug.connection == Some(id)
@@ -85,8 +108,7 @@ impl MemoryLink {
             .collect();
         for id in ids {
             self.report_end(id, Close::Harness);
-            let deliveries = self.broker.leave(id, false);
-            self.distribute(deliveries);
+            self.leave(id, false);
             if let Some(connection) = self.connections.remove(&id)
                 && connection.device_open
                 && let Some(plug) = self.plugs.get_mut(connection.peer)

@@ -490,7 +490,10 @@ fn jitter_and_coalescing_are_the_same_for_the_same_seed_and_keep_the_order() {
 #[test]
 fn a_peer_of_the_harness_is_not_behind_the_tap_and_its_messages_are_reported_as_sent() {
     let mut bench = bench(vec![]);
-    let script = VecDeque::from(vec![publishes(100, "d/state", "mock", 0, false)]);
+    let script = VecDeque::from(vec![
+        publishes(100, "d/state", "mock", 0, false),
+        (ms(600), PeerOutput::Drop),
+    ]);
     let log = Log::default();
     let own = Scripted {
         script,
@@ -507,6 +510,9 @@ fn a_peer_of_the_harness_is_not_behind_the_tap_and_its_messages_are_reported_as_
     bench.until(50);
     bench.fault(LinkFault::Silence { direction: None });
     assert_eq!(kinds(&bench.until(500)), ["sent", "message"]);
+    let seen = bench.until(900);
+    assert_eq!(kinds(&seen), ["sent", "message"], "the broker sends its last will");
+    assert!(matches!(&seen[0].event, Event::Sent { topic, .. } if topic == "d/connection"));
 }
 
 #[test]

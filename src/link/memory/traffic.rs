@@ -333,22 +333,19 @@ impl MemoryLink {
             Up::Ack(..) | Up::Raw(_) => {}
             Up::Ping => self.down(id, Down::Pong),
             Up::Disconnect => {
-                let deliveries = self.broker.leave(id, true);
-                self.distribute(deliveries);
+                self.leave(id, true);
             }
             Up::Garbage => self.broker_closes(id),
             Up::Close => {
                 connection.broker_open = false;
-                let deliveries = self.broker.leave(id, false);
-                self.distribute(deliveries);
+                self.leave(id, false);
                 self.forget(id);
             }
         }
     }
 
     pub(super) fn broker_closes(&mut self, id: u64) {
-        let deliveries = self.broker.leave(id, false);
-        self.distribute(deliveries);
+        self.leave(id, false);
         if let Some(connection) = self.connections.get_mut(&id) {
             connection.broker_open = false;
         }

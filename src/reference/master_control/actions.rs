@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::Site;
 use super::faults::FaultName as F;
-use super::seen::{ActionOffer, Factsheet, ParameterOffer};
+use super::seen::{ActionOffer, ActionState, Factsheet, ParameterOffer};
 use super::tolerances::ToleranceName as T;
 use super::vehicle::Vehicle;
 
@@ -102,7 +102,7 @@ impl Site {
         };
         let mut action = json!({
             "actionType": sent,
-            "actionId": self.next_id(vehicle, "action"),
+            "actionId": self.failed_id(vehicle, kind).unwrap_or_else(|| self.next_id(vehicle, "action")),
             "blockingType": blocking,
         });
         if !parameters.is_empty() {
@@ -113,6 +113,14 @@ impl Site {
             action["actionParameters"] = Value::Array(list);
         }
         action
+    }
+
+    /// `failed-action-repeated`: the id of the action of this type that has failed.
+    fn failed_id(&self, vehicle: &Vehicle, kind: &str) -> Option<String> {
+        let actions = &vehicle.state.as_ref()?.action_states;
+        let failed = |action: &&ActionState| action.action_type == kind && action.action_status == "FAILED";
+        let failed = actions.iter().find(failed).map(|action| action.action_id.clone());
+        failed.filter(|_| self.faults.has(F::FailedActionRepeated))
     }
 
     fn blocking(&self, offer: Option<&ActionOffer>) -> String {

@@ -1,5 +1,7 @@
 //! The running order: its acceptance, the extension of its base, and its end.
 
+use std::time::Duration;
+
 use serde_json::{Value, json};
 
 use super::Site;
@@ -134,6 +136,28 @@ impl Site {
             self.publish(vehicle, "order", &running.message);
         }
         true
+    }
+
+    /// `order-repeated-for-ever`: once more, and at once again, whatever has become of it.
+    pub(super) fn repeat_for_ever(&mut self, vehicle: &mut Vehicle) {
+        if !self.faults.has(F::OrderRepeatedForEver) {
+            return;
+        }
+        let now = self.now.moment;
+        let sheet = vehicle.factsheet.as_ref();
+        let begins = vehicle.repeated.is_none() && sheet.is_some_and(|sheet| sheet.order_interval > 0.0);
+        if let Some(running) = vehicle.running.as_ref().filter(|_| begins) {
+            vehicle.repeated = Some((running.message.clone(), now));
+        }
+        let Some((message, due)) = vehicle.repeated.take() else {
+            return;
+        };
+        let next = if due > now { due } else { now + Duration::from_millis(2) };
+        vehicle.repeated = Some((message.clone(), next));
+        vehicle.at(next);
+        if due <= now {
+            self.publish(vehicle, "order", &message);
+        }
     }
 
     /// `refused-order-repeated`: perhaps it likes it better this way.

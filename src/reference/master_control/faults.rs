@@ -131,6 +131,7 @@ faults! {
     NextOrderAhead "next-order-ahead" ["ORD-CANCEL-17", "ORD-03"] "Begins the order behind a cancelled one at the node the vehicle has not reached.";
 
     // Actions
+    FailedActionRepeated "failed-action-repeated" ["ORD-MSG-17"] "Tries an action that has failed again under its old actionId.";
     StationTypeRenamed "station-type-renamed" ["ACT-06", "ACT-31"] "Gives the station type of pick and drop under a key of its own.";
     VendorActionRenamed "vendor-action-renamed" ["ACT-07", "FACT-15"] "Writes actions of the manufacturer with a capital letter.";
     PickAtOnce "pick-at-once" ["ACT-08", "FACT-15"] "Sends pick as an instant action.";
@@ -155,6 +156,7 @@ faults! {
     MessageLimitIgnored "message-limit-ignored" ["FACT-12"] "Sends longer messages than the vehicle takes.";
     IdLimitIgnored "id-limit-ignored" ["FACT-12"] "Sends longer ids than the vehicle takes.";
     NumericalIdsIgnored "numerical-ids-ignored" ["FACT-12"] "Sends ids with letters to a vehicle that takes digits only.";
+    OrderRepeatedForEver "order-repeated-for-ever" ["FACT-13"] "Sends an order to a vehicle that wants time between orders hundreds of times in every second, for ever.";
     OrderIntervalIgnored "order-interval-ignored" ["FACT-13"] "Does not keep the interval between orders.";
 
     // Maps

@@ -78,7 +78,9 @@ impl Site {
         let is_awaited = |instant: &Instant| awaited.iter().any(|id| id == instant.id());
         let Vehicle { instants, state, .. } = vehicle;
         let seen = |id: &str| state.as_ref().and_then(|state| state.action(id));
-        instants.retain(|instant| !seen(instant.id()).is_some_and(ActionState::is_terminal) || is_awaited(instant));
+        let is_over =
+            |instant: &Instant| instant.sent_at.is_some() && seen(instant.id()).is_some_and(ActionState::is_terminal);
+        instants.retain(|instant| !is_over(instant) || is_awaited(instant));
         let mut wake = None;
         for instant in instants.iter_mut() {
             let Some(sent_at) = instant.sent_at else { continue };
@@ -115,6 +117,10 @@ impl Vehicle {
 
 /// How an instant action ended: `Some(true)` FINISHED, `Some(false)` FAILED or lost for good.
 pub(super) fn ended(vehicle: &mut Vehicle, id: &str) -> Option<bool> {
+    let mut waiting = vehicle.instants.iter().filter(|instant| instant.sent_at.is_none());
+    if waiting.any(|instant| instant.id() == id) {
+        return None;
+    }
     let seen = vehicle.state.as_ref().and_then(|state| state.action(id));
     let end = match seen {
         Some(action) if action.is_terminal() => Some(action.action_status == "FINISHED"),

@@ -34,6 +34,14 @@ pub const LAPSES: &[(&str, &str)] = &[
         "An empty list of actions on the stitching node is a warning by the ruling of ORD-UPD-06.",
     ),
     ("map-not-preloaded", "It breaks a recommendation only."),
+    (
+        "orders-to-offline",
+        "No sentence forbids an order for a vehicle that is lost; the ruling of CONN-12 is a warning.",
+    ),
+    (
+        "old-will-ignored",
+        "An order does not prove that the will was ignored; the ruling of CONN-13 is a warning.",
+    ),
 ];
 
 /// Why this fault is a lapse; `None` for one that fails.

@@ -77,6 +77,9 @@ impl Site {
         if self.faults.has(FaultName::ActionIdsRepeat) && what == "action" {
             return (self.ids % 3).to_string();
         }
+        if self.faults.has(FaultName::OrderIdWithSpace) && what == "order" {
+            return format!("Order {}-{}", self.session, self.ids);
+        }
         if self.faults.has(FaultName::IdLimitIgnored) {
             return format!("{what}-{}-{:064}", self.session, self.ids);
         }
@@ -200,6 +203,7 @@ impl Site {
         self.watch_maps(vehicle);
         cancel::watch_cancel(vehicle);
         self.watch_order(vehicle);
+        self.repeat_for_ever(vehicle);
         self.begin_next(vehicle);
         self.send_instants(vehicle);
         let now = self.now.moment;

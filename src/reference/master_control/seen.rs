@@ -49,6 +49,9 @@ pub(super) struct ElementState {
 #[serde(rename_all = "camelCase")]
 pub(super) struct ActionState {
     pub(super) action_id: String,
+    /// Looked at by faulty master controls.
+    #[serde(default)]
+    pub(super) action_type: String,
     pub(super) action_status: String,
 }
 

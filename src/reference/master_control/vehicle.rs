@@ -194,6 +194,8 @@ pub(super) struct Vehicle {
     pub(super) shown_at: Option<(String, Position)>,
     /// The order given up last: its message (`refused-order-repeated`, `next-order-starts-elsewhere`).
     pub(super) last_order: Option<Running>,
+    /// What is sent again and again, and when the next time (`order-repeated-for-ever`).
+    pub(super) repeated: Option<(Value, Moment)>,
 }
 
 impl Vehicle {

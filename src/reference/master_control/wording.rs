@@ -113,9 +113,6 @@ fn without_empty(value: &mut Value) {
 fn identity(faults: Faults, update: bool, message: &mut Value) {
     let id = message["orderId"].as_str().unwrap_or_default().to_owned();
     let number = message["orderUpdateId"].as_u64().unwrap_or_default();
-    if faults.has(F::OrderIdWithSpace) {
-        message["orderId"] = json!(format!("Order {id}"));
-    }
     if faults.has(F::OrderIdReused) {
         message["orderId"] = json!("transport");
     }
