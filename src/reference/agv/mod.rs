@@ -362,6 +362,10 @@ impl Agv {
             return Duration::from_secs_f64(seconds);
         }
         let by_type = self.config.action_durations.get(&action.request.action_type);
-        by_type.copied().unwrap_or(self.config.action_duration)
+        let duration = by_type.copied().unwrap_or(self.config.action_duration);
+        if self.takes(ToleranceName::ActionsLast) {
+            return duration.max(Duration::from_secs(1));
+        }
+        duration
     }
 }
