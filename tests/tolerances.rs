@@ -140,7 +140,7 @@ fn whatever_liberties_it_takes_everything_is_decided_and_nothing_fails() {
 
 /// Liberties that were once taken for defects only together: what a slow or talkative vehicle reports of its own
 /// falls into the time of an answer.
-const TOGETHER: [&[&str]; 8] = [
+const TOGETHER: [&[&str]; 11] = [
     &["answers-slowly", "states-often", "warning-comes-and-goes"],
     &["answers-very-slowly", "every-state-twice", "warning-comes-and-goes"],
     &[
@@ -169,6 +169,11 @@ const TOGETHER: [&[&str]; 8] = [
         "every-state-twice",
         "warning-comes-and-goes",
     ],
+    // What makes it slow, whichever was taken first.
+    &["actions-at-once", "states-coalesced"],
+    &["actions-last", "answers-very-slowly"],
+    // The first node of an order is still to come, and the last node is that of the order before.
+    &["first-node-listed", "header-id-restarts"],
 ];
 
 #[test]

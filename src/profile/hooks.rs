@@ -60,6 +60,11 @@ pub const HOOKS: &[HookInfo] = &[
         "The vehicle was brought to a node and knows where it is.",
     ),
     agv("push-out", &[], "The vehicle was moved off the way it had been given."),
+    agv(
+        "shift-position",
+        &[],
+        "What the vehicle takes for its place was shifted aside by more than half a metre, such as with its service tool.",
+    ),
     agv("emergency-stop", &[], "An emergency stop was pressed."),
     agv(
         "release-emergency-stop",
@@ -100,6 +105,16 @@ pub const HOOKS: &[HookInfo] = &[
         "unblock-pause",
         &[],
         "A pause and its end by a message were made possible again.",
+    ),
+    agv(
+        "lock-charger",
+        &[],
+        "An end of charging by a message was made impossible, such as by a latch.",
+    ),
+    agv(
+        "unlock-charger",
+        &[],
+        "An end of charging by a message was made possible again.",
     ),
     agv(
         "use-lift",

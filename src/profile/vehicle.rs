@@ -49,6 +49,11 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
         "It is brought to a place by hand, which takes a mode for people.",
     ),
     word("push-out", &[], "It is moved off the way it was given."),
+    word(
+        "shift-position",
+        &[],
+        "It takes itself to stand beside the way it was given.",
+    ),
     word("drive-manually", &[], "It is driven by hand for a short way."),
     word("lose-position", &[], "It no longer knows where it is."),
     word("find-position", &[], "It knows where it is again."),
@@ -80,6 +85,16 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
         "unblock-pause",
         &[],
         "A pause and its end by a message are possible again.",
+    ),
+    word(
+        "lock-charger",
+        &[],
+        "An end of charging by a message is made impossible.",
+    ),
+    word(
+        "unlock-charger",
+        &[],
+        "An end of charging by a message is possible again.",
     ),
     word(
         "provoke-error",

@@ -92,21 +92,46 @@ pub(super) fn load<'a>(
     }
     suites.tests.sort_by(|left, right| left.id.cmp(&right.id));
     suites.monitors.sort_by(|left, right| left.id.cmp(&right.id));
-    for pair in suites.tests.windows(2) {
-        if pair[0].id == pair[1].id {
-            duplicate(&pair[1].id, &pair[1].source, &pair[0].source, &mut problems);
-        }
-    }
+    unique_names(&suites, &mut problems);
     let problems = problems.into_sorted();
     if problems.is_empty() { Ok(suites) } else { Err(problems) }
 }
 
-fn duplicate(id: &str, second: &Arc<Source>, first: &Arc<Source>, problems: &mut Problems) {
-    problems.at(
-        "duplicate-test",
-        &Span::new(second, 0, second.text.find('\n').unwrap_or(0)),
-        format!("the test `{id}` for a second time"),
-        format!("{} has it already", first.name),
+/// No name means two things. The rows of one table differ by their rows only, so a table is one of the things.
+fn unique_names(suites: &Suites, problems: &mut Problems) {
+    let mut taken: BTreeMap<&str, &Arc<Source>> = BTreeMap::new();
+    let mut tables: BTreeMap<&str, &Arc<Source>> = BTreeMap::new();
+    for test in &suites.tests {
+        if let Some(first) = taken.insert(&test.id, &test.source) {
+            taken_twice(
+                "duplicate-test",
+                format!("the test `{}` for a second time", test.id),
+                &test.source,
+                first,
+                problems,
+            );
+        }
+        let table = test.id.split_once('[').map_or(test.id.as_str(), |(table, _)| table);
+        tables.insert(table, &test.source);
+    }
+    for pair in suites.monitors.windows(2).filter(|pair| pair[0].id == pair[1].id) {
+        let title = format!("the monitor `{}` for a second time", pair[1].id);
+        taken_twice("duplicate-monitor", title, &pair[1].source, &pair[0].source, problems);
+    }
+    for monitor in &suites.monitors {
+        if let Some(test) = tables.get(monitor.id.as_str()) {
+            let title = format!("the monitor `{}` is named as a test", monitor.id);
+            taken_twice("monitor-named-as-test", title, &monitor.source, test, problems);
+        }
+    }
+}
+
+fn taken_twice(code: &'static str, title: String, second: &Arc<Source>, first: &Arc<Source>, problems: &mut Problems) {
+    let line = Span::new(second, 0, second.text.find('\n').unwrap_or(second.text.len()));
+    let label = format!("{} has the name already", first.name);
+    problems.add(
+        Diagnostic::new(code, line, title, label)
+            .hint("give one of the two files another name; in reports it is all they are known by"),
     );
 }
 

@@ -265,6 +265,41 @@ fn files_that_are_no_suites_and_ids_that_are_taken_are_told() {
 }
 
 #[test]
+fn a_test_and_a_monitor_do_not_share_a_name() {
+    for name in ["connection/last-will-and-return", "order/malformed"] {
+        let mut files = good();
+        let text = files["suites/monitors/map/enabled-once.yaml"].replace("map/enabled-once", name);
+        files.insert(format!("suites/monitors/{name}.yaml"), text);
+        let problems = World::new().load(&files).err().unwrap_or_default();
+        let [problem] = problems.as_slice() else {
+            panic!("{}", rendered(&problems))
+        };
+        let text = problem.to_string();
+        assert_eq!(problem.code, "monitor-named-as-test");
+        assert!(text.contains(&format!("suites/monitors/{name}.yaml:1:1")), "{text}");
+        assert!(text.contains(&format!("suites/agv/{name}.yaml")), "{text}");
+        assert!(problem.hint.is_some());
+    }
+}
+
+#[test]
+fn two_monitors_do_not_share_a_name() {
+    let files = good();
+    let twice = files.iter().filter(|(path, _)| path.contains("map/enabled-once"));
+    let files = files
+        .iter()
+        .chain(twice)
+        .map(|(path, text)| (path.as_str(), text.as_str()));
+    let world = World::new();
+    let vocabulary = PackVocabulary::new(&world.packs, &world.catalogue, &HOOKS);
+    let problems = Suites::load_files(files, &vocabulary, &CHECKS)
+        .err()
+        .unwrap_or_default();
+    let codes: Vec<_> = problems.iter().map(|problem| problem.code).collect();
+    assert_eq!(codes, ["duplicate-monitor"]);
+}
+
+#[test]
 fn a_mistake_in_a_state_is_told_once_however_often_it_is_used() {
     let mut files = good();
     let path = "suites/states/idle.yaml";

@@ -202,6 +202,10 @@ impl Actions {
 
     /// A node was traversed, or an edge entered: its actions are triggered.
     pub(super) fn trigger(&mut self, origin: Origin, faults: Faults) {
+        if faults.has(F::EdgeListCut) && matches!(origin, Origin::Edge(_)) {
+            let of_edge = self.all.iter_mut().filter(|action| action.origin == origin);
+            of_edge.skip(1).for_each(|action| action.end(Status::Failed));
+        }
         let mut phases: VecDeque<Vec<String>> = VecDeque::new();
         let mut parallel = Vec::new();
         let waiting = |action: &&Action| action.origin == origin && action.status == Status::Waiting;
@@ -288,10 +292,16 @@ impl Actions {
     }
 
     /// The vehicle leaves the edge: its actions end (NODE-05).
-    pub(super) fn leave_edge(&mut self, sequence_id: u32) {
+    pub(super) fn leave_edge(&mut self, sequence_id: u32, faults: Faults) {
         let origin = Origin::Edge(sequence_id);
         self.lists.retain(|list| list.origin != origin);
-        for action in self.all.iter_mut().filter(|action| action.origin == origin) {
+        let ended = if faults.has(F::LastEdgeActionOutlivesEdge) {
+            1
+        } else {
+            usize::MAX
+        };
+        let of_edge = self.all.iter_mut().filter(|action| action.origin == origin);
+        for action in of_edge.take(ended) {
             match action.status {
                 Status::Waiting => action.end(Status::Failed),
                 status if status.is_active() => action.end(Status::Finished),

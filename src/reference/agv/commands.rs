@@ -26,6 +26,7 @@ pub const COMMANDS: &[&str] = &[
     "place-on",
     "move-to",
     "push-out",
+    "shift-position",
     "place-obstacle",
     "remove-obstacle",
     "drive-manually",
@@ -37,6 +38,8 @@ pub const COMMANDS: &[&str] = &[
     "release-pause",
     "block-pause",
     "unblock-pause",
+    "lock-charger",
+    "unlock-charger",
     "use-lift",
     "enable-map",
     "enter-field",
@@ -91,7 +94,8 @@ impl Agv {
             "place-on" => self.place_on(text("nodeId")),
             "move-to" if arguments.get("nodeId").is_some() => self.place_on(text("nodeId")),
             "move-to" => self.move_to(arguments),
-            "push-out" => self.push_out(),
+            // To the vehicle it is the same whether it was moved or only its idea of where it is.
+            "push-out" | "shift-position" => self.push_out(),
             "place-obstacle" if self.obstacles.len() < MAX_OBSTACLES => {
                 self.obstacles.insert(text("edgeId").to_owned());
             }
@@ -110,6 +114,8 @@ impl Agv {
             "release-pause" => self.set_holds(|holds| holds.button = false),
             "block-pause" => self.pause_blocked = true,
             "unblock-pause" => self.pause_blocked = false,
+            "lock-charger" => self.charger_locked = true,
+            "unlock-charger" => self.charger_locked = false,
             "enter-field" => self.set_holds(|holds| holds.field = true),
             "leave-field" => self.set_holds(|holds| holds.field = false),
             "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
@@ -180,9 +186,14 @@ impl Agv {
         let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
         let keeps = leaves || self.faults.has(F::ManualKeepsOrder);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
+            let given_up = self.book.clone();
             self.give_up_order();
+            self.remembered = Some(given_up).filter(|_| self.faults.has(F::OrderTakenUpAgain));
         }
         self.mode = mode;
+        if let Some(order) = self.remembered.take_if(|_| mode.takes_orders()) {
+            self.book = order;
+        }
     }
 
     fn is_occupied(&self) -> bool {
@@ -228,6 +239,7 @@ impl Agv {
 
     /// A short way ahead, by hand.
     fn drive_manually(&mut self) {
+        self.locked = self.faults.has(F::ManualLocks);
         let pose = self.motion.pose(self.moment());
         let (x, y) = (pose.x + pose.theta.cos() / 2.0, pose.y + pose.theta.sin() / 2.0);
         self.move_to(&json!({ "x": x, "y": y }));

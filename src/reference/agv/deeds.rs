@@ -208,10 +208,7 @@ impl Agv {
             Deed::StartPause => self.start_pause(action),
             Deed::StopPause => self.stop_pause(action),
             Deed::StartCharging => self.start_charging(action).into(),
-            Deed::StopCharging => {
-                self.stop_charging();
-                Outcome::Done(None)
-            }
+            Deed::StopCharging => self.stop_charging(action).into(),
             Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
                 let result = self
@@ -308,11 +305,22 @@ impl Agv {
         }
     }
 
-    fn stop_charging(&mut self) {
+    /// What does not charge has nothing to end (ACT-11); what cannot be ended has failed (ACT-20).
+    fn stop_charging(&mut self, action: &Action) -> Result<(), Problem> {
+        if self.charging && self.charger_locked {
+            if self.faults.has(F::ChargingEndFailureFinished) {
+                return Ok(());
+            }
+            self.charging = !self.faults.has(F::ChargingEndShownAnyway);
+            let problem = Problem::new(Area::Charging, action, "the vehicle cannot leave the charger");
+            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+        }
         if self.charging && self.faults.has(F::ChargingEndsEarly) {
             self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
         }
-        self.charging &= self.faults.has(F::ChargingEndUnreported);
+        let toggled = !self.charging && self.faults.has(F::ChargingEndToggled);
+        self.charging = toggled || self.charging && self.faults.has(F::ChargingEndUnreported);
+        Ok(())
     }
 
     /// The charger is at a node: there is none where the vehicle drives (ACT-20).
@@ -321,11 +329,15 @@ impl Agv {
             if self.faults.has(F::ChargingFailureFinished) {
                 return Ok(());
             }
-            self.charging = self.faults.has(F::ChargingShownAnyway);
+            self.charging |= self.faults.has(F::ChargingShownAnyway);
             let problem = Problem::new(Area::Charging, action, "the vehicle is not at a charger");
             return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
         }
-        self.charging = !self.faults.has(F::ChargingUnreported);
+        if self.charging && self.faults.has(F::ChargingTwiceFails) {
+            return Err(Problem::new(Area::Charging, action, "the vehicle charges already"));
+        }
+        let toggled = self.charging && self.faults.has(F::ChargingToggled);
+        self.charging = !toggled && !self.faults.has(F::ChargingUnreported);
         Ok(())
     }
 

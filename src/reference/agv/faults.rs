@@ -204,6 +204,7 @@ faults! {
     CorridorOverrun "corridor-overrun" ["CORR-01", "CORR-03"] "Drives round an obstacle as if its corridor were twice as wide.";
     CorridorContourIgnored "corridor-contour-ignored" ["CORR-03", "CORR-01"] "Keeps only its centre inside a corridor that is meant for its contour.";
     CorridorExitDrivenOn "corridor-exit-driven-on" ["CORR-06"] "Drives on when it finds itself outside its corridor.";
+    CorridorExitForgotten "corridor-exit-forgotten" ["CORR-06"] "Stops for a moment when it finds itself outside its corridor, and drives on.";
     CorridorExitSilent "corridor-exit-silent" ["CORR-07"] "Stops outside its corridor and does not say why.";
     PlannedPathMissing "planned-path-missing" ["STATE-14"] "Plans its path and does not report it.";
     PlannedPathOfBaseOnly "planned-path-of-base-only" ["STATE-14"] "Reports the path it planned for the base only.";
@@ -258,6 +259,10 @@ faults! {
     FieldDoesNotPause "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated.";
     FieldPauseStuck "field-pause-stuck" ["ACT-34", "ASTATE-04"] "Does not go on with its actions when its protective field is free again.";
     EdgeActionOutlivesEdge "edge-action-outlives-edge" ["ACT-02", "NODE-05"] "Lets the actions of an edge run on behind its end.";
+    LastEdgeActionOutlivesEdge "last-edge-action-outlives-edge" ["NODE-05", "ACT-02"] "Ends only the first of several actions of an edge when it leaves it.";
+    EdgeListCut "edge-list-cut" ["ACT-01"] "Performs only the first of several actions of an edge, and fails the others.";
+    EdgeActionsUnlisted "edge-actions-unlisted" ["ASTATE-01"] "Lists the actions of an edge only when they begin.";
+    StuckAfterEdgeAction "stuck-after-edge-action" ["BLOCK-07", "ORD-06"] "Does not drive on after a blocking action of an edge.";
     EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
     PauseTwiceFails "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused.";
@@ -272,6 +277,11 @@ faults! {
     ChargingEndUnreported "charging-end-unreported" ["ACT-19"] "Reports that it charges after stopCharging is FINISHED.";
     ChargingEndsEarly "charging-ends-early" ["ACT-22"] "Reports that it does not charge any more while it cannot take orders yet.";
     ChargingFailureFinished "charging-failure-finished" ["ACT-20"] "Reports startCharging FINISHED although there is no charger.";
+    ChargingEndFailureFinished "charging-end-failure-finished" ["ACT-20", "ACT-19"] "Reports stopCharging FINISHED although it cannot leave the charger.";
+    ChargingEndShownAnyway "charging-end-shown-anyway" ["ACT-20"] "Reports that it does not charge any more although stopCharging failed.";
+    ChargingToggled "charging-toggled" ["ACT-11"] "Ends its charging when startCharging comes a second time.";
+    ChargingEndToggled "charging-end-toggled" ["ACT-11"] "Begins to charge again when stopCharging comes a second time.";
+    ChargingTwiceFails "charging-twice-fails" ["ACT-11"] "Fails a startCharging while it charges.";
     ChargingShownAnyway "charging-shown-anyway" ["ACT-20"] "Reports that it charges although startCharging failed.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23", "ACT-24"] "Reports initPosition FINISHED and does nothing.";
     InitPositionUninitialized "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose.";
@@ -389,6 +399,8 @@ faults! {
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
     ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
+    OrderTakenUpAgain "order-taken-up-again" ["MODE-05"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC.";
+    ManualLocks "manual-locks" ["MODE-02"] "Refuses the first order after it was driven by hand.";
     ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";
     SemiautomaticFaster "semiautomatic-faster" ["MODE-03"] "Drives faster in SEMIAUTOMATIC.";
     VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";

@@ -70,6 +70,10 @@ pub const LAPSES: &[(&str, &str)] = &[
     ),
     ("hash-ignored", "It breaks a recommendation only."),
     ("undescribed-status", "It breaks a recommendation only."),
+    (
+        "charging-twice-fails",
+        "Whether charging cannot be started where it is under way is a matter of reading; the ruling of ACT-11 is a warning.",
+    ),
     ("field-does-not-pause", "It breaks a recommendation only."),
     (
         "state-request-unanswered",

@@ -133,7 +133,7 @@ pub struct Agv {
     loads: Vec<Load>,
     /// Edges on which something stands.
     obstacles: BTreeSet<String>,
-    /// It takes no order now (`order-error-locks` only).
+    /// It refuses the next order (`order-error-locks`, `manual-locks` only).
     locked: bool,
     /// It has left its corridor and was not put back yet.
     strayed: bool,
@@ -146,6 +146,10 @@ pub struct Agv {
     undocking: Option<Moment>,
     /// A switch keeps it from pausing and from going on.
     pause_blocked: bool,
+    /// Something keeps it from ending its charging.
+    charger_locked: bool,
+    /// The order it gave up in a mode for people (`order-taken-up-again` only).
+    remembered: Option<Book>,
     /// It has not found its pose (`init-position-uninitialized` only).
     lost: bool,
     /// The map it says it is on (`init-position-taken-anyway` only).
@@ -216,6 +220,8 @@ impl Agv {
             charging: false,
             undocking: None,
             pause_blocked: false,
+            charger_locked: false,
+            remembered: None,
             lost: false,
             claimed_map: None,
             connection: Connection::new(),
@@ -352,7 +358,9 @@ impl Agv {
 
     /// How long an action runs.
     fn duration_of(&self, action: &actions::Action) -> Duration {
-        if self.faults.has(FaultName::EdgeActionOutlivesEdge) && matches!(action.origin, actions::Origin::Edge(_)) {
+        let of_edge = matches!(action.origin, actions::Origin::Edge(_));
+        let all = self.faults.has(FaultName::EdgeActionOutlivesEdge);
+        if of_edge && (all || self.faults.has(FaultName::LastEdgeActionOutlivesEdge)) {
             return Duration::from_secs(60);
         }
         let asked = action
@@ -362,6 +370,10 @@ impl Agv {
             return Duration::from_secs_f64(seconds);
         }
         let by_type = self.config.action_durations.get(&action.request.action_type);
-        by_type.copied().unwrap_or(self.config.action_duration)
+        let duration = by_type.copied().unwrap_or(self.config.action_duration);
+        if self.takes(ToleranceName::ActionsLast) {
+            return duration.max(Duration::from_secs(1));
+        }
+        duration
     }
 }

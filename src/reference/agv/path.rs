@@ -121,18 +121,23 @@ impl Agv {
                 life: Life::WhileOutside,
             });
         }
-        if !self.faults.has(F::CorridorExitDrivenOn) {
+        if self.faults.has(F::CorridorExitForgotten) {
+            self.lingers_until = Some(self.moment() + super::cancel::MOMENT);
+        } else if !self.faults.has(F::CorridorExitDrivenOn) {
             self.set_holds(|holds| holds.outside = true);
         }
         true
     }
 
-    /// Somebody pushed it to its left.
+    /// Somebody pushed it to the left of the way it has before it.
     pub(super) fn push_out(&mut self) {
         let moment = self.moment();
         let mut pose = self.motion.pose(moment);
-        pose.x -= PUSHED * pose.theta.sin();
-        pose.y += PUSHED * pose.theta.cos();
+        let ahead = self.book.nodes.front().map(|stop| &stop.place);
+        let ahead = ahead.filter(|place| pose.distance(place.x, place.y) > ON_PATH);
+        let heading = ahead.map_or(pose.theta, |place| (place.y - pose.y).atan2(place.x - pose.x));
+        pose.x -= PUSHED * heading.sin();
+        pose.y += PUSHED * heading.cos();
         self.motion.place(pose);
     }
 

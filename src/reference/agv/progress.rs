@@ -75,6 +75,7 @@ impl Agv {
         };
         let offline = !self.connection.online && self.faults.has(F::StopsOnLinkLoss);
         let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
+        let stuck = stuck || self.faults.has(F::StuckAfterEdgeAction) && self.blocking_edge_action_ended();
         let warned = self.faults.has(F::WarningBlocks) && !self.errors.is_empty();
         self.mode.takes_orders()
             && !self.persona.halted
@@ -90,6 +91,14 @@ impl Agv {
 
     fn blocking_action_ended(&self) -> bool {
         let here = Origin::Node(self.book.last_sequence);
+        let mut actions = self.actions.iter().filter(|action| action.origin == here);
+        actions.any(|action| action.request.blocking != Blocking::None && action.status.is_terminal())
+    }
+
+    fn blocking_edge_action_ended(&self) -> bool {
+        let Some(here) = self.book.edge_ahead().map(|edge| Origin::Edge(edge.sequence_id)) else {
+            return false;
+        };
         let mut actions = self.actions.iter().filter(|action| action.origin == here);
         actions.any(|action| action.request.blocking != Blocking::None && action.status.is_terminal())
     }
@@ -332,7 +341,7 @@ impl Agv {
             if self.faults.has(F::EdgeActionsLate) {
                 self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
             } else if !self.faults.has(F::EdgeActionOutlivesEdge) {
-                self.actions.leave_edge(edge.sequence_id);
+                self.actions.leave_edge(edge.sequence_id, self.faults);
             }
             self.book.left.1 = Some(edge);
         }

@@ -182,6 +182,9 @@ impl Agv {
         };
         let hidden = (of_horizon && self.faults.has(F::HorizonActionsMissing))
             || (!action.of_order() && self.faults.has(F::InstantActionUnlisted))
+            || (matches!(action.origin, Origin::Edge(_))
+                && action.status == Status::Waiting
+                && self.faults.has(F::EdgeActionsUnlisted))
             || (action.of_order() && self.book.base_end.1 == 0 && self.faults.has(F::SingleNodeActionUnlisted));
         if hidden {
             return None;

@@ -47,7 +47,10 @@ pub(super) fn all() -> Vec<Scenario> {
         (config(), instant_actions),
         (config(), held_by_hand),
         (stations(), at_stations),
+        (config(), charging),
+        (config(), edge_lists),
         (config(), modes),
+        (config(), driven_by_hand),
         (config(), out_of_command),
         (config(), defects),
         (zoned, zones),
@@ -352,6 +355,43 @@ fn at_stations(bench: &mut Bench) {
     let ride = action("initPosition", "i", "HARD", pose);
     bench.order(with(order("o3", 0, 0, "n1"), "/nodes/0/actions/-", ride));
     bench.wait(1.0);
+}
+
+fn charging(bench: &mut Bench) {
+    for (name, id) in [
+        ("startCharging", "s1"),
+        ("startCharging", "s2"),
+        ("stopCharging", "e1"),
+        ("stopCharging", "e2"),
+        ("startCharging", "s3"),
+    ] {
+        bench.instant(name, id, json!({}));
+        bench.wait(1.0);
+    }
+    bench.command("lock-charger", json!({}));
+    bench.instant("stopCharging", "e3", json!({}));
+    bench.wait(1.0);
+    bench.command("unlock-charger", json!({}));
+    bench.instant("stopCharging", "e4", json!({}));
+    bench.wait(1.0);
+}
+
+fn edge_lists(bench: &mut Bench) {
+    let list = json!([beep("a", "SOFT"), beep("b", "HARD")]);
+    bench.order(with(order("o1", 0, 0, "n1 n2"), "/edges/0/actions", list));
+    bench.wait(10.0);
+}
+
+fn driven_by_hand(bench: &mut Bench) {
+    bench.order(order("o1", 0, 0, "n1 n2 n3"));
+    bench.wait(0.5);
+    bench.command("set-mode", json!({ "mode": "MANUAL" }));
+    bench.command("drive-manually", json!({}));
+    bench.command("move-to", json!({ "nodeId": "n1" }));
+    bench.command("set-mode", json!({ "mode": "AUTOMATIC" }));
+    bench.wait(1.0);
+    bench.order(order("o2", 0, 0, "n1 n2"));
+    bench.wait(5.0);
 }
 
 fn modes(bench: &mut Bench) {

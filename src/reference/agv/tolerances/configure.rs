@@ -25,7 +25,6 @@ pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
         T::VisualizationOff => config.visualization_interval = None,
         T::VisualizationOften => config.visualization_interval = Some(Duration::from_millis(50)),
         T::DrivesSlowly => slower(config, 4.0),
-        T::ActionsLast => config.action_duration = config.action_duration.max(Duration::from_secs(1)),
         T::ActionsAtOnce => {
             // What happens at a station takes the time it takes.
             for action in ["pick", "drop", "finePositioning", "detectObject"] {
@@ -51,5 +50,9 @@ fn slower(config: &mut AgvConfig, times: f64) {
         config.speed /= more;
         config.rotation_speed /= more;
         config.action_duration = config.action_duration.mul_f64(more);
+        // Whichever liberty was taken first.
+        for duration in config.action_durations.values_mut() {
+            *duration = duration.mul_f64(more);
+        }
     }
 }

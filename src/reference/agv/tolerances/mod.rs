@@ -138,6 +138,17 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_vehicle_is_slow_at_its_stations_whichever_liberty_came_first() {
+        let taken = |names: [&str; 2]| {
+            let mut config = AgvConfig::default();
+            assert!(names.into_iter().all(|name| config.tolerate(name).is_ok()));
+            config.action_durations["pick"]
+        };
+        let names = ["actions-at-once", "states-coalesced"];
+        assert_eq!(taken(names), taken([names[1], names[0]]));
+    }
+
+    #[test]
     fn an_unknown_one_is_refused_by_name() {
         let mut config = AgvConfig::default();
         assert_eq!(config.tolerate("no-such"), Err(UnknownTolerance("no-such".to_owned())));
