@@ -113,8 +113,8 @@ impl ReferenceMasterControl {
         self.time.drive = Duration::from_secs(3);
         self.time.quiet = Duration::from_millis(300);
         // What the tests let pass so that nobody is accused of what was under way; here nothing is for long.
-        self.time.slow = Duration::from_millis(750);
-        self.time.settle = Duration::from_millis(100);
+        self.time.slow = Duration::from_millis(650);
+        self.time.settle = Duration::from_millis(70);
         self.config.reconnect_delay = Duration::from_millis(100);
         self.config.resend_after = Duration::from_secs(2);
         self.config.trigger_timeout = Duration::from_secs(3);
