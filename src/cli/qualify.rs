@@ -30,9 +30,8 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         None => library.rules.packs.all().to_vec(),
     };
     let whole = arguments.tests.is_empty() && arguments.fault.is_empty();
-    let mut exit = Exit::Conforms;
     let mut refused = None;
-    let mut any = false;
+    let mut jobs = Vec::new();
     for (role, pack) in with_faults
         .iter()
         .flat_map(|role| packs.iter().map(move |pack| (*role, pack)))
@@ -43,15 +42,29 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
             .copied()
             .collect();
         let all = library.tests(role, &pack.id);
-        let tests = match super::select::select(&all, &arguments.tests) {
-            Ok(tests) => tests,
+        match super::select::select(&all, &arguments.tests) {
+            Ok(tests) => jobs.push((role, pack, tests, faults)),
             Err(problem) => {
                 refused.get_or_insert(problem);
-                continue;
             }
-        };
-        any = true;
-        let outcome = qualify_tests(&library, pack, &tests, &faults, &|_| {});
+        }
+    }
+    let any = !jobs.is_empty();
+    let mut exit = Exit::Conforms;
+    // Side by side: while one waits for its last fault, the others go on.
+    let outcomes = std::thread::scope(|scope| {
+        let library = &library;
+        let running: Vec<_> = jobs
+            .iter()
+            .map(|(_, pack, tests, faults)| scope.spawn(|| qualify_tests(library, pack, tests, faults, &|_| {})))
+            .collect();
+        running
+            .into_iter()
+            .map(std::thread::ScopedJoinHandle::join)
+            .collect::<Vec<_>>()
+    });
+    for ((role, pack, _, _), outcome) in jobs.iter().zip(outcomes) {
+        let outcome = outcome.map_err(|_| Problem::Environment("a qualification has broken off".to_owned()))?;
         let outcome = outcome.map_err(|error| Problem::Environment(error.to_string()))?;
         // Faults of what a version does not have cannot show there.
         let newest = pack.id == library.rules.packs.latest().id;
@@ -62,7 +75,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         }
         let text = match arguments.format {
             Format::Text => format!("{role}, VDA 5050 {}\n\n{}\n", pack.version, page(&outcome)),
-            Format::Json => format!("{}\n", data(role, &pack.version.to_string(), &outcome)),
+            Format::Json => format!("{}\n", data(*role, &pack.version.to_string(), &outcome)),
         };
         super::print(&text)?;
     }

@@ -2,7 +2,7 @@
 
 use super::found;
 use super::lane::Place;
-use super::way::{Pose, Way};
+use super::way::{self, Pose};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -26,7 +26,6 @@ const UNLIKE: f64 = 0.9;
 
 #[derive(Default)]
 struct Axes {
-    way: Way,
     /// Where the vehicle was at rest last, by the order and by its own account.
     rested: Option<(Place, Pose)>,
 }
@@ -47,7 +46,7 @@ fn distance(one: (f64, f64), other: (f64, f64)) -> f64 {
 
 impl Running for Axes {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

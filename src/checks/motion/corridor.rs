@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::lane::Lane;
 use super::node_tolerance::margin;
-use super::way::{Pose, Way};
+use super::way::{self, Pose};
 use super::{found, softly};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -56,16 +56,12 @@ enum Point {
 }
 
 struct Boundaries {
-    way: Way,
     point: Point,
 }
 
 impl Boundaries {
     fn of(point: Point) -> Self {
-        Self {
-            way: Way::default(),
-            point,
-        }
+        Self { point }
     }
 }
 
@@ -88,7 +84,7 @@ fn lateral(lane: &Lane, pose: &Pose) -> Option<(f64, f64)> {
 
 impl Running for Boundaries {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;
@@ -118,13 +114,11 @@ impl Running for Boundaries {
 }
 
 #[derive(Default)]
-struct NextCorridor {
-    way: Way,
-}
+struct NextCorridor {}
 
 impl Running for NextCorridor {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

@@ -1,7 +1,7 @@
 //! `motion/trajectory` and `motion/curve-orientation`: edges that are no straight lines.
 
 use super::lane::apart;
-use super::way::Way;
+use super::way;
 use super::{TURNED, found, softly};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -37,13 +37,11 @@ const ASIDE: f64 = 0.3;
 const RIGHT: f64 = 0.25;
 
 #[derive(Default)]
-struct Trajectory {
-    way: Way,
-}
+struct Trajectory {}
 
 impl Running for Trajectory {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;
@@ -69,13 +67,11 @@ impl Running for Trajectory {
 }
 
 #[derive(Default)]
-struct CurveOrientation {
-    way: Way,
-}
+struct CurveOrientation {}
 
 impl Running for CurveOrientation {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

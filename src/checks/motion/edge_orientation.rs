@@ -1,7 +1,7 @@
 //! `motion/edge-orientation`: the orientation an edge asks for, against the map or against the way.
 
 use super::lane::apart;
-use super::way::Way;
+use super::way;
 use super::{TURNED, found, softly};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -25,13 +25,11 @@ const RIGHT: f64 = 0.2;
 const STEADY: f64 = 0.05;
 
 #[derive(Default)]
-struct EdgeOrientation {
-    way: Way,
-}
+struct EdgeOrientation {}
 
 impl Running for EdgeOrientation {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

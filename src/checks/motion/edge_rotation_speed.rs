@@ -1,7 +1,7 @@
 //! `motion/edge-rotation-speed`: maxRotationSpeed of an edge.
 
 use super::lane::{Lane, apart};
-use super::way::{View, Way};
+use super::way::{self, View};
 use super::{SHARE, found, softly};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -27,7 +27,6 @@ const SLACK: f64 = 0.1;
 
 #[derive(Default)]
 struct EdgeRotationSpeed {
-    way: Way,
     accused: Option<(String, u64)>,
 }
 
@@ -52,7 +51,7 @@ fn owner(lane: &Lane, view: &View) -> Option<Owner> {
 
 impl Running for EdgeRotationSpeed {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

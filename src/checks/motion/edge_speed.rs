@@ -1,6 +1,6 @@
 //! `motion/edge-speed`: maxSpeed of an edge, by the velocity that is reported and by the way that was made.
 
-use super::way::{AT_REST, View, Way};
+use super::way::{self, AT_REST, View};
 use super::{SHARE, found, softly};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -25,7 +25,6 @@ const SLACK: f64 = 0.2;
 
 #[derive(Default)]
 struct EdgeSpeed {
-    way: Way,
     /// The first state on the present edge.
     entered: Option<View>,
     /// A velocity was reported on it that keeps the limit: what positions say against that is a warning, for a
@@ -46,7 +45,7 @@ fn advance(then: &View, now: &View, limit: f64) -> Option<(f64, f64)> {
 
 impl Running for EdgeSpeed {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

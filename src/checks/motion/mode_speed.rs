@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::way::{View, Way};
+use super::way::{self, View};
 use super::{SHARE, found, softly};
 use crate::checks::traffic::text;
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
@@ -49,7 +49,6 @@ type Ends = (String, String, Option<i64>);
 
 #[derive(Default)]
 struct ModeSpeed {
-    way: Way,
     /// The fastest drive in AUTOMATIC, by edge.
     automatic: BTreeMap<Ends, Drive>,
     /// The edge being driven: its first state, its mode, and what was seen since.
@@ -111,7 +110,7 @@ impl ModeSpeed {
 
 impl Running for ModeSpeed {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;
@@ -131,7 +130,7 @@ impl Running for ModeSpeed {
             .as_ref()
             .is_some_and(|(entered, was, _)| now.order == entered.order && *was == mode);
         let alike = context.with.get("alike") == Some(&serde_json::Value::Bool(true));
-        let judged = went_on && self.driven(&now, alike, findings);
+        let judged = went_on && self.driven(now, alike, findings);
         let drive = Drive {
             reported: now.velocity.speed(),
             took: None,

@@ -2,7 +2,7 @@
 
 use super::lane::apart;
 use super::node_tolerance::margin;
-use super::way::Way;
+use super::way;
 use super::{TURNED, found, softly};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -26,13 +26,11 @@ const USUAL: f64 = 0.1;
 const SLACK: f64 = 0.02;
 
 #[derive(Default)]
-struct NodeTheta {
-    way: Way,
-}
+struct NodeTheta {}
 
 impl Running for NodeTheta {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

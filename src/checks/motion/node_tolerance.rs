@@ -1,7 +1,7 @@
 //! `motion/node-tolerance`: where the vehicle is when it reports a node traversed.
 
 use super::softly;
-use super::way::{View, Way};
+use super::way::{self, View};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -18,7 +18,6 @@ pub(in crate::checks) const NODE_TOLERANCE: Check = Check {
     start: |context| {
         let stated = context.with.get("tolerance").and_then(serde_json::Value::as_f64);
         Box::new(NodeTolerance {
-            way: Way::default(),
             usual: stated.unwrap_or(0.1),
         })
     },
@@ -30,7 +29,6 @@ const SLACK: f64 = 0.05;
 const LATE: f64 = 0.2;
 
 struct NodeTolerance {
-    way: Way,
     /// Tolerance of the vendor, in metres.
     usual: f64,
 }
@@ -51,7 +49,7 @@ pub(super) fn margin(now: &View, before: &View, speed: impl Fn(&View) -> Option<
 
 impl Running for NodeTolerance {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

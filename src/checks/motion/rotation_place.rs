@@ -1,7 +1,7 @@
 //! `motion/rotation-place`: no turning on an edge that forbids rotation.
 
 use super::lane::apart;
-use super::way::{View, Way};
+use super::way::{self, View};
 use super::{TURNED, found};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -19,14 +19,13 @@ pub(in crate::checks) const ROTATION_PLACE: Check = Check {
 
 #[derive(Default)]
 struct RotationPlace {
-    way: Way,
     /// The first state on the present edge alone.
     first: Option<View>,
 }
 
 impl Running for RotationPlace {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

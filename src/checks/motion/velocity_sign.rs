@@ -2,7 +2,7 @@
 
 use super::found;
 use super::lane::apart;
-use super::way::{View, Way};
+use super::way::{self, View};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -24,7 +24,6 @@ const MOVING: f64 = 0.05;
 
 #[derive(Default)]
 struct VelocitySign {
-    way: Way,
     /// Where the way began that is looked at: some states before, where they come faster than the vehicle moves.
     start: Option<View>,
     suspicious: bool,
@@ -32,7 +31,7 @@ struct VelocitySign {
 
 impl Running for VelocitySign {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = self.way.step(entry, context) else {
+        let Some(step) = way::step(entry, context) else {
             return false;
         };
         let now = &step.now;

@@ -140,16 +140,10 @@ impl Plan {
     }
 }
 
-/// Follows the vehicle over its orders. All checks that look at the same entries look over the same shoulder, so that
-/// each state is read once for all of them.
-#[derive(Default)]
-pub(super) struct Way;
-
-impl Way {
-    /// What a state shows, if the vehicle can be held to its order.
-    pub fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Arc<Step>> {
-        context.shared.walked.borrow_mut().step(entry, context)
-    }
+/// What a state shows, if the vehicle can be held to its order. All checks that look at the same entries look over the
+/// same shoulder, so that each state is read once for all of them.
+pub(super) fn step(entry: &Entry, context: &CheckContext<'_>) -> Option<Arc<Step>> {
+    context.shared.walked.borrow_mut().step(entry, context)
 }
 
 /// The way as far as it was followed, and what the newest entry showed.

@@ -88,12 +88,9 @@ impl Site {
             if action_id.is_empty() {
                 continue;
             }
-            match ended(vehicle, &action_id) {
-                // Not asked again on its own, even if the vehicle says it is done and shows no map.
-                Some(_) => {
-                    vehicle.enabling.insert(map_id, String::new());
-                }
-                None => {}
+            // Not asked again on its own, even if the vehicle says it is done and shows no map.
+            if ended(vehicle, &action_id).is_some() {
+                vehicle.enabling.insert(map_id, String::new());
             }
         }
     }
