@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::{Semaphore, mpsc};
 
 use super::LinkError;
+use super::heard::Heard;
 use crate::clock::WallClock;
 use crate::journal::event::{Direction, Event, Occurrence, Packet, Source};
 
@@ -36,6 +37,7 @@ pub struct Reporter {
     room: Arc<Semaphore>,
     /// Held while an occurrence is stamped and put in, so that the order of stamps is the order of the inbox.
     turn: Arc<Mutex<()>>,
+    heard: Arc<Heard>,
 }
 
 /// An inbox and the way into it.
@@ -47,6 +49,7 @@ pub(crate) fn inbox(clock: WallClock) -> (Reporter, Inbox) {
         items: sender,
         room: room.clone(),
         turn: Arc::default(),
+        heard: Arc::default(),
     };
     (reporter, Inbox { items, room })
 }
@@ -67,6 +70,9 @@ impl Reporter {
         };
         permit.forget();
         let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Event::Message { topic, payload, .. } = &event {
+            self.heard.note(topic, payload.bytes());
+        }
         let occurrence = Occurrence {
             at: self.clock.now(),
             source,
@@ -74,6 +80,11 @@ impl Reporter {
             event,
         };
         let _ = self.items.send((cost, Item::Seen(Box::new(occurrence))));
+    }
+
+    /// Waits until this message, which a device of the harness got, has been reported.
+    pub async fn has_heard(&self, topic: &str, payload: &[u8]) {
+        self.heard.wait(topic, payload).await;
     }
 
     /// Reports that the link is broken. Never waits.

@@ -4,6 +4,7 @@
 //! server), `memory` an in-process bus with MQTT's retain, will and QoS rules in virtual time. A link
 //! reports everything as journal occurrences and judges nothing.
 
+mod heard;
 pub(crate) mod inbox;
 pub mod memory;
 pub mod mqtt;

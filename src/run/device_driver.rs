@@ -167,7 +167,12 @@ impl<D: Device> Driver<D> {
                 self.established = true;
                 self.give(Input::Connected).await;
             }
-            ClientEvent::Message { topic, payload, .. } => self.give(Input::Message { topic, payload }).await,
+            ClientEvent::Message { topic, payload, .. } => {
+                if let Some(reporter) = &self.sent {
+                    reporter.has_heard(&topic, &payload).await;
+                }
+                self.give(Input::Message { topic, payload }).await;
+            }
             ClientEvent::Lost(reason) => {
                 tracing::debug!(client = self.client_id, reason, "a device lost its connection");
                 self.connection = None;

@@ -5,6 +5,7 @@
 
 pub mod client;
 pub mod endpoint;
+mod fresh;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -380,7 +381,7 @@ impl Link for MqttLink {
         let (endpoint, reporter) = (self.endpoint.clone(), self.reporter.clone());
         while self.tasks.try_join_next().is_some() {}
         self.tasks.spawn(async move {
-            let served = timeout(ANSWER_LIMIT, serve_fresh(request, &options, end, &reporter)).await;
+            let served = timeout(ANSWER_LIMIT, fresh::look(request, &options, end, &reporter)).await;
             if let Err(reason) = served.unwrap_or_else(|_| Err("it does not serve a fresh subscriber".to_owned())) {
                 reporter.broken(endpoint.lost(reason));
             }
@@ -403,50 +404,4 @@ impl Link for MqttLink {
     async fn serve(&mut self, offer: Offer) -> Result<String, LinkError> {
         Ok(self.maps.offer(offer))
     }
-}
-
-/// Subscribes with a new client and reports what comes. A message of its own, sent after the subscription was
-/// granted, comes back behind everything the broker had stored.
-async fn serve_fresh(request: u64, options: &ClientOptions, end: String, reporter: &Reporter) -> Result<(), String> {
-    let (client, mut events) = Client::open(options);
-    loop {
-        match events.recv().await {
-            Some(ClientEvent::Connected) => {
-                let marker = Outgoing {
-                    topic: end.clone(),
-                    payload: bytes::Bytes::new(),
-                    qos: 1,
-                    retain: false,
-                };
-                if !client.publish(marker) {
-                    return Err("a fresh subscriber lost its connection".to_owned());
-                }
-            }
-            Some(ClientEvent::Message { topic, .. }) if topic == end => break,
-            Some(ClientEvent::Message {
-                topic,
-                payload,
-                qos,
-                retain,
-                ..
-            }) => {
-                let payload = Payload::keep(payload);
-                let event = Event::Retained {
-                    request,
-                    topic,
-                    qos,
-                    retain,
-                    payload,
-                };
-                reporter.report(Source::Link, Some(Direction::FromDevice), event).await;
-            }
-            Some(ClientEvent::Lost(reason)) => return Err(reason),
-            None => return Err("a fresh subscriber lost its connection".to_owned()),
-        }
-    }
-    reporter
-        .report(Source::Link, None, Event::RetainedEnd { request })
-        .await;
-    client.disconnect().await;
-    Ok(())
 }

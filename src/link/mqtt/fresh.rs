@@ -1,0 +1,79 @@
+//! A new client that looks what the broker has stored.
+
+use std::time::Duration;
+
+use super::client::{Client, ClientEvent, ClientOptions};
+use crate::journal::event::{Direction, Event, Payload, Source};
+use crate::link::Outgoing;
+use crate::link::inbox::Reporter;
+
+/// So often a new client looks before it says that nothing is stored.
+const LOOKS: u32 = 3;
+/// So long it leaves the broker between two looks.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
+
+/// Looks with a new client what the broker has stored, and reports it. A broker that is just replacing a stored message
+/// by another one may have none for a moment, and no event tells when it is done: nothing is nothing only when it is
+/// nothing again.
+pub(super) async fn look(
+    request: u64,
+    options: &ClientOptions,
+    end: String,
+    reporter: &Reporter,
+) -> Result<(), String> {
+    for look in 1..=LOOKS {
+        if look_once(request, options, &end, reporter).await? || look == LOOKS {
+            break;
+        }
+        tokio::time::sleep(BETWEEN_LOOKS).await;
+    }
+    reporter
+        .report(Source::Link, None, Event::RetainedEnd { request })
+        .await;
+    Ok(())
+}
+
+/// Subscribes with a new client and reports what comes; says whether anything came. A message of its own, sent after
+/// the subscription was granted, comes back behind everything the broker had stored.
+async fn look_once(request: u64, options: &ClientOptions, end: &str, reporter: &Reporter) -> Result<bool, String> {
+    let mut any = false;
+    let (client, mut events) = Client::open(options);
+    loop {
+        match events.recv().await {
+            Some(ClientEvent::Connected) => {
+                let marker = Outgoing {
+                    topic: end.to_owned(),
+                    payload: bytes::Bytes::new(),
+                    qos: 1,
+                    retain: false,
+                };
+                if !client.publish(marker) {
+                    return Err("a fresh subscriber lost its connection".to_owned());
+                }
+            }
+            Some(ClientEvent::Message { topic, .. }) if topic == end => break,
+            Some(ClientEvent::Message {
+                topic,
+                payload,
+                qos,
+                retain,
+                ..
+            }) => {
+                any = true;
+                let payload = Payload::keep(payload);
+                let event = Event::Retained {
+                    request,
+                    topic,
+                    qos,
+                    retain,
+                    payload,
+                };
+                reporter.report(Source::Link, Some(Direction::FromDevice), event).await;
+            }
+            Some(ClientEvent::Lost(reason)) => return Err(reason),
+            None => return Err("a fresh subscriber lost its connection".to_owned()),
+        }
+    }
+    client.disconnect().await;
+    Ok(any)
+}
