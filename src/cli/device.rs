@@ -70,6 +70,10 @@ pub(super) fn tolerate(device: &mut BuiltIn, tolerances: &[String]) -> Result<()
 /// What the profile states, and what follows from the actions it names.
 pub(super) fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
     let mut all = device.statements.clone();
+    if device.role == Role::MasterControl {
+        // As most of them do; what is not seen then is inconclusive.
+        all.entry("extends-base".to_owned()).or_insert(true);
+    }
     for kind in SAMPLE_ACTIONS.iter().filter(|kind| kind.place == Place::Anywhere) {
         all.insert(kind.name.to_owned(), device.sample_actions.0.contains_key(kind.name));
     }

