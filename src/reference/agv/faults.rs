@@ -27,7 +27,7 @@ faults! {
     FactsheetQosTwo "factsheet-qos-2" ["MQTT-07"] "Publishes the factsheet with QoS 2.";
     ConnectionQosZero "connection-qos-0" ["MQTT-08"] "Publishes the connection topic with QoS 0.";
     NeverReconnects "never-reconnects" ["MQTT-10", "STATE-02"] "Does not connect again after a broken link.";
-    NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10"] "Sends the terminating zero byte of its string with every periodic state.";
+    NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10", "STATE-02"] "Sends the terminating zero byte of its string with every periodic state.";
     MisspelledTopic "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore.";
     OtherSerialNumber "other-serial-number" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
     NoFactsheet "no-factsheet" ["TOPIC-11", "ACT-40"] "Never publishes a factsheet.";
@@ -53,13 +53,13 @@ faults! {
     VersionShort "version-short" ["HDR-04"] "Gives the protocol version without the patch number.";
     FieldMisspelled "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore.";
     ModeLowerCase "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case.";
-    LatinOneText "latin-1-text" ["JSON-03"] "Encodes the text of its periodic states in Latin-1.";
+    LatinOneText "latin-1-text" ["JSON-03", "STATE-02"] "Encodes the text of its periodic states in Latin-1.";
     BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15", "ACT-19"] "Sends charging as a word in quotes.";
-    NanVelocity "nan-velocity" ["JSON-08", "MQTT-02"] "Writes NaN as turning speed into its periodic states.";
+    NanVelocity "nan-velocity" ["JSON-08", "MQTT-02", "STATE-02"] "Writes NaN as turning speed into its periodic states.";
     NanAsText "nan-as-text" ["JSON-08", "STATE-MSG-05"] "Writes the word NaN as turning speed into its periodic states.";
     ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15", "JSON-06"] "Estimates its reach in fractions of a metre.";
     DuplicateKey "duplicate-key" ["JSON-10"] "Repeats the key driving in its periodic states, with another value.";
-    IdWithSpace "id-with-space" ["JSON-04"] "Reports the id of its map with a space.";
+    IdWithSpace "id-with-space" ["JSON-04", "ORD-CANCEL-15"] "Reports the id of its map with a space.";
 
     // Connection
     NoWill "no-will" ["CONN-01", "CONN-02", "CONN-03"] "Connects without a last will.";
@@ -192,7 +192,7 @@ faults! {
     MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
     TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there.";
     AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
-    DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05"] "Reports its orientation in degrees.";
+    DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05", "ORD-CANCEL-15"] "Reports its orientation in degrees.";
     VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 
     TurnsOnEdge "turns-on-edge" ["ORD-MSG-24", "ORD-MSG-12"] "Turns to the orientation of an edge when it is on it already.";
@@ -218,7 +218,7 @@ faults! {
     // Maps
     MapListedTwice "map-listed-twice" ["MAP-07"] "Lists the map it uses twice.";
     UnknownMapAccepted "unknown-map-accepted" ["MAP-08"] "Accepts orders on maps it does not have.";
-    PositionMapStale "position-map-stale" ["MAP-11"] "Names a map in its position that is not on board.";
+    PositionMapStale "position-map-stale" ["MAP-11", "ORD-CANCEL-15"] "Names a map in its position that is not on board.";
     MapStatusMisspelled "map-status-misspelled" ["MAP-12", "MAP-24"] "Says ACTIVE where ENABLED is meant.";
     DisabledMapUsed "disabled-map-used" ["MAP-13"] "Drives on maps that are disabled.";
     MapsReportedEmpty "maps-reported-empty" ["MAP-15", "MAP-20"] "Reports no maps although it drives on one.";
@@ -306,7 +306,7 @@ faults! {
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
-    InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09"] "Performs instant actions without an action state.";
+    InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09", "ORD-CANCEL-18"] "Performs instant actions without an action state.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
     UnknownInstantFinished "unknown-instant-finished" ["IACT-06"] "Reports an instant action it does not know as FINISHED.";
@@ -336,7 +336,7 @@ faults! {
     OrderIdForgottenOnRequest "order-id-forgotten-on-request" ["STATE-MSG-02", "STATE-13"] "Answers a stateRequest without its orderId.";
     LastNodeUnknownOnRequest "last-node-unknown-on-request" ["STATE-MSG-04"] "Answers a stateRequest without its last node.";
     RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
-    PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06"] "Reports its coordinates as strings.";
+    PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06", "ORD-CANCEL-15"] "Reports its coordinates as strings.";
     LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
     DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";

@@ -117,7 +117,6 @@ faults! {
     StitchingMissing "stitching-missing" ["ORD-UPD-05"] "Begins updates with the first new node.";
     StitchingMoved "stitching-moved" ["ORD-UPD-06"] "Rounds the position of the stitching node to decimetres, and shifts it.";
     StitchingActionAdded "stitching-action-added" ["ORD-UPD-06"] "Adds an action to the stitching node.";
-    StitchingActionsDropped "stitching-actions-dropped" ["ORD-UPD-06"] "Leaves the actions of the stitching node out.";
     SequenceFromOne "sequence-from-one" ["ORD-UPD-11"] "Numbers nodes and edges from 1.";
     SequencePerKind "sequence-per-kind" ["ORD-UPD-11"] "Numbers nodes and edges separately.";
     SequenceRestarts "sequence-restarts" ["ORD-UPD-12", "ORD-UPD-05"] "Numbers nodes and edges from 0 again in every update.";

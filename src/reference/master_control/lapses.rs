@@ -29,10 +29,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     ),
     ("base-extended-late", "It breaks a recommendation only."),
     ("new-base-request-ignored", "It breaks a recommendation only."),
-    (
-        "stitching-actions-dropped",
-        "An empty list of actions on the stitching node is a warning by the ruling of ORD-UPD-06.",
-    ),
     ("map-not-preloaded", "It breaks a recommendation only."),
     (
         "orders-to-offline",

@@ -142,9 +142,6 @@ fn stitching(faults: Faults, message: &mut Value) {
         {
             *x = json!(x.as_f64().unwrap_or_default() + 0.3);
         }
-        if faults.has(F::StitchingActionsDropped) {
-            node["actions"] = json!([]);
-        }
         if faults.has(F::StitchingActionAdded)
             && let Some(actions) = node["actions"].as_array_mut()
         {
