@@ -23,7 +23,7 @@ fn suites_below(folder: &Path, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries {
         let path = entry.expect("entry").path();
-        if path.is_dir() && !path.ends_with("suites/requirements") {
+        if path.is_dir() && !path.ends_with("suites/requirements") && !path.ends_with("suites/qualification") {
             suites_below(&path, found);
         } else if path.extension().is_some_and(|extension| extension == "yaml") {
             found.push(path);

@@ -25,6 +25,7 @@ mod state_actions;
 mod state_battery;
 mod state_bursts;
 mod state_maps;
+mod state_order;
 mod state_paused;
 mod state_period;
 mod state_predefined;
@@ -167,6 +168,7 @@ static REGISTRY: &[Check] = &[
     state_bursts::BURSTS,
     state_actions::TRANSITIONS,
     state_actions::KEPT,
+    state_order::ORDER_KEPT,
     state_predefined::STATUSES,
     state_predefined::RESULTS,
     state_route::REMAINING_ROUTE,

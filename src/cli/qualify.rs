@@ -67,14 +67,14 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         let outcome = outcome.map_err(|_| Problem::Environment("a qualification has broken off".to_owned()))?;
         let outcome = outcome.map_err(|error| Problem::Environment(error.to_string()))?;
         // Faults of what a version does not have cannot show there.
-        let newest = pack.id == library.rules.packs.latest().id;
-        let proven = outcome.blemishes.is_empty()
-            && (!whole || !newest || (outcome.unproven().is_empty() && outcome.missed().is_empty()));
-        if !proven {
+        let complete = whole && pack.id == library.rules.packs.latest().id;
+        let proven =
+            outcome.unexcused().is_empty() && outcome.stale_excuses().is_empty() && outcome.missed().is_empty();
+        if !outcome.blemishes.is_empty() || (complete && !proven) {
             exit = Exit::DoesNotConform;
         }
         let text = match arguments.format {
-            Format::Text => format!("{role}, VDA 5050 {}\n\n{}\n", pack.version, page(&outcome)),
+            Format::Text => format!("{role}, VDA 5050 {}\n\n{}\n", pack.version, page(&outcome, complete)),
             Format::Json => format!("{}\n", data(*role, &pack.version.to_string(), &outcome)),
         };
         super::print(&text)?;
@@ -85,7 +85,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
     }
 }
 
-fn page(outcome: &Qualification) -> String {
+fn page(outcome: &Qualification, complete: bool) -> String {
     use std::fmt::Write as _;
     let mut text = outcome.matrix();
     for (decider, verdict) in &outcome.blemishes {
@@ -93,6 +93,13 @@ fn page(outcome: &Qualification) -> String {
             text,
             "not a pass without a fault: {} {} ({verdict})",
             decider.requirement, decider.place
+        );
+    }
+    for excuse in outcome.stale_excuses().into_iter().filter(|_| complete) {
+        let _ = writeln!(
+            text,
+            "proven after all, so that no reason is needed: {} {}",
+            excuse.requirement, excuse.place
         );
     }
     for kill in outcome.missed() {
@@ -112,8 +119,8 @@ fn data(role: Role, version: &str, outcome: &Qualification) -> serde_json::Value
         json!({ "fault": kill.fault.name, "breaks": kill.fault.breaks, "named": kill.named(), "killed": deciders.collect::<Vec<_>>() })
     });
     let unproven = outcome.unproven();
-    let unproven = unproven
-        .iter()
-        .map(|decider| json!({ "requirement": decider.requirement, "by": decider.place }));
+    let unproven = unproven.iter().map(
+        |decider| json!({ "requirement": decider.requirement, "by": decider.place, "why": outcome.excuse(decider) }),
+    );
     json!({ "role": role.word(), "protocol": version, "deciders": outcome.deciders.len(), "faults": kills.collect::<Vec<_>>(), "unproven": unproven.collect::<Vec<_>>() })
 }

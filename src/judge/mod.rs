@@ -6,6 +6,7 @@
 
 mod decide;
 mod departure;
+mod hidden;
 mod limit;
 mod monitor;
 mod reactions;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use serde_json::Map;
 
 use super::decide::mood;
+use super::hidden::Hidden;
 use super::step::shown_path;
 use super::test::Ground;
 use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
@@ -30,6 +31,8 @@ pub struct MonitorJudge {
     rule: Watching,
     judged: u64,
     findings: Vec<MonitorFinding>,
+    /// The first fail since the running test began: requirement and entry.
+    broken: Option<(String, u64)>,
 }
 
 enum Watching {
@@ -67,6 +70,7 @@ impl MonitorJudge {
             rule,
             judged: 0,
             findings: Vec::new(),
+            broken: None,
         })
     }
 
@@ -100,6 +104,9 @@ impl MonitorJudge {
 
     /// Shows it one entry.
     pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground, shared: &Shared) {
+        if matches!(entry.event(), Event::TestBegun { .. }) {
+            self.broken = None;
+        }
         let mut found = Vec::new();
         match &mut self.rule {
             Watching::Off => {}
@@ -160,6 +167,9 @@ impl MonitorJudge {
             if verdict == Verdict::Pass {
                 continue;
             }
+            if verdict == Verdict::Fail && self.broken.is_none() && !self.monitor.hides.is_empty() {
+                self.broken = Some((id.as_str().to_owned(), finding.seq));
+            }
             let known = self
                 .findings
                 .iter_mut()
@@ -195,6 +205,25 @@ impl MonitorJudge {
             judged: self.judged,
             findings: self.findings.clone(),
         }
+    }
+
+    /// What shows nothing in the running test for what was found in it.
+    pub(super) fn hidden(&self) -> Vec<Hidden> {
+        let Some((requirement, seq)) = &self.broken else {
+            return Vec::new();
+        };
+        let decides = self.monitor.checks.iter();
+        let decides: Vec<String> = decides.map(|binding| binding.requirement.as_str().to_owned()).collect();
+        let members = self.monitor.hides.iter();
+        members
+            .map(|member| Hidden {
+                member: member.clone(),
+                monitor: self.monitor.id.clone(),
+                requirement: requirement.clone(),
+                decides: decides.clone(),
+                seq: *seq,
+            })
+            .collect()
     }
 
     /// The monitor.

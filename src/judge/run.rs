@@ -162,6 +162,9 @@ impl RunJudge {
             _ => {}
         }
         if let Some(current) = &mut self.current {
+            if matches!(entry.event(), Event::TestEnded { .. }) {
+                current.hide(self.watches.hidden());
+            }
             current.observe(entry, subject.as_deref(), &self.timeline, &self.ground);
         }
         if matches!(entry.event(), Event::TestEnded { .. })
@@ -182,7 +185,8 @@ impl RunJudge {
     }
 
     fn break_off(&mut self, why: &str) {
-        if let Some(current) = self.current.take() {
+        if let Some(mut current) = self.current.take() {
+            current.hide(self.watches.hidden());
             self.done.push(current.break_off(self.last.moment, why, &self.ground));
         }
     }

@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 
 use super::decide::decide;
 use super::departure::Departure;
+use super::hidden::{Hidden, take_back};
 use super::step::{Evaluator, Position, Progress, StepOutcome};
 use super::timeline::Timeline;
 use super::window::Scene;
@@ -55,6 +56,7 @@ pub struct TestJudge {
     verdict: Accumulated,
     result: TestResult,
     departure: Departure,
+    hidden: Vec<Hidden>,
     ended: bool,
 }
 
@@ -104,6 +106,7 @@ impl TestJudge {
                 steps: Vec::new(),
             },
             departure: Departure::default(),
+            hidden: Vec::new(),
             ended: false,
         }
     }
@@ -310,14 +313,23 @@ impl TestJudge {
         }
     }
 
+    /// Tells it what shows nothing in this test, before it ends.
+    pub(super) fn hide(&mut self, hidden: Vec<Hidden>) {
+        self.hidden = hidden;
+    }
+
     /// Clauses that were never reached are inconclusive, and a test that decided nothing is an error.
     fn finish(&mut self, at: Moment, ground: &Ground) {
         if std::mem::replace(&mut self.ended, true) {
             return;
         }
         self.result.seconds = at.since(self.begun.1).as_secs_f64();
+        let hidden = take_back(&mut self.result.decisions, &self.result.steps, &self.hidden);
+        let decided = self.result.decisions.iter();
+        self.verdict = decided.map(|decision| decision.verdict).collect();
         let why = match (&self.trouble, &self.preamble, &self.body) {
             (Some(trouble), _, _) => trouble.clone(),
+            (None, Ok(()), _) if hidden.is_some() => hidden.unwrap_or_default(),
             (None, Err(why), _) => why.clone(),
             (None, Ok(()), Err(why)) => format!("an earlier step failed: {why}"),
             (None, Ok(()), Ok(())) => "the test ended before this was judged".to_owned(),

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use super::hidden::Hidden;
 use super::monitor::MonitorJudge;
 use super::test::Ground;
 use super::timeline::Timeline;
@@ -138,6 +139,13 @@ impl Watches {
         for (ground, watch) in &mut self.others {
             watch.finish(end, ground);
         }
+    }
+
+    /// What shows nothing in the running test.
+    pub fn hidden(&self) -> Vec<Hidden> {
+        let others = self.others.iter().flat_map(|(_, watch)| &watch.monitors);
+        let all = self.first.monitors.iter().chain(others);
+        all.flat_map(MonitorJudge::hidden).collect()
     }
 
     /// What was found, monitor by monitor.

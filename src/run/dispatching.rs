@@ -17,6 +17,9 @@ use crate::suite::model::Test;
 /// A vehicle that is no farther from its node, in metres, stands on it.
 const ON_NODE: f64 = 0.05;
 
+/// So many transports left over from a test are let pass before the next one.
+const LEFTOVERS: usize = 3;
+
 impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Waits for the subscriptions of a master control that has connected, and for the first state of the vehicle.
     pub(super) async fn settle_in(&mut self) -> Result<Result<(), String>, EngineError> {
@@ -60,7 +63,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             let reset = Fleet::reset(node.as_deref());
             self.engine.set_vehicle(vehicle, "reset", reset).await?;
         }
-        // The preambles of the tests give the master control the time to see it (state `vehicle-ready`).
+        // Before the next test the master control is given the time to see it.
         self.engine.drain().await
     }
 
@@ -69,6 +72,24 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     pub(super) async fn bring_back(&mut self) -> Result<(), EngineError> {
         self.engine.set_vehicle(0, "reset", Fleet::reset(None)).await?;
         self.be_seen().await
+    }
+
+    /// Gives the master control the time to see where the vehicle stands before a test. What it still has for it, it
+    /// sends then: that is carried out first, so that no test begins where the vehicle will not be.
+    pub(super) async fn let_it_see(&mut self) -> Result<(), EngineError> {
+        // Left to its natural traffic, it may never be without an order.
+        if self.engine.operator.natural_traffic("dispatch").is_some() {
+            return self.be_seen().await;
+        }
+        for _ in 0..LEFTOVERS {
+            let until = self.engine.link.now().moment + self.time("settle");
+            if !self.engine.watch(until, |recorder| !is_idle(recorder.judge())).await? {
+                break;
+            }
+            let until = self.engine.link.now().moment + self.time("drive");
+            self.engine.watch(until, |recorder| is_idle(recorder.judge())).await?;
+        }
+        Ok(())
     }
 
     /// The master control has to see a vehicle that was put somewhere before it is asked for the next transport.

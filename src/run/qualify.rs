@@ -15,6 +15,7 @@ use crate::engine::EngineError;
 use crate::pack::{Pack, Role};
 use crate::reference::Fault;
 use crate::report::result::RunResult;
+use crate::suite::Unproven;
 use crate::suite::model::Test;
 use crate::verdict::Verdict;
 
@@ -74,9 +75,39 @@ pub struct Qualification {
     pub deciders: BTreeSet<Decider>,
     /// One per fault.
     pub kills: Vec<Kill>,
+    /// What no fault is known to fail, with the reasons the suites give.
+    pub excused: Vec<Unproven>,
 }
 
 impl Qualification {
+    /// Why a decider is not proven, where the suites say so.
+    #[must_use]
+    pub fn excuse(&self, decider: &Decider) -> Option<&str> {
+        let excused = self.excused.iter();
+        let mut excused = excused.filter(|one| one.requirement == decider.requirement && one.place == decider.place);
+        excused.next().map(|one| one.why.as_str())
+    }
+
+    /// Deciders that no fault can fail, and for which the suites give no reason.
+    #[must_use]
+    pub fn unexcused(&self) -> Vec<&Decider> {
+        let unproven = self.unproven().into_iter();
+        unproven.filter(|decider| self.excuse(decider).is_none()).collect()
+    }
+
+    /// Reasons that are needed no more: what they excuse is proven, or is not there.
+    #[must_use]
+    pub fn stale_excuses(&self) -> Vec<&Unproven> {
+        let unproven = self.unproven();
+        let excused = self.excused.iter();
+        excused
+            .filter(|one| {
+                let needs = |decider: &&&Decider| decider.requirement == one.requirement && decider.place == one.place;
+                !unproven.iter().any(|decider| needs(&decider))
+            })
+            .collect()
+    }
+
     /// Deciders no fault can fail.
     #[must_use]
     pub fn unproven(&self) -> Vec<&Decider> {
@@ -126,6 +157,8 @@ impl Qualification {
         );
         for decider in unproven {
             let _ = writeln!(text, "  {:<14} {}", decider.requirement, decider.place);
+            let why = self.excuse(decider).unwrap_or("No reason is given.");
+            let _ = writeln!(text, "  {:<14}   {why}", "");
         }
         text
     }
@@ -239,10 +272,12 @@ pub fn qualify_tests(
         );
         prove_the_rest(library, pack, &vehicles, faults, &deciders, &mut kills)?;
     }
+    let excused = library.rules.suites.unproven.iter();
     Ok(Qualification {
         blemishes,
         deciders,
         kills,
+        excused: excused.filter(|one| one.role == role).cloned().collect(),
     })
 }
 

@@ -145,6 +145,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             if gone.is_none() {
                 gone = self.be_there().await?;
             }
+            if gone.is_none() && test.device == Role::MasterControl {
+                self.let_it_see().await?;
+            }
             let ready = match (&gone, &self.halted) {
                 (Some(why), _) => Err(why.clone()),
                 (None, Some(why)) if test.moves => Err(why.clone()),
@@ -196,7 +199,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         );
         let planned = self.setup.tests.iter().zip(&plan.tests);
         let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);
-        let estimate = estimate.of_tests(running.map(|(test, _)| &**test));
+        let running: Vec<&Test> = running.map(|(test, _)| &**test).collect();
+        let mut estimate = estimate.of_tests(running.iter().copied());
+        if self.engine.recorder.judge().role() == Role::MasterControl {
+            estimate += self.time("settle") * u32::try_from(running.len()).unwrap_or(u32::MAX);
+        }
         self.progress.note(&format!(
             "this takes {}, if the device keeps nobody waiting",
             estimate::in_words(estimate)

@@ -8,7 +8,7 @@ use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::model::{CourseNeed, Maturity, Test};
 use super::read::{named, read_monitor, read_test, start};
 use super::steps::StepReader;
-use super::{CheckInfo, Suites};
+use super::{CheckInfo, Suites, unproven};
 use crate::diagnostic::{Diagnostic, Source, Span};
 use crate::pack::Role;
 use crate::yaml::{self, Node};
@@ -63,6 +63,7 @@ pub(super) fn load<'a>(
     let mut states = States::default();
     let mut tests = Vec::new();
     let mut monitors = Vec::new();
+    let mut unproven = Vec::new();
     for (path, text) in files {
         let inner = path.strip_prefix("suites/").unwrap_or(path);
         let Some((folder, rest)) = inner.split_once('/') else {
@@ -78,6 +79,8 @@ pub(super) fn load<'a>(
             ("agv", Some(name)) => tests.push((source, Some(Role::Agv), name.to_owned())),
             ("master-control", Some(name)) => tests.push((source, Some(Role::MasterControl), name.to_owned())),
             ("monitors", Some(name)) => monitors.push((source, name.to_owned())),
+            ("qualification", Some("agv")) => unproven.push((source, Role::Agv)),
+            ("qualification", Some("master-control")) => unproven.push((source, Role::MasterControl)),
             _ => stray(path, &mut problems),
         }
     }
@@ -89,6 +92,11 @@ pub(super) fn load<'a>(
     for (source, name) in &monitors {
         let read = read_monitor(source, Some(name), vocabulary, known, &mut problems);
         suites.monitors.extend(read.map(Arc::new));
+    }
+    for (source, role) in &unproven {
+        suites
+            .unproven
+            .extend(unproven::read(source, *role, vocabulary, &mut problems));
     }
     suites.tests.sort_by(|left, right| left.id.cmp(&right.id));
     suites.monitors.sort_by(|left, right| left.id.cmp(&right.id));
@@ -137,8 +145,9 @@ fn taken_twice(code: &'static str, title: String, second: &Arc<Source>, first: &
 
 fn stray(path: &str, problems: &mut Problems) {
     problems.add(
-        Diagnostic::whole("stray-file", format!("`{path}` is not a suite"))
-            .hint("suites are .yaml files below agv/, master-control/, states/, monitors/ or requirements/"),
+        Diagnostic::whole("stray-file", format!("`{path}` is not a suite")).hint(
+            "suites are .yaml files below agv/, master-control/, states/, monitors/, qualification/ or requirements/",
+        ),
     );
 }
 
@@ -222,6 +231,7 @@ fn lint_state(
     };
     let given = reader.steps(steps, "steps", None);
     let places = HeaderPlaces {
+        hides: Vec::new(),
         start: steps.span.clone(),
         spec: None,
         moves: None,

@@ -17,12 +17,14 @@ mod stimuli;
 mod terms;
 #[cfg(test)]
 mod tests;
+mod unproven;
 mod visit;
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
+pub use unproven::Unproven;
 
 use crate::diagnostic::Diagnostic;
 use crate::pack::{Assets, Catalogue, Packs};
@@ -56,6 +58,8 @@ pub struct Suites {
     pub tests: Vec<Arc<Test>>,
     /// The monitors.
     pub monitors: Vec<Arc<Monitor>>,
+    /// What qualification cannot prove, and why.
+    pub unproven: Vec<Unproven>,
     /// The tests by requirement, once somebody has asked for them.
     deciding: OnceLock<HashMap<String, Vec<Arc<Test>>>>,
 }

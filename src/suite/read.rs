@@ -21,7 +21,8 @@ const TEST_KEYS: &[&str] = &[
     "test", "title", "device", "spec", "needs", "moves", "maturity", "why", "cases", "given", "steps", "finally",
 ];
 const MONITOR_KEYS: &[&str] = &[
-    "monitor", "title", "device", "spec", "needs", "why", "checks", "check", "with", "topic", "always", "when", "never",
+    "monitor", "title", "device", "spec", "needs", "why", "checks", "check", "with", "topic", "always", "when",
+    "never", "hides",
 ];
 const ROLES: [(&str, Role); 2] = [("agv", Role::Agv), ("master-control", Role::MasterControl)];
 
@@ -282,6 +283,7 @@ impl TestReader<'_> {
         test.course = course_need(&test);
         let value_place = |key: &str| fields.get(key, &mut Problems::default()).map(|node| node.span.clone());
         let places = HeaderPlaces {
+            hides: Vec::new(),
             start: at,
             spec: value_place("spec"),
             moves: value_place("moves"),
@@ -320,6 +322,7 @@ pub(super) fn read_monitor(
         );
     }
     let rule = rule(&fields, &at, problems);
+    let hides: Vec<&Node> = fields.list("hides", problems).iter().collect();
     let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
     let monitor = Monitor {
         id: id?,
@@ -330,9 +333,14 @@ pub(super) fn read_monitor(
         checks: bindings,
         why: header.why,
         rule: rule?,
+        hides: hides
+            .iter()
+            .filter_map(|node| text_of(node, problems).map(str::to_owned))
+            .collect(),
         source: Arc::clone(source),
     };
     let places = HeaderPlaces {
+        hides: hides.iter().map(|node| node.span.clone()).collect(),
         spec: fields
             .get("spec", &mut Problems::default())
             .map(|node| node.span.clone()),

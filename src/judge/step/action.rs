@@ -10,6 +10,7 @@ use crate::diagnostic::Span;
 use crate::journal::Entry;
 use crate::judge::limit::Limit;
 use crate::judge::window::Scene;
+use crate::report::result::NearestMiss;
 use crate::suite::model::{ActionWalk, Step, Walk};
 
 /// The topic that reports action states.
@@ -158,6 +159,8 @@ impl Walking {
             .last
             .as_ref()
             .map(|entry| entry.at().moment.since(self.position.base));
+        // It stopped on its way, as opposed to walking another one.
+        let stopped = !self.decided() && cut_short.is_none();
         let (holds, message) = if self.through.done() {
             match arrived.filter(|took| *took > self.limit.soft) {
                 Some(took) => (Holds::Late, format!("walked {walked}, after {}", seconds(took))),
@@ -182,6 +185,12 @@ impl Walking {
         for clause in &mut clauses {
             clause.label = format!("walked {walked}");
             clause.expected = Some(self.verb.through.text.clone());
+            clause.nearest = seq.filter(|_| stopped).map(|seq| NearestMiss {
+                seq,
+                path: "actionStates".to_owned(),
+                found: walked.clone(),
+                expected: self.verb.through.text.clone(),
+            });
         }
         let message_json = self.last.as_ref().and_then(|entry| entry.json());
         let saves = self.verb.save.iter().filter_map(|(name, path)| {

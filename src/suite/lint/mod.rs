@@ -35,6 +35,8 @@ pub(super) struct HeaderPlaces {
     pub(super) moves: Option<Span>,
     /// The entries of `needs`, as many as the model has.
     pub(super) needs: Vec<Span>,
+    /// The entries of `hides` of a monitor.
+    pub(super) hides: Vec<Span>,
     /// Whether all of the file could be read. Otherwise nothing is said about what seems to be missing.
     pub(super) complete: bool,
 }
@@ -121,6 +123,9 @@ pub(super) fn monitor(
     let packs = linter.packs.clone();
     if packs.is_empty() {
         return;
+    }
+    for (member, at) in monitor.hides.iter().zip(&places.hides) {
+        linter.exists_somewhere("state", &[member.as_str()], member, at);
     }
     let required = linter.requirements(&monitor.checks, &packs);
     let scope = Scope::of_monitor(vocabulary);

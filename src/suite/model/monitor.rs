@@ -26,6 +26,9 @@ pub struct Monitor {
     pub why: String,
     /// The rule.
     pub rule: Rule,
+    /// Members of the state that show nothing any more once it has found something: what a test has waited for there
+    /// in vain could not be observed.
+    pub hides: Vec<String>,
     /// The file.
     pub source: Arc<Source>,
 }
