@@ -20,6 +20,9 @@ const ON_NODE: f64 = 0.05;
 /// So many transports left over from a test are let pass before the next one.
 const LEFTOVERS: usize = 3;
 
+/// A master control that acts on a state does so within this part of `time.settle`.
+const AT_ONCE: u32 = 10;
+
 impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Waits for the subscriptions of a master control that has connected, and for the first state of the vehicle.
     pub(super) async fn settle_in(&mut self) -> Result<Result<(), String>, EngineError> {
@@ -63,7 +66,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             let reset = Fleet::reset(node.as_deref());
             self.engine.set_vehicle(vehicle, "reset", reset).await?;
         }
-        // Before the next test the master control is given the time to see it.
+        // The preambles of the tests give the master control the time to see it (state `vehicle-ready`).
         self.engine.drain().await
     }
 
@@ -74,15 +77,16 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         self.be_seen().await
     }
 
-    /// Gives the master control the time to see where the vehicle stands before a test. What it still has for it, it
-    /// sends then: that is carried out first, so that no test begins where the vehicle will not be.
-    pub(super) async fn let_it_see(&mut self) -> Result<(), EngineError> {
+    /// What a master control still has for a vehicle, it sends as soon as it sees it free. That is carried out first,
+    /// so that no test begins where the vehicle will not be. One that takes longer is noticed in the preambles (state
+    /// `vehicle-ready`).
+    pub(super) async fn let_it_finish(&mut self) -> Result<(), EngineError> {
         // Left to its natural traffic, it may never be without an order.
         if self.engine.operator.natural_traffic("dispatch").is_some() {
-            return self.be_seen().await;
+            return Ok(());
         }
         for _ in 0..LEFTOVERS {
-            let until = self.engine.link.now().moment + self.time("settle");
+            let until = self.engine.link.now().moment + self.time("settle") / AT_ONCE;
             if !self.engine.watch(until, |recorder| !is_idle(recorder.judge())).await? {
                 break;
             }

@@ -146,7 +146,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 gone = self.be_there().await?;
             }
             if gone.is_none() && test.device == Role::MasterControl {
-                self.let_it_see().await?;
+                self.let_it_finish().await?;
             }
             let ready = match (&gone, &self.halted) {
                 (Some(why), _) => Err(why.clone()),
@@ -199,11 +199,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         );
         let planned = self.setup.tests.iter().zip(&plan.tests);
         let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);
-        let running: Vec<&Test> = running.map(|(test, _)| &**test).collect();
-        let mut estimate = estimate.of_tests(running.iter().copied());
-        if self.engine.recorder.judge().role() == Role::MasterControl {
-            estimate += self.time("settle") * u32::try_from(running.len()).unwrap_or(u32::MAX);
-        }
+        let estimate = estimate.of_tests(running.map(|(test, _)| &**test));
         self.progress.note(&format!(
             "this takes {}, if the device keeps nobody waiting",
             estimate::in_words(estimate)

@@ -218,7 +218,8 @@ impl Running for Start {
         let is_new = self.orders.insert(id);
         let nodes = in_sequence(order, "nodes");
         let mut judged = false;
-        let begins = number(order, "orderUpdateId").is_none_or(|update| update == 0);
+        // Who knows that the vehicle has nothing to do also knows that an order of another name is a new one.
+        let begins = self.settled || number(order, "orderUpdateId").is_none_or(|update| update == 0);
         if let Some(node) = nodes.first().filter(|_| is_new && begins) {
             // A state may overtake the order it answers.
             let own = text(order, "orderId");

@@ -434,6 +434,21 @@ fn an_order_from_another_place_is_found_and_a_moved_vehicle_is_given_time() {
 }
 
 #[test]
+fn a_first_order_of_a_high_update_is_judged_where_nothing_was_under_way() {
+    let elsewhere = |settled: bool| {
+        let mut trace = begun();
+        trace.with.insert("settled".to_owned(), json!(settled));
+        trace.wait(10.0);
+        let mut order = order("o1", 0, 1, 2, 3);
+        order["orderUpdateId"] = json!(7);
+        trace.commands("order", &order);
+        trace.judge("commands/start").summary()
+    };
+    assert_eq!(elsewhere(true), ["ORD-03"]);
+    assert_eq!(elsewhere(false), Vec::<String>::new());
+}
+
+#[test]
 fn a_vehicle_between_nodes_goes_on_from_there() {
     let begins = |deviation: Option<f64>, from: usize| {
         let mut trace = begun();
