@@ -61,7 +61,9 @@ impl Running for OrderKept {
         if before.0.is_empty() {
             return false;
         }
-        if now.0.is_empty() {
+        // An order that names itself so is a mistake, and taking it over is another one.
+        let named_so = self.sent.back().is_some_and(|last| last.0.is_empty());
+        if now.0.is_empty() && !named_so {
             let text = format!(
                 "orderId was {} and is empty, although no new order came",
                 quote(&before.0)
@@ -123,6 +125,15 @@ mod tests {
             ["STATE-MSG-02"]
         );
         assert_eq!(judge(&[("a", 1, "AUTOMATIC"), ("a", 0, "AUTOMATIC")]), ["STATE-MSG-02"]);
+    }
+
+    #[test]
+    fn an_order_without_a_name_that_was_taken_over_is_another_matter() {
+        let mut trace = Trace::subscriber();
+        trace.state(&shows("a", 0, "AUTOMATIC"));
+        trace.sent("order", &json!({ "orderUpdateId": 0 }));
+        trace.state(&shows("", 0, "AUTOMATIC"));
+        assert!(trace.judge("state/order-kept").findings.is_empty());
     }
 
     #[test]

@@ -83,9 +83,8 @@ impl Qualification {
     /// Why a decider is not proven, where the suites say so.
     #[must_use]
     pub fn excuse(&self, decider: &Decider) -> Option<&str> {
-        let excused = self.excused.iter();
-        let mut excused = excused.filter(|one| one.requirement == decider.requirement && one.place == decider.place);
-        excused.next().map(|one| one.why.as_str())
+        let excuse = self.excused.iter().find(|one| excuses(one, decider));
+        excuse.map(|one| one.why.as_str())
     }
 
     /// Deciders that no fault can fail, and for which the suites give no reason.
@@ -99,13 +98,8 @@ impl Qualification {
     #[must_use]
     pub fn stale_excuses(&self) -> Vec<&Unproven> {
         let unproven = self.unproven();
-        let excused = self.excused.iter();
-        excused
-            .filter(|one| {
-                let needs = |decider: &&&Decider| decider.requirement == one.requirement && decider.place == one.place;
-                !unproven.iter().any(|decider| needs(&decider))
-            })
-            .collect()
+        let stale = |one: &&Unproven| !unproven.iter().any(|decider| excuses(one, decider));
+        self.excused.iter().filter(stale).collect()
     }
 
     /// Deciders no fault can fail.
@@ -162,6 +156,10 @@ impl Qualification {
         }
         text
     }
+}
+
+fn excuses(one: &Unproven, decider: &Decider) -> bool {
+    one.requirement == decider.requirement && one.place == decider.place
 }
 
 /// What was decided in a result, with its verdict.

@@ -38,7 +38,7 @@ pub(in crate::checks) const NEXT_CORRIDOR: Check = Check {
           or released, with 0.05 m for wrong positions and a margin for the way since the state before, but at the end \
           of the base only for 0.2 s of late reports. Not judged on nodes with actions. Always a warning.",
     arguments: &[],
-    start: |_| Box::new(NextCorridor::default()),
+    start: |_| Box::new(NextCorridor),
 };
 
 /// How far a position may be wrong, in metres.
@@ -113,8 +113,7 @@ impl Running for Boundaries {
     }
 }
 
-#[derive(Default)]
-struct NextCorridor {}
+struct NextCorridor;
 
 impl Running for NextCorridor {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {

@@ -14,7 +14,7 @@ pub(in crate::checks) const TRAJECTORY: Check = Check {
           Judged away from the nodes only; a position near the curve proves something only where the curve is more \
           than 0.3 m away from the straight line.",
     arguments: &[],
-    start: |_| Box::new(Trajectory::default()),
+    start: |_| Box::new(Trajectory),
 };
 
 /// `motion/curve-orientation`.
@@ -26,7 +26,7 @@ pub(in crate::checks) const CURVE_ORIENTATION: Check = Check {
           the curve, in the second half of the edge and away from the nodes, where the curve points elsewhere than the \
           straight line, and not if the end node asks for an orientation of its own.",
     arguments: &[],
-    start: |_| Box::new(CurveOrientation::default()),
+    start: |_| Box::new(CurveOrientation),
 };
 
 /// How far beside its curve a vehicle follows it, in metres.
@@ -36,8 +36,7 @@ const ASIDE: f64 = 0.3;
 /// A theta this near is right, in radians.
 const RIGHT: f64 = 0.25;
 
-#[derive(Default)]
-struct Trajectory {}
+struct Trajectory;
 
 impl Running for Trajectory {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
@@ -66,8 +65,7 @@ impl Running for Trajectory {
     }
 }
 
-#[derive(Default)]
-struct CurveOrientation {}
+struct CurveOrientation;
 
 impl Running for CurveOrientation {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {

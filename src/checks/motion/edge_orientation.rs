@@ -16,7 +16,7 @@ pub(in crate::checks) const EDGE_ORIENTATION: Check = Check {
           permits rotation, only in its second half, while the vehicle does not turn, and not if the end node asks \
           for an orientation of its own.",
     arguments: &[],
-    start: |_| Box::new(EdgeOrientation::default()),
+    start: |_| Box::new(EdgeOrientation),
 };
 
 /// A theta this near is right, in radians.
@@ -24,8 +24,7 @@ const RIGHT: f64 = 0.2;
 /// A vehicle that turns slower does not turn, in radians per second, and between two states in radians.
 const STEADY: f64 = 0.05;
 
-#[derive(Default)]
-struct EdgeOrientation {}
+struct EdgeOrientation;
 
 impl Running for EdgeOrientation {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {

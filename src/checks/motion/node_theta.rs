@@ -17,7 +17,7 @@ pub(in crate::checks) const NODE_THETA: Check = Check {
           before, but at the end of the base only for 0.2 s of late reports. Not judged on nodes with actions, \
           which may move the vehicle.",
     arguments: &[],
-    start: |_| Box::new(NodeTheta::default()),
+    start: |_| Box::new(NodeTheta),
 };
 
 /// What vehicles usually reach where nothing is said, in radians.
@@ -25,8 +25,7 @@ const USUAL: f64 = 0.1;
 /// How far an orientation may be wrong, in radians.
 const SLACK: f64 = 0.02;
 
-#[derive(Default)]
-struct NodeTheta {}
+struct NodeTheta;
 
 impl Running for NodeTheta {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {

@@ -331,6 +331,7 @@ faults! {
     NewBaseRequestAlways "new-base-request-always" ["STATE-16"] "Asks for a new base all the time.";
     SafetyStateMissing "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states.";
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02", "ORD-CANCEL-08"] "Empties the orderId when the order is complete.";
+    UpdateIdResetWhenDone "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
     LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
     OrderIdForgottenOnRequest "order-id-forgotten-on-request" ["STATE-MSG-02", "STATE-13"] "Answers a stateRequest without its orderId.";

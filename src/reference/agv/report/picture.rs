@@ -30,7 +30,8 @@ impl Agv {
             set("maps", self.maps.picture(self.faults));
         }
         set("orderId", json!(order_id));
-        set("orderUpdateId", json!(self.book.update_id));
+        let reset = complete && has(F::UpdateIdResetWhenDone);
+        set("orderUpdateId", json!(if reset { 0 } else { self.book.update_id }));
         if let Some(zones) = &self.config.zone_set {
             let invented = has(F::ZoneSetInvented) && self.book.zoned;
             set("zoneSetId", json!(if invented { "factory" } else { zones }));
