@@ -40,7 +40,7 @@ fn files(name: &str, text: &str) -> Vec<(String, String)> {
             "test: bad/user",
             "title: Uses the state",
             "device: agv",
-            "spec: \">=2.0, <4\"",
+            "spec: \">=2.0, <3\"",
             "why: A state is only read where it is used.",
             "given:",
             &format!("  - use: {name}"),

@@ -106,7 +106,7 @@ fn a_wrong_suite_is_2_and_shows_the_place() {
     );
     let folder = own.join("agv/own");
     fs::create_dir_all(&folder).unwrap();
-    let text = "test: own/typo\ntitle: A typo\ndevice: agv\nspec: \">=2.0, <4\"\nwhy: It happens.\nsteps:\n  \
+    let text = "test: own/typo\ntitle: A typo\ndevice: agv\nspec: \">=2.0, <3\"\nwhy: It happens.\nsteps:\n  \
                 - expect: stat\n    checks: [STATE-01]\n    within: 5 s\n";
     fs::write(folder.join("typo.yaml"), text).unwrap();
     bench

@@ -416,7 +416,7 @@ pub fn find(name: &str) -> Option<&'static Fault> {
 
 /// A set of faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Faults([u128; 4]);
+pub(super) struct Faults([u128; 8]);
 
 impl Faults {
     /// The set of the named faults; `Err` with the first unknown name.
@@ -451,6 +451,7 @@ mod tests {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), FAULTS.len());
+        assert!(FAULTS.len() <= 1024, "they are kept in 1024 bits");
     }
 
     #[test]

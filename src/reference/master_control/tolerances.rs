@@ -50,12 +50,12 @@ tolerances! {
 
 /// A set of tolerances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tolerances(u64);
+pub struct Tolerances(u128);
 
 impl Tolerances {
     /// Whether the master control takes this liberty.
     pub(super) fn has(self, tolerance: ToleranceName) -> bool {
-        self.0 & (1 << (tolerance as u64)) != 0
+        self.0 & (1 << (tolerance as u128)) != 0
     }
 }
 
@@ -68,7 +68,7 @@ impl MasterControlConfig {
         let position = TOLERANCES.iter().position(|tolerance| tolerance.name == name);
         let tolerance = position.and_then(|at| ALL.get(at)).copied();
         let tolerance = tolerance.ok_or_else(|| UnknownTolerance(name.to_owned()))?;
-        self.tolerances.0 |= 1 << (tolerance as u64);
+        self.tolerances.0 |= 1 << (tolerance as u128);
         match tolerance {
             ToleranceName::AnswersSlowly => self.answers_after = Duration::from_millis(500),
             ToleranceName::NoHorizon => self.horizon_length = 0,

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{action, all, begun, order, pick};
+use super::{action, all, begun, merged, order, pick};
 
 /// One order, changed.
 fn with(change: impl FnOnce(&mut Value)) -> Vec<String> {

@@ -96,12 +96,12 @@ pub fn find(name: &str) -> Option<&'static Tolerance> {
 
 /// A set of tolerances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tolerances(u64);
+pub struct Tolerances(u128);
 
 impl Tolerances {
     /// Whether the vehicle takes this liberty.
     pub(super) fn has(self, tolerance: ToleranceName) -> bool {
-        self.0 & (1 << (tolerance as u64)) != 0
+        self.0 & (1 << (tolerance as u128)) != 0
     }
 }
 
@@ -114,7 +114,7 @@ impl AgvConfig {
         let position = TOLERANCES.iter().position(|tolerance| tolerance.name == name);
         let tolerance = position.and_then(|at| ALL.get(at)).copied();
         let tolerance = tolerance.ok_or_else(|| UnknownTolerance(name.to_owned()))?;
-        self.tolerances.0 |= 1 << (tolerance as u64);
+        self.tolerances.0 |= 1 << (tolerance as u128);
         configure::configure(self, tolerance);
         Ok(())
     }
