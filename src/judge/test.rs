@@ -17,7 +17,7 @@ use super::timeline::Timeline;
 use super::window::Scene;
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::{Event, StepEnd};
+use crate::journal::event::{Event, StepEnd, Waiver};
 use crate::pack::{Catalogue, Pack, Role};
 use crate::pattern::Bindings;
 use crate::report::result::{StepResult, TestResult, Waited};
@@ -38,6 +38,8 @@ pub struct Ground {
     pub identity: (String, String),
     /// `time`, `device`.
     pub bindings: Arc<Map<String, Value>>,
+    /// Lasting mistakes of the vehicle that do not stand in the way any more.
+    pub waivers: Vec<Waiver>,
 }
 
 /// A test being judged.
@@ -104,6 +106,7 @@ impl TestJudge {
                 journal: Some((seq, seq)),
                 decisions: Vec::new(),
                 steps: Vec::new(),
+                allowances: Vec::new(),
             },
             departure: Departure::default(),
             hidden: Vec::new(),
@@ -191,6 +194,7 @@ impl TestJudge {
             bindings: &self.bindings,
             timeline,
             entries: &self.entries,
+            waivers: &ground.waivers,
         }
     }
 
@@ -240,6 +244,11 @@ impl TestJudge {
         let at = entry.at().moment;
         let outcome = evaluator.end(at, cut_short.as_deref(), &self.scene(timeline, ground));
         self.record_step(&step, &outcome, end, begun, entry);
+        for allowance in &outcome.allowances {
+            if !self.result.allowances.contains(allowance) {
+                self.result.allowances.push(allowance.clone());
+            }
+        }
         if let StepEnd::Broken(why) = end {
             self.broken(section, &step, why);
         }

@@ -166,6 +166,9 @@ pub struct TestResult {
     pub decisions: Vec<Decision>,
     /// The steps as they went.
     pub steps: Vec<StepResult>,
+    /// Lasting mistakes of the device that would have stood in the way, and what else had to be done to get here.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub allowances: Vec<String>,
 }
 
 /// One step of a test.
