@@ -153,6 +153,13 @@ impl Agv {
                 self.actions.push(action);
             }
         }
+        if self.faults.has(F::RejectionDropsHorizon) {
+            self.book.drop_horizon();
+        }
+        if self.faults.has(F::RejectionClearsActionStates) {
+            self.actions
+                .retain(|action| !action.of_order() || !action.status.is_terminal());
+        }
         if self.faults.has(F::RejectionStopsOrder)
             || (rule == Rule::Outdated && self.faults.has(F::OutdatedUpdateDropsOrder))
         {
