@@ -413,7 +413,7 @@ impl RunJudge {
         for test in tests {
             for decision in &test.decisions {
                 let (verdict, by) = decided.entry(decision.requirement.as_str()).or_default();
-                verdict.add(decision.verdict);
+                verdict.add(decision.verdict());
                 if !by.contains(&test.id) {
                     by.push(test.id.clone());
                 }
@@ -478,19 +478,7 @@ impl RunJudge {
 }
 
 fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
-    Decision {
-        requirement: requirement.to_owned(),
-        verdict: Verdict::Inconclusive,
-        clause,
-        place,
-        witness: None,
-        message: why.to_owned(),
-        expected: None,
-        nearest: None,
-        waited: None,
-        explanation: None,
-        interpretation: None,
-    }
+    Decision::new(requirement, Verdict::Inconclusive, clause, place, why.to_owned())
 }
 
 /// Judges a whole journal.
