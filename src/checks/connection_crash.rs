@@ -60,7 +60,11 @@ impl Stays {
         }
         let (what, requirement) = if is_to_vehicle("order", entry, context) {
             let bad = Malformed::is_malformed(entry, context);
-            if bad { ("a malformed order", "ORD-REJ-02") } else { ("an order", "ORD-FLOW-06") }
+            if bad {
+                ("a malformed order", "ORD-REJ-02")
+            } else {
+                ("an order", "ORD-FLOW-06")
+            }
         } else if is_to_vehicle("instantActions", entry, context) {
             ("instantActions", "IACT-03")
         } else {
@@ -71,7 +75,9 @@ impl Stays {
             .unwrap_or_default();
         let actions = to_vehicle("instantActions", entry, context).into_iter();
         let actions = actions.flat_map(|message| elements(message, "actions").take(50));
-        let ids = ids.into_iter().chain(actions.map(|action| text(action, "actionId").to_owned()));
+        let ids = ids
+            .into_iter()
+            .chain(actions.map(|action| text(action, "actionId").to_owned()));
         self.sent = Some(Sent {
             seq: entry.seq(),
             at: entry.at().moment,
@@ -124,16 +130,25 @@ impl Running for Stays {
         }
         self.note_sent(entry, context);
         match entry.event() {
-            Event::Packet { packet: Packet::Connect { .. }, .. } => self.announced = false,
-            Event::Packet { packet: Packet::Disconnect { .. }, .. } => self.announced = true,
-            Event::Packet { connection, packet: Packet::Publish { topic, .. } }
-                if context.topic_name(topic) == Some("state") =>
-            {
+            Event::Packet {
+                packet: Packet::Connect { .. },
+                ..
+            } => self.announced = false,
+            Event::Packet {
+                packet: Packet::Disconnect { .. },
+                ..
+            } => self.announced = true,
+            Event::Packet {
+                connection,
+                packet: Packet::Publish { topic, .. },
+            } if context.topic_name(topic) == Some("state") => {
                 self.speaks_on = Some(*connection);
             }
-            Event::Closed { connection, how: Close::DeviceFin | Close::DeviceReset, .. }
-                if self.speaks_on == Some(*connection) =>
-            {
+            Event::Closed {
+                connection,
+                how: Close::DeviceFin | Close::DeviceReset,
+                ..
+            } if self.speaks_on == Some(*connection) => {
                 self.closed(entry, findings);
             }
             _ => {}
@@ -144,7 +159,10 @@ impl Running for Stays {
         let named = |id: &str| {
             id == text(state, "orderId") || elements(state, "actionStates").any(|action| text(action, "actionId") == id)
         };
-        let answered = self.sent.as_ref().is_some_and(|sent| sent.ids.iter().any(|id| named(id)));
+        let answered = self
+            .sent
+            .as_ref()
+            .is_some_and(|sent| sent.ids.iter().any(|id| named(id)));
         if answered {
             self.sent = None;
         }

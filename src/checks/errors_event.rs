@@ -61,7 +61,10 @@ fn texts(value: &Value, told: &mut BTreeSet<String>) {
 /// Whether the protocol has this error for what a message may be refused for.
 fn is_refusal(kind: &str, context: &CheckContext<'_>) -> bool {
     let errors = context.pack.vocabulary().get("error").and_then(Value::as_object);
-    errors.into_iter().flatten().any(|(_, name)| name.as_str() == Some(kind))
+    errors
+        .into_iter()
+        .flatten()
+        .any(|(_, name)| name.as_str() == Some(kind))
 }
 
 impl Running for OnEvent {
@@ -98,7 +101,10 @@ impl Running for OnEvent {
         let took = entry.at().moment.since(*since);
         let soft = context.time("event").unwrap_or(Duration::from_secs(1));
         let hard = context.time("eventWarning").map_or(soft, |hard| hard.max(soft));
-        let text = format!("the error is published {:.1} s after what caused it", took.as_secs_f64());
+        let text = format!(
+            "the error is published {:.1} s after what caused it",
+            took.as_secs_f64()
+        );
         if took > hard {
             findings.push(broken("STATE-05", entry.seq(), text));
         } else if took > soft {
@@ -117,7 +123,11 @@ mod tests {
     fn judge(seconds: f64, errors: &Value) -> Outcome {
         let mut trace = Trace::subscriber();
         trace.state(&json!({})).sent("order", &json!({ "orderId": "o" }));
-        trace.wait(seconds).state(&json!({ "errors": errors })).wait(30.0).state(&json!({ "errors": errors }));
+        trace
+            .wait(seconds)
+            .state(&json!({ "errors": errors }))
+            .wait(30.0)
+            .state(&json!({ "errors": errors }));
         trace.judge("errors/on-event")
     }
 

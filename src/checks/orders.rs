@@ -260,7 +260,10 @@ impl Malformed {
         let good = self.good.iter();
         if !order.is_empty() && good.clone().any(|(id, number)| id == order && Some(*number) == update) {
             // The one that came last is what the vehicle holds, unless it goes by no name at all.
-            self.nameless &= self.good.back().is_none_or(|(id, number)| id != order || Some(*number) != update);
+            self.nameless &= self
+                .good
+                .back()
+                .is_none_or(|(id, number)| id != order || Some(*number) != update);
             return false;
         }
         let same = |(id, number): &(String, Option<u64>)| id == order && (number.is_none() || *number == update);

@@ -8,9 +8,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::orders::{last_node, sets_position};
-use super::traffic::{
-    Traffic, actions, broken, elements, outside_influence, quote, show, state, text, to_vehicle,
-};
+use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, show, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -102,9 +100,17 @@ pub(super) fn is_displaced(entry: &Entry, context: &CheckContext<'_>) -> bool {
         .is_some_and(|message| actions(message).any(|action| sets_position(text(action, "actionType"))));
     let placed = to_vehicle("order", entry, context).is_some_and(|order| {
         let nodes = elements(order, "nodes").flat_map(|node| elements(node, "actions"));
-        nodes.take(NODES).any(|action| sets_position(text(action, "actionType")))
+        nodes
+            .take(NODES)
+            .any(|action| sets_position(text(action, "actionType")))
     });
-    let connects = matches!(entry.event(), Event::Packet { packet: Packet::Connect { .. }, .. });
+    let connects = matches!(
+        entry.event(),
+        Event::Packet {
+            packet: Packet::Connect { .. },
+            ..
+        }
+    );
     told || placed || connects || outside_influence(entry)
 }
 
@@ -221,12 +227,17 @@ struct PositionMoves {
 impl PositionMoves {
     fn learn(&mut self, order: &Value) {
         for node in elements(order, "nodes").take(NODES) {
-            let Some(position) = node.get("nodePosition") else { continue };
+            let Some(position) = node.get("nodePosition") else {
+                continue;
+            };
             let number = |name| position.get(name).and_then(Value::as_f64);
-            let (Some(x), Some(y)) = (number("x"), number("y")) else { continue };
+            let (Some(x), Some(y)) = (number("x"), number("y")) else {
+                continue;
+            };
             if self.nodes.len() < NODES {
                 let place = (text(position, "mapId").chars().take(512).collect(), x, y);
-                self.nodes.insert(text(node, "nodeId").chars().take(512).collect(), place);
+                self.nodes
+                    .insert(text(node, "nodeId").chars().take(512).collect(), place);
             }
         }
     }
@@ -306,9 +317,18 @@ mod tests {
     fn turning_without_driving_is_found_when_it_lasts() {
         let turning = [at(1.0, 0.0, false), at(1.0, 0.5, false), at(1.0, 1.0, false)];
         assert_eq!(driving(&turning, 0.5), ["STATE-MSG-08"]);
-        assert!(driving(&turning, 5.0).is_empty(), "it may have driven and stopped between them");
+        assert!(
+            driving(&turning, 5.0).is_empty(),
+            "it may have driven and stopped between them"
+        );
         assert!(driving(&turning[..2], 0.5).is_empty(), "once may be a matter of timing");
-        assert!(driving(&[at(1.0, 3.14, false), at(1.0, -3.14, false), at(1.0, 3.14, false)], 0.5).is_empty());
+        assert!(
+            driving(
+                &[at(1.0, 3.14, false), at(1.0, -3.14, false), at(1.0, 3.14, false)],
+                0.5
+            )
+            .is_empty()
+        );
     }
 
     #[test]

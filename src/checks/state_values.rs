@@ -57,9 +57,7 @@ impl Running for IdleEmpty {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.malformed.note(entry, context);
-        let Some(state) =
-            state(self.traffic, entry, context).filter(|state| !self.malformed.is_shown_in(state))
-        else {
+        let Some(state) = state(self.traffic, entry, context).filter(|state| !self.malformed.is_shown_in(state)) else {
             return false;
         };
         let count = |name| elements(state, name).count();
@@ -200,11 +198,15 @@ mod tests {
     fn what_a_malformed_order_left_is_not_judged() {
         let mut trace = Trace::subscriber();
         let left = json!({ "nodeStates": [{}], "orderUpdateId": 3 });
-        trace.state(&json!({})).sent("order", &json!({ "orderUpdateId": 3, "nodes": [{}], "edges": [] }));
+        trace
+            .state(&json!({}))
+            .sent("order", &json!({ "orderUpdateId": 3, "nodes": [{}], "edges": [] }));
         trace.state(&left);
         assert!(trace.judge("state/idle-empty").findings.is_empty());
         let mut trace = Trace::subscriber();
-        trace.state(&json!({})).sent("order", &json!({ "orderId": "bad", "orderUpdateId": 0, "nodes": [] }));
+        trace
+            .state(&json!({}))
+            .sent("order", &json!({ "orderId": "bad", "orderUpdateId": 0, "nodes": [] }));
         trace.state(&left);
         assert_eq!(trace.judge("state/idle-empty").summary(), ["STATE-13", "STATE-MSG-02"]);
     }

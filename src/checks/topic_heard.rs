@@ -58,7 +58,9 @@ impl Heard {
                 if self.open.len() == KEPT {
                     self.open.pop_first();
                 }
-                self.open.entry(*connection).or_insert((entry.at().moment, BTreeSet::new()));
+                self.open
+                    .entry(*connection)
+                    .or_insert((entry.at().moment, BTreeSet::new()));
                 self.pending.clear();
             }
             Packet::Disconnect { .. } if !down => {
@@ -67,7 +69,9 @@ impl Heard {
             }
             Packet::Subscribe { filters, .. } => {
                 for name in TOPICS {
-                    let Some(topic) = context.topics.get(name) else { continue };
+                    let Some(topic) = context.topics.get(name) else {
+                        continue;
+                    };
                     if filters.iter().any(|filter| covers(&filter.filter, topic)) {
                         let opened = (entry.at().moment, BTreeSet::new());
                         self.open.entry(*connection).or_insert(opened).1.insert(name);
@@ -89,18 +93,24 @@ impl Heard {
     /// Notes what the harness sends while the vehicle is there and has had the time to subscribe.
     fn sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
         for name in TOPICS {
-            let Some(message) = to_vehicle(name, entry, context) else { continue };
+            let Some(message) = to_vehicle(name, entry, context) else {
+                continue;
+            };
             let mut keep = |id: &str| {
                 if !id.is_empty() && id.len() <= 512 {
                     self.sent.push((name, id.to_owned()));
                 }
             };
             keep(text(message, "orderId"));
-            actions(message).take(KEPT).for_each(|action| keep(text(action, "actionId")));
+            actions(message)
+                .take(KEPT)
+                .for_each(|action| keep(text(action, "actionId")));
             let excess = self.sent.len().saturating_sub(2 * KEPT);
             self.sent.drain(..excess);
         }
-        let Event::Sent { topic, .. } = entry.event() else { return };
+        let Event::Sent { topic, .. } = entry.event() else {
+            return;
+        };
         let Some(name) = TOPICS.into_iter().find(|name| context.topics.get(*name) == Some(topic)) else {
             return;
         };
@@ -114,7 +124,10 @@ impl Heard {
     }
 
     fn overdue(&mut self, now: Moment, findings: &mut Vec<CheckFinding>) {
-        let lost = self.pending.iter().filter(|(_, (_, since))| now.since(*since) > DELIVERY);
+        let lost = self
+            .pending
+            .iter()
+            .filter(|(_, (_, since))| now.since(*since) > DELIVERY);
         let lost: Vec<(&'static str, u64)> = lost.map(|(name, (seq, _))| (*name, *seq)).collect();
         for (name, seq) in lost {
             self.pending.remove(name);
@@ -197,7 +210,13 @@ mod tests {
     fn subscribed(names: &[&str]) -> Trace {
         let mut trace = Trace::tap();
         trace.connected(1);
-        let filters = names.iter().map(|name| Filter { filter: trace.topic(name), qos: 0 }).collect();
+        let filters = names
+            .iter()
+            .map(|name| Filter {
+                filter: trace.topic(name),
+                qos: 0,
+            })
+            .collect();
         let packet = Packet::Subscribe { packet_id: 1, filters };
         let event = Event::Packet { connection: 1, packet };
         trace.add(Source::Tap, Some(Direction::FromDevice), event);
@@ -208,7 +227,10 @@ mod tests {
     #[test]
     fn a_vehicle_that_subscribes_to_both_hears_whatever_it_makes_of_it() {
         let mut trace = subscribed(&["order", "instantActions"]);
-        trace.sent("order", &json!({ "orderId": "o" })).wait(60.0).state(&json!({}));
+        trace
+            .sent("order", &json!({ "orderId": "o" }))
+            .wait(60.0)
+            .state(&json!({}));
         let outcome = trace.judge(CHECK);
         assert!(outcome.findings.is_empty());
         assert_eq!(outcome.judged, 1);
@@ -218,7 +240,10 @@ mod tests {
     fn a_topic_nobody_subscribed_to_is_found_once() {
         let mut trace = subscribed(&["order"]);
         for _ in 0..3 {
-            trace.instant("stateRequest", "x", &json!([])).wait(10.0).state(&json!({}));
+            trace
+                .instant("stateRequest", "x", &json!([]))
+                .wait(10.0)
+                .state(&json!({}));
         }
         let outcome = trace.judge(CHECK);
         assert_eq!(outcome.summary(), ["TOPIC-10"]);
@@ -235,8 +260,14 @@ mod tests {
     #[test]
     fn without_the_tap_only_reactions_count() {
         let mut trace = Trace::subscriber();
-        trace.sent("order", &json!({ "orderId": "o" })).wait(60.0).state(&json!({ "orderId": "o" }));
-        trace.instant("stateRequest", "x", &json!([])).wait(60.0).state(&json!({}));
+        trace
+            .sent("order", &json!({ "orderId": "o" }))
+            .wait(60.0)
+            .state(&json!({ "orderId": "o" }));
+        trace
+            .instant("stateRequest", "x", &json!([]))
+            .wait(60.0)
+            .state(&json!({}));
         let outcome = trace.judge(CHECK);
         assert!(outcome.findings.is_empty());
         assert_eq!(outcome.judged, 0);

@@ -55,7 +55,11 @@ impl Position {
             if pose.map == at.map && far <= BESIDE && turned <= BESIDE {
                 continue;
             }
-            let thousandth = Pose { x: pose.x / 1000.0, y: pose.y / 1000.0, ..pose.clone() };
+            let thousandth = Pose {
+                x: pose.x / 1000.0,
+                y: pose.y / 1000.0,
+                ..pose.clone()
+            };
             let millimetres = at.x.hypot(at.y) > FROM_ORIGIN && at.apart(&thousandth).0 <= BESIDE / 2.0;
             if millimetres {
                 self.millimetres += 1;

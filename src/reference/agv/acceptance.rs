@@ -12,6 +12,7 @@ use super::faults::FaultName as F;
 use super::order_message::{ActionRequest, Edge, Node, Order};
 use super::read::Defect;
 use super::rejection::{Refusal, Rule};
+use crate::reference::Output;
 
 /// What to do with an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +42,14 @@ impl Agv {
             Err(refusal) => Err(refusal.clone()),
             Ok(message) => self.order_decided(message),
         };
+        if let Err(refusal) = &result
+            && refusal.is_malformed()
+            && self.faults.has(F::CrashesOnMalformedOrder)
+        {
+            self.pending.push(Output::Drop);
+            self.connection.dropped(self.moment() + self.config.reconnect_delay);
+            return;
+        }
         if let Err(refusal) = result {
             self.refuse(message.as_ref().unwrap_or(&Value::Null), refusal);
         }

@@ -166,7 +166,7 @@ impl Agv {
             return;
         }
         self.book.soon = None;
-        self.book.slipped = self.faults.has(F::HorizonSlippedInto);
+        self.book.slipped = self.faults.has(F::HorizonSlippedInto) || self.faults.has(F::HorizonCreptInto);
         if self.faults.has(F::CancelForgetsActions) {
             self.actions.retain(|action| !action.of_order());
         }

@@ -1,6 +1,7 @@
 //! What actions do: their stages, their effect on the vehicle, and how a failure is reported.
 
 use std::f64::consts::PI;
+use std::time::Duration;
 
 use super::Agv;
 use super::action_kinds::Deed;
@@ -81,6 +82,9 @@ impl From<Result<(), Problem>> for Outcome {
         result.map_or_else(Self::Failed, |()| Self::Done(None))
     }
 }
+
+/// How long what was held takes to go on (`resumes-in-a-moment`).
+const RESUMING: Duration = Duration::from_millis(500);
 
 impl Agv {
     /// An action of the order begins.
@@ -294,6 +298,14 @@ impl Agv {
         Outcome::Done(None)
     }
 
+    /// What was held goes on at the next cycle (`resumes-in-a-moment`).
+    pub(super) fn resume_if_due(&mut self) {
+        let moment = self.moment();
+        if self.resumes_at.take_if(|at| *at <= moment).is_some() && !self.holds.any() {
+            self.actions.resume(moment);
+        }
+    }
+
     /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
     pub(super) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
         let before = self.holds.any();
@@ -305,6 +317,7 @@ impl Agv {
             (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
             (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
             (false, true) => self.actions.hold(moment, self.faults),
+            (true, false) if self.takes(T::ResumesInAMoment) => self.resumes_at = Some(moment + RESUMING),
             (true, false) => self.actions.resume(moment),
             _ => {}
         }

@@ -31,6 +31,7 @@ faults! {
     NeverReconnects "never-reconnects" ["MQTT-10", "STATE-02"] "Does not connect again after a broken link.";
     NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10", "STATE-02"] "Sends the terminating zero byte of its string with every periodic state.";
     MisspelledTopic "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore.";
+    StatesTopic "states-topic" ["TOPIC-01"] "Publishes its states on a topic called states.";
     OtherSerialNumber "other-serial-number" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
     NoFactsheet "no-factsheet" ["TOPIC-11", "ACT-40"] "Never publishes a factsheet.";
     OtherMajorVersion "other-major-version" ["TOPIC-03", "TOPIC-02"] "Publishes its visualization below another major version.";
@@ -48,10 +49,13 @@ faults! {
     ManufacturerWithSlash "manufacturer-with-slash" ["TOPIC-06", "TOPIC-04"] "Writes its manufacturer with a slash in the header.";
     HeaderIdConstant "header-id-constant" ["HDR-02"] "Sends every state with the same headerId.";
     HeaderIdShared "header-id-shared" ["HDR-02"] "Counts one headerId over all topics.";
+    HeaderIdResetByReconnect "header-id-reset-by-reconnect" ["HDR-02"] "Counts from 0 again after a link that was only broken.";
     HeaderIdAsText "header-id-as-text" ["JSON-06", "HDR-02"] "Sends the headerId as a string.";
     TimestampLocal "timestamp-local" ["HDR-03"] "Gives its timestamps in local time with an offset.";
     TimestampWithoutZone "timestamp-without-zone" ["HDR-03"] "Gives its timestamps without the Z.";
     TimestampUnix "timestamp-unix" ["HDR-03", "JSON-06"] "Gives its timestamps as seconds since 1970.";
+    TimestampStandsStill "timestamp-stands-still" ["HDR-03"] "Gives every message the time at which it was switched on.";
+    TimestampLocalAsUtc "timestamp-local-as-utc" ["HDR-03"] "Writes its local time with a Z.";
     VersionShort "version-short" ["HDR-04"] "Gives the protocol version without the patch number.";
     FieldMisspelled "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore.";
     ModeLowerCase "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case.";
@@ -76,6 +80,7 @@ faults! {
     ConnectionNotRetained "connection-not-retained" ["CONN-06"] "Publishes ONLINE and OFFLINE without the retain flag.";
     NoOffline "no-offline" ["CONN-07"] "Disconnects without saying OFFLINE.";
     NoDisconnect "no-disconnect" ["CONN-08"] "Closes the socket after OFFLINE without a DISCONNECT.";
+    CrashesOnMalformedOrder "crashes-on-malformed-order" ["ORD-REJ-02", "ORD-REJ-17"] "Ends its connection over an order that it cannot read, and comes back.";
     ConnectionStateUnderscore "connection-state-underscore" ["CONN-02", "CONN-10", "JSON-02"] "Spells CONNECTIONBROKEN with an underscore.";
     ConnectionStateConnected "connection-state-connected" ["CONN-10", "CONN-05", "JSON-02"] "Says CONNECTED instead of ONLINE.";
     NoOnlineAfterReconnect "no-online-after-reconnect" ["CONN-11"] "Says ONLINE only the first time it connects.";
@@ -112,11 +117,15 @@ faults! {
     StopsBeforeEndOfBase "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base.";
     HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05", "MQTT-04"] "Drives into the horizon without waiting for its release.";
     HorizonSlippedInto "horizon-slipped-into" ["ORD-07", "MQTT-04"] "Stops at the decision point and rolls on into the horizon a moment later.";
+    HorizonCreptInto "horizon-crept-into" ["ORD-UPD-01", "ORD-07"] "Waits at the decision point for a moment and creeps on into the horizon.";
     HorizonDemanded "horizon-demanded" ["ORD-10"] "Refuses new orders without a horizon.";
     GraphUnchecked "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense.";
     SingleNodeRefused "single-node-refused" ["ORD-13"] "Refuses orders with one node.";
     DrivingAtDecisionPoint "driving-at-decision-point" ["ORD-UPD-01", "STATE-MSG-08"] "Says that it drives while it waits at the decision point.";
+    DrivingWhileWaiting "driving-while-waiting" ["STATE-MSG-08"] "Says that it drives when its order is done.";
+    TurnsWithoutDriving "turns-without-driving" ["STATE-MSG-08"] "Does not say that it drives while it turns on the spot.";
     StitchingNodeOverwritten "stitching-node-overwritten" ["ORD-UPD-07"] "Takes over the actions an update brings for the stitching node.";
+    UpdateJoinedByNumber "update-joined-by-number" ["ORD-FLOW-08"] "Joins an update by its sequenceId, whatever the node.";
     HorizonAppended "horizon-appended" ["ORD-UPD-08"] "Keeps the old horizon when an update brings a new one.";
     HorizonKept "horizon-kept" ["ORD-UPD-09"] "Keeps the old horizon when an update has none.";
     HorizonActionsStay "horizon-actions-stay" ["ORD-UPD-10"] "Lets the actions of a deleted horizon wait for ever.";
@@ -223,6 +232,7 @@ faults! {
     MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
     TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there.";
     AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
+    PositionFrozen "position-frozen" ["MAP-01"] "Reports the position at which it was switched on wherever it is.";
     DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05", "ORD-CANCEL-15"] "Reports its orientation in degrees.";
     VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 
@@ -447,6 +457,9 @@ faults! {
     ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";
     SemiautomaticFaster "semiautomatic-faster" ["MODE-03"] "Drives faster in SEMIAUTOMATIC.";
     VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";
+    VisualizationBeside "visualization-beside" ["VIS-01"] "Shows itself two metres beside where its states say it is.";
+    VisualizationMillimetres "visualization-millimetres" ["MAP-02", "VIS-01"] "Gives its position in the visualization in millimetres.";
+    VisualizationWithoutPosition "visualization-without-position" ["VIS-01"] "Leaves the position out of the visualization.";
     VisualizationMissing "visualization-missing" ["VIS-02", "TOPIC-12"] "States a visualization interval and publishes none.";
 }
 

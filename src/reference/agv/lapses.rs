@@ -40,14 +40,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     ("cancel-lets-run", "It breaks a recommendation only."),
     ("cancel-fails-early", "It breaks a recommendation only."),
     (
-        "validation-error-lingers",
-        "That the error goes with the next order is implied only; the ruling of ORD-REJ-03 is a warning.",
-    ),
-    (
-        "order-error-as-validation",
-        "The name within the family is a preference by the ruling of ORD-REJ-06, and what follows is not reached.",
-    ),
-    (
         "max-rotation-speed-ignored",
         "The turn takes place while the edge is entered; whether it belongs to the edge yet is a matter of reading.",
     ),
@@ -55,10 +47,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     (
         "corridor-contour-ignored",
         "CORR-03 is a recommendation, and by the kinematic centre CORR-01 is kept.",
-    ),
-    (
-        "download-failure-silent",
-        "FAILED tells it; the error beside it is a preference of MAP-19.",
     ),
     (
         "storage-full-silent",
@@ -99,6 +87,14 @@ pub const LAPSES: &[(&str, &str)] = &[
     (
         "traversal-split",
         "Two states of one moment are remarked on; tests that look at single states are not reached.",
+    ),
+    (
+        "visualization-without-position",
+        "The schema requires nothing; by the ruling of VIS-01 what is merely absent is a warning.",
+    ),
+    (
+        "header-id-reset-by-reconnect",
+        "The text leaves open where the count begins; the ruling of HDR-02 makes a new count after a mere reconnect a warning.",
     ),
     ("visualization-slow", "It breaks a recommendation only."),
     ("visualization-missing", "It breaks a recommendation only."),

@@ -161,6 +161,8 @@ pub struct Agv {
     inbox: VecDeque<(Moment, Input)>,
     /// It stands still on a node until then (`stops-on-nodes`, `first-node-listed` only).
     lingers_until: Option<Moment>,
+    /// When what was held goes on (`resumes-in-a-moment` only).
+    resumes_at: Option<Moment>,
     /// Counts states.
     states_sent: u64,
     /// Counts logs.
@@ -229,6 +231,7 @@ impl Agv {
             report: Report::default(),
             inbox: VecDeque::new(),
             lingers_until: None,
+            resumes_at: None,
             states_sent: 0,
             logs: 0,
             pending: Vec::new(),
@@ -264,6 +267,7 @@ impl Agv {
             self.connection.online_at,
             self.book.soon,
             self.lingers_until,
+            self.resumes_at,
             self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
             self.persona.next_end(),
@@ -306,6 +310,7 @@ impl Agv {
         }
         self.shadow.take_if(|(end, _)| *end <= moment);
         self.a_moment_later();
+        self.resume_if_due();
         self.attempt_connection();
         self.settle();
         self.flush();

@@ -214,6 +214,7 @@ impl Agv {
         let own = match self.mode {
             Mode::Semiautomatic if self.faults.has(F::SemiautomaticFaster) => self.config.speed * 2.0,
             Mode::Semiautomatic => self.config.speed / 2.0,
+            _ if self.book.slipped && self.faults.has(F::HorizonCreptInto) => self.config.speed / 40.0,
             _ if self.book.slipped => self.config.speed * 4.0,
             _ => self.config.speed,
         };
@@ -375,7 +376,7 @@ impl Agv {
             self.actions
                 .trigger(Origin::Node(planned.node.sequence_id), self.faults);
         }
-        if self.faults.has(F::HorizonSlippedInto) {
+        if self.faults.has(F::HorizonSlippedInto) || self.faults.has(F::HorizonCreptInto) {
             self.book.soon = Some(self.now.moment + super::cancel::MOMENT);
         }
     }

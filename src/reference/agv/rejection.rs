@@ -42,6 +42,10 @@ impl Refusal {
         }
     }
 
+    pub(super) fn is_malformed(&self) -> bool {
+        self.rule == Rule::Malformed
+    }
+
     pub(super) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
         self.culprits.push((key.to_owned(), value.into()));
         self

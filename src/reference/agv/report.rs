@@ -319,7 +319,22 @@ impl Agv {
         }
         let mut body = Map::new();
         if !self.config.line_guided() {
-            body.insert("agvPosition".into(), self.position_picture());
+            let mut position = self.position_picture();
+            let mut change = |key: &str, change: fn(f64) -> f64| {
+                if let Some(value) = position.get(key).and_then(Value::as_f64) {
+                    position[key] = json!(change(value));
+                }
+            };
+            if self.faults.has(F::VisualizationBeside) {
+                change("x", |x| x + 2.0);
+            }
+            if self.faults.has(F::VisualizationMillimetres) {
+                change("x", |x| x * 1000.0);
+                change("y", |y| y * 1000.0);
+            }
+            if !self.faults.has(F::VisualizationWithoutPosition) {
+                body.insert("agvPosition".into(), position);
+            }
         }
         body.insert("velocity".into(), self.velocity_picture());
         let body = self.shown_visualization(body);

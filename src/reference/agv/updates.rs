@@ -24,6 +24,7 @@ impl Agv {
         let joins = if busy || cancelled {
             (&first.id, first.sequence_id) == (&self.book.base_end.0, self.book.base_end.1)
                 || self.faults.has(F::RunningUpdateGapAccepted)
+                || (self.faults.has(F::UpdateJoinedByNumber) && first.sequence_id == self.book.base_end.1)
                 || self.faults.has(F::OutdatedUpdateTakenOver)
         } else {
             (&first.id, first.sequence_id) == (&self.book.last_node, self.book.last_sequence)

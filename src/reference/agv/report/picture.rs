@@ -116,7 +116,10 @@ impl Agv {
 
     fn shows_driving(&self) -> bool {
         let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
-        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported))
+        let turning = self.motion.is_turning() && self.faults.has(F::TurnsWithoutDriving);
+        let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
+        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning)
+            || idle
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
@@ -221,7 +224,14 @@ impl Agv {
 
     /// agvPosition, also for the visualization (STATE-MSG-05).
     pub(super) fn position_picture(&self) -> Value {
-        let pose = self.motion.pose(self.moment());
+        let mut pose = self.motion.pose(self.moment());
+        if let Some(start) = self
+            .config
+            .node(&self.config.start_node)
+            .filter(|_| self.faults.has(F::PositionFrozen))
+        {
+            (pose.x, pose.y) = (start.x, start.y);
+        }
         let theta = if self.faults.has(F::DegreesReported) {
             pose.theta.to_degrees() + 180.0
         } else {
