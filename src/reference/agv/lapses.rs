@@ -44,6 +44,12 @@ pub const LAPSES: &[(&str, &str)] = &[
         "That the error goes with the next order is implied only; the ruling of ORD-REJ-03 is a warning.",
     ),
     (
+        "header-unchecked",
+        "No sentence says what becomes of an order whose header is broken; that it is malformed is a matter of reading.",
+    ),
+    ("unknown-instant-silent", "It breaks a recommendation only."),
+    ("unknown-instant-unreferenced", "It breaks a recommendation only."),
+    (
         "order-error-as-validation",
         "The name within the family is a preference by the ruling of ORD-REJ-06, and what follows is not reached.",
     ),
