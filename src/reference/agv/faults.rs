@@ -101,6 +101,9 @@ faults! {
     VersionsNumeric "versions-numeric" ["FACT-10", "JSON-06"] "Gives its software version as a number.";
     OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
     MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
+    PickAsInstantAction "pick-as-instant-action" ["ACT-09"] "Declares pick as an instant action.";
+    ChargingOnEdges "charging-on-edges" ["ACT-09"] "Declares startCharging as an action for edges.";
+    StateRequestUnlisted "state-request-unlisted" ["FACT-07"] "Offers stateRequest but does not list it.";
     StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
 
     // Order
@@ -169,7 +172,7 @@ faults! {
     MissingListReadAsEmpty "missing-list-read-as-empty" ["ORD-REJ-01"] "Takes a list that is missing for an empty one.";
     NumbersWrapped "numbers-wrapped" ["ORD-REJ-01"] "Cuts numbers that are no whole numbers of 32 bits until they are.";
     OptionalTypesUnchecked "optional-types-unchecked" ["ORD-REJ-01"] "Leaves optional members of a wrong type aside, although it supports them.";
-    EdgeEndsAssumed "edge-ends-assumed" ["ORD-REJ-01", "ORD-11"] "Lets every edge lead from the node before it to the one behind it, whatever it says.";
+    EdgeEndsAssumed "edge-ends-assumed" ["ORD-11", "ORD-REJ-01"] "Lets every edge lead from the node before it to the one behind it, whatever it says.";
     EdgeEndsUnchecked "edge-ends-unchecked" ["ORD-11"] "Takes edges that name other nodes than those around them.";
     SequenceUnchecked "sequence-unchecked" ["ORD-11"] "Takes nodes and edges with doubled or missing sequenceIds.";
     MalformedStopsOrder "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema.";
@@ -301,6 +304,7 @@ faults! {
     ChargingTwiceFails "charging-twice-fails" ["ACT-11"] "Fails a startCharging while it charges.";
     ChargingShownAnyway "charging-shown-anyway" ["ACT-20"] "Reports that it charges although startCharging failed.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23", "ACT-24"] "Reports initPosition FINISHED and does nothing.";
+    InitPositionKeepsPose "init-position-keeps-pose" ["ACT-23"] "Takes over the last node of an initPosition, and keeps its pose.";
     InitPositionUninitialized "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose.";
     InitPositionTakenAnyway "init-position-taken-anyway" ["ACT-25"] "Changes its map although it fails an initPosition.";
     InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
@@ -320,6 +324,7 @@ faults! {
     PositioningFailureFinished "positioning-failure-finished" ["ACT-36"] "Reports finePositioning FINISHED although there is no target.";
     FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick, a drop or charging fails.";
     TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
+    TriggerGivenUp "trigger-given-up" ["ACT-37"] "Waits for a trigger for a second and a half only.";
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";

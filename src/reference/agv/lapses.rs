@@ -33,6 +33,10 @@ pub const LAPSES: &[(&str, &str)] = &[
         "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
     ),
     (
+        "state-request-unlisted",
+        "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
+    ),
+    (
         "min-state-interval-ignored",
         "FACT-14 contradicts the sending on events; its ruling leaves a warning.",
     ),
