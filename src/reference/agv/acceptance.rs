@@ -148,30 +148,6 @@ impl Agv {
         Err(Refusal::new(Rule::StartOutOfRange, "the first node is out of reach").naming("nodeId", &order.nodes[0].id))
     }
 
-    fn check_update(&self, order: &mut Order) -> Result<(), Refusal> {
-        let busy = self.is_busy();
-        if self.book.cancel.is_some() || self.book.cancelled {
-            return Err(Refusal::new(Rule::BrokenUpdate, "the order was cancelled"));
-        }
-        if self.faults.has(F::CompletedNotContinued) && !busy {
-            return Err(Refusal::new(Rule::BrokenUpdate, "the order is complete"));
-        }
-        let first = &order.nodes[0];
-        let joins = if busy {
-            (&first.id, first.sequence_id) == (&self.book.base_end.0, self.book.base_end.1)
-                || self.faults.has(F::RunningUpdateGapAccepted)
-                || self.faults.has(F::OutdatedUpdateTakenOver)
-        } else {
-            (&first.id, first.sequence_id) == (&self.book.last_node, self.book.last_sequence)
-                || self.faults.has(F::CompletedUpdateGapAccepted)
-        };
-        if !joins {
-            let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
-            return Err(refusal.naming("nodeId", &first.id));
-        }
-        self.check_ability(order, 1)
-    }
-
     /// Nodes left, an order action not ended, or a cancellation under way; a horizon keeps it busy.
     pub(super) fn is_busy(&self) -> bool {
         let actions = self.actions.order_unfinished() && !self.faults.has(F::RunningActionIgnored);
@@ -239,60 +215,19 @@ impl Agv {
         self.book.update_id = order.update_id;
         self.book.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
+        self.book.first_end = self.book.nodes.back().map_or(0, |stop| stop.node.sequence_id);
+        let pose = self.motion.pose(self.moment());
+        self.book.begun_at = Some((pose.x, pose.y));
+        if self.faults.has(F::OwnErrorClearedByOrder) {
+            self.errors.cleared();
+        }
+        if self.faults.has(F::OrderEndsPause) {
+            self.set_holds(|holds| holds.pause = false);
+        }
         self.linger_on_first_node();
     }
 
-    /// Rows 8 and 10: takes over an update.
-    fn continue_with(&mut self, order: Order) {
-        self.book.continued |= !self.is_busy();
-        let keep = if order.nodes.iter().any(|node| !node.released) {
-            self.faults.has(F::HorizonAppended)
-        } else {
-            self.faults.has(F::HorizonKept)
-        };
-        if !keep {
-            let gone = self.book.drop_horizon();
-            if !self.faults.has(F::HorizonActionsStay) {
-                self.actions.retain(|action| match action.origin {
-                    Origin::Node(sequence_id) | Origin::Edge(sequence_id) => !gone.contains(&sequence_id),
-                    Origin::Instant => true,
-                });
-            }
-        }
-        if self.faults.has(F::UpdateReplacesBase) {
-            while self.book.nodes.len() > 1 {
-                self.book.nodes.pop_front();
-                self.book.edges.pop_front();
-            }
-        }
-        if !self.faults.has(F::UpdateIdKept) {
-            self.book.update_id = order.update_id;
-        }
-        let mut nodes = order.nodes.into_iter();
-        let joint = nodes.next();
-        if let Some(joint) = joint.filter(|_| self.faults.has(F::StitchingNodeOverwritten)) {
-            self.overwrite_joint(joint);
-        }
-        self.append(nodes.collect(), order.edges);
-    }
-
-    /// `stitching-node-overwritten`: what the first transmission said is forgotten.
-    fn overwrite_joint(&mut self, joint: Node) {
-        let origin = Origin::Node(joint.sequence_id);
-        let open = self
-            .book
-            .nodes
-            .iter()
-            .any(|stop| stop.node.sequence_id == joint.sequence_id);
-        self.actions
-            .retain(|action| action.origin != origin || action.status.is_terminal());
-        self.push_actions(joint.actions, origin);
-        if !open {
-            self.actions.trigger(origin, self.faults);
-        }
-    }
-
-    fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
+    pub(super) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
         let mut edges = edges.into_iter().peekable();
         for node in nodes {
             while let Some(edge) = edges.next_if(|edge| edge.sequence_id < node.sequence_id) {
@@ -319,10 +254,15 @@ impl Agv {
         self.book.edges.push_back(edge);
     }
 
-    fn push_actions(&mut self, requests: Vec<ActionRequest>, origin: Origin) {
+    pub(super) fn push_actions(&mut self, requests: Vec<ActionRequest>, origin: Origin) {
         for request in requests {
+            let again = self.book.dropped.contains(&request.id);
+            if again && self.faults.has(F::ReleasedActionsLost) {
+                continue;
+            }
             let kind = action_kinds::find(&self.config, &request.action_type);
-            self.actions.retain(|action| action.request.id != request.id);
+            let doubled = again && self.faults.has(F::ReleasedActionsDoubled);
+            self.actions.retain(|action| action.request.id != request.id || doubled);
             self.actions.push(Action::waiting(request, kind, origin));
         }
     }

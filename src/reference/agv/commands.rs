@@ -188,8 +188,17 @@ impl Agv {
         let keeps = leaves || self.faults.has(F::ManualKeepsOrder);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             let given_up = self.book.clone();
-            self.give_up_order();
+            if self.faults.has(F::ManualKeepsActions) {
+                self.motion.halt(self.now.moment);
+                self.book.drop_route();
+                self.book.cancelled = true;
+            } else {
+                self.give_up_order();
+            }
             self.remembered = Some(given_up).filter(|_| self.faults.has(F::OrderTakenUpAgain));
+        }
+        if mode == Mode::Semiautomatic && self.faults.has(F::SemiautomaticEndsOrder) {
+            self.give_up_order();
         }
         self.mode = mode;
         if let Some(order) = self.remembered.take_if(|_| mode.takes_orders()) {

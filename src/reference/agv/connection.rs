@@ -176,6 +176,16 @@ impl Agv {
             self.give_up_order();
             self.book.order_id.clear();
         }
+        self.book.cut = true;
+        if self.faults.has(F::UpdateForgottenOnLinkLoss) {
+            self.book.update_id = 0;
+        }
+        if self.faults.has(F::ActionsForgottenOnLinkLoss) {
+            self.actions.retain(|action| !action.of_order());
+        }
+        if self.faults.has(F::PauseLostOnLinkLoss) {
+            self.set_holds(|holds| holds.pause = false);
+        }
         self.connection.online = false;
         self.connection.online_at = None;
         let ended = self.connection.shut_down || self.faults.has(F::NeverReconnects);

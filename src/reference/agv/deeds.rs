@@ -291,6 +291,11 @@ impl Agv {
             self.set_holds(|holds| holds.stuck |= holds.pause);
         }
         self.set_holds(|holds| holds.pause = false);
+        if self.faults.has(F::PausedOrderSurvivesCancel)
+            && let Some(order) = self.remembered.take()
+        {
+            self.book = order;
+        }
         Outcome::Done(None)
     }
 

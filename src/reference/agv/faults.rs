@@ -20,6 +20,8 @@ macro_rules! faults {
 faults! {
     // Transport
     OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
+    UpdateForgottenOnLinkLoss "update-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-02"] "Goes back to the first orderUpdateId of its order when the link breaks.";
+    ActionsForgottenOnLinkLoss "actions-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-10"] "Forgets the actions of its order when the link breaks.";
     StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
     HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07", "MQTT-04"] "Drives into the horizon while the link is down.";
     OldMqtt "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1.";
@@ -133,10 +135,26 @@ faults! {
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
+    OnlyFirstUpdate "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before.";
+    UpdateActionsLost "update-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its nodes and edges.";
+    UpdateActionsNotPerformed "update-actions-not-performed" ["ACT-01", "NODE-04"] "Lists the actions of an update and never begins them.";
+    ReleasedActionsLost "released-actions-lost" ["ASTATE-01"] "Forgets an action of its horizon when an update releases it.";
+    ReleasedActionsDoubled "released-actions-doubled" ["STATE-MSG-09", "ASTATE-01"] "Lists an action of its horizon a second time when an update releases it.";
+    HorizonActionsInherited "horizon-actions-inherited" ["ORD-UPD-08"] "Performs the actions of a horizon that was replaced on the nodes that took its place.";
+    UpdateClearsActionStates "update-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when an update comes.";
+    UpdateRepeatsActions "update-repeats-actions" ["ASTATE-06"] "Performs the actions of its last node once more when an update comes.";
+    UpdateEndsActions "update-ends-actions" ["ORD-FLOW-09"] "Breaks off its running actions when an update comes.";
+    UpdateBreaksBlocking "update-breaks-blocking" ["BLOCK-04", "BLOCK-07"] "Drives off with an update although an action that stops it still runs.";
+    UpdateRefusedWhileActing "update-refused-while-acting" ["ORD-FLOW-09"] "Refuses updates while an action of the order runs.";
+    UpdateRefusedWhilePaused "update-refused-while-paused" ["ORD-FLOW-09"] "Refuses updates while it is paused.";
+    UpdateEndsPause "update-ends-pause" ["ACT-12", "ACT-13"] "Goes on with an update although it is paused.";
+    UpdateRefusedAfterCut "update-refused-after-cut" ["ORD-FLOW-09"] "Refuses updates of an order that it had before its link broke.";
     CompletedUpdateGapAccepted "completed-update-gap-accepted" ["ORD-FLOW-10"] "Continues a completed order from whatever node the update begins with.";
     ContinuationNotDriven "continuation-not-driven" ["ORD-06", "ORD-FLOW-11"] "Takes over an update of a completed order and does not drive it.";
     CompletedNotContinued "completed-not-continued" ["ORD-FLOW-11"] "Refuses updates of a completed order.";
     RejectionStopsOrder "rejection-stops-order" ["ORD-FLOW-12", "ORD-REJ-11"] "Stops driving when it has to refuse a message.";
+    RejectionDropsHorizon "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12"] "Forgets its horizon when it has to refuse a message.";
+    RejectionClearsActionStates "rejection-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when it has to refuse an order.";
 
     // Cancel
     CancelDrivesOn "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder.";
@@ -148,11 +166,21 @@ faults! {
     CancelForgetsActions "cancel-forgets-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Forgets the actions of a cancelled order a moment later.";
     CancelNeverFinished "cancel-never-finished" ["ORD-CANCEL-07", "IACT-04"] "Leaves cancelOrder RUNNING for ever.";
     CancelClearsOrderId "cancel-clears-order-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Empties the orderId when the order is cancelled.";
+    CancelResetsUpdateId "cancel-resets-update-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is cancelled.";
     CancelKeepsNodes "cancel-keeps-nodes" ["ORD-CANCEL-09"] "Keeps all node states while it drives to the node where it stops.";
     CancelLastNodeStale "cancel-last-node-stale" ["ORD-CANCEL-10"] "Does not report the node where it stopped after a cancellation.";
+    CancelClearsLastNode "cancel-clears-last-node" ["STATE-MSG-04"] "Empties the lastNodeId when the order is cancelled.";
     CancelLeavesNodes "cancel-leaves-nodes" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order.";
     CancelDropsActions "cancel-drops-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Removes the action states of a cancelled order.";
     DeadAfterCancel "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation.";
+    CancelledOrderRevived "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02"] "Goes on with a cancelled order when an update of it comes late.";
+    CancelWaitsForPause "cancel-waits-for-pause" ["ORD-CANCEL-07"] "Does not finish cancelOrder as long as it is paused.";
+    PausedOrderSurvivesCancel "paused-order-survives-cancel" ["ORD-CANCEL-02"] "Goes on with an order that was cancelled in a pause when the pause ends.";
+    PausedActionsSurviveCancel "paused-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while actions are PAUSED, and goes on with them after the pause.";
+    PreparedActionsSurviveCancel "prepared-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while it prepares an action, and performs it.";
+    SecondCancelTakesOver "second-cancel-takes-over" ["ORD-CANCEL-07", "IACT-04"] "Forgets a cancelOrder that is under way when a second one comes.";
+    CancelMissesEdgeActions "cancel-misses-edge-actions" ["ORD-CANCEL-03"] "Leaves the waiting actions of edges WAITING when the order is cancelled.";
+    CancelForgetsLoad "cancel-forgets-load" ["STATE-MSG-06"] "Shows no load any more when its order is cancelled.";
     TemporaryNodeRefused "temporary-node-refused" ["ORD-CANCEL-15"] "Refuses orders that begin at a node it has never heard of.";
     TemporaryNodeNotReached "temporary-node-not-reached" ["ORD-CANCEL-15"] "Takes over an order with one node it has never heard of, and never counts it as reached.";
     RangeNotCounted "range-not-counted" ["ORD-CANCEL-16"] "Drives to the exact place of a first node in whose range it stands.";
@@ -199,6 +227,9 @@ faults! {
     UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
     MemoryUnchecked "memory-unchecked" ["ORD-REJ-15", "STATE-12"] "Takes over orders larger than its stated limits, cut to what fits.";
     OrientationUnchecked "orientation-unchecked" ["ORD-REJ-16"] "Accepts edges with an orientation it cannot take.";
+    RefusalLevelCorrected "refusal-level-corrected" ["ORD-REJ-12", "ORD-REJ-02", "ORD-REJ-06", "ORD-CANCEL-19"] "Reports a refusal as FATAL at first, and right a moment later.";
+    RefusalTypeCorrected "refusal-type-corrected" ["ORD-REJ-06", "ORD-REJ-02", "ORD-REJ-12"] "Reports a refusal as internalError at first, and right a moment later.";
+    RefusalReferencesCorrected "refusal-references-corrected" ["ORD-REJ-14", "ORD-REJ-07", "ORD-CANCEL-20"] "Does not say what a refusal is about at first, and says it a moment later.";
     RejectionSilent "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order.";
 
     // Motion
@@ -290,6 +321,8 @@ faults! {
     PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
+    PauseLostOnLinkLoss "pause-lost-on-link-loss" ["ACT-12", "ACT-13"] "Ends its pause when the link breaks.";
+    OrderEndsPause "order-ends-pause" ["ACT-12", "ACT-13"] "Drives off with a new order although it is paused.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Pauses and goes on by message although a switch or the button at the vehicle forbids it.";
     BlockedPauseTaken "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
@@ -341,6 +374,10 @@ faults! {
 
     // State
     StateSilence "state-silence" ["STATE-02"] "Sends states only every 45 seconds when nothing happens.";
+    SilentWhileHeld "silent-while-held" ["STATE-02"] "Sends states only every 45 seconds while it waits for a release.";
+    SilentWhilePaused "silent-while-paused" ["STATE-02"] "Sends states only every 45 seconds while it is paused.";
+    SilentWhileActing "silent-while-acting" ["STATE-02"] "Sends states only every 45 seconds while an action runs.";
+    SilentByHand "silent-by-hand" ["STATE-02", "MODE-06"] "Sends states only every 45 seconds in MANUAL.";
     StatesByClock "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens.";
     StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
     SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
@@ -356,6 +393,7 @@ faults! {
     TraversedNodesListed "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last.";
     FinishedOrderListed "finished-order-listed" ["STATE-13"] "Keeps the last node in its states when the order is complete.";
     NewBaseRequestAlways "new-base-request-always" ["STATE-16"] "Asks for a new base all the time.";
+    NewBaseRequestStays "new-base-request-stays" ["STATE-16"] "Asks for a new base until its next order, once it has done so.";
     SafetyStateMissing "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states.";
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02", "ORD-CANCEL-08"] "Empties the orderId when the order is complete.";
     UpdateIdResetWhenDone "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete.";
@@ -377,6 +415,7 @@ faults! {
     NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13", "STATE-12"] "Leaves the sequenceId out of its node states.";
     HorizonReportedReleased "horizon-reported-released" ["STATE-MSG-13"] "Reports the nodes and edges of the horizon as released.";
     DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
+    DistanceNotReset "distance-not-reset" ["STATE-MSG-18"] "Counts the distance since its last node from the beginning of its order.";
     StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant.";
     ChargeGoodBad "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent.";
     ChargeMissing "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state.";
@@ -417,6 +456,7 @@ faults! {
     ReferenceValueNumeric "reference-value-numeric" ["ERR-05", "ORD-REJ-14"] "Gives numbers as reference values of errors.";
     ErrorsOmittedOnRequest "errors-omitted-on-request" ["ORD-REJ-03", "ORD-REJ-08", "ERR-01"] "Answers a stateRequest without its errors.";
     OwnErrorForgotten "own-error-forgotten" ["ERR-04", "ERR-01"] "Forgets an error of its own a moment later, although its cause is still there.";
+    OwnErrorClearedByOrder "own-error-cleared-by-order" ["ERR-01", "ERR-04"] "Forgets an error of its own with the next order, although its cause is still there.";
     OwnErrorKept "own-error-kept" ["ERR-01", "ERR-04"] "Keeps its errors for a minute, also when their cause is gone.";
     FatalDrives "fatal-drives" ["ERR-04"] "Drives on with a FATAL error.";
     OwnErrorMild "own-error-mild" ["ERR-04"] "Reports defects that keep it from running as a WARNING.";
@@ -424,9 +464,11 @@ faults! {
     ReferencesAsMap "references-as-map" ["BP-04", "ERR-05", "ORD-CANCEL-20"] "Gives the references of errors as one object.";
     InfoLevelWarning "info-level-warning" ["INFO-01", "JSON-02"] "Reports an information with the level WARNING.";
     SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
+    SemiautomaticEndsOrder "semiautomatic-ends-order" ["MODE-02"] "Gives its order up when it is switched from AUTOMATIC to SEMIAUTOMATIC.";
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
     ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
+    ManualKeepsActions "manual-keeps-actions" ["MODE-05"] "Clears its way in MANUAL and goes on with its actions.";
     OrderTakenUpAgain "order-taken-up-again" ["MODE-05"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC.";
     ManualLocks "manual-locks" ["MODE-02"] "Refuses the first order after it was driven by hand.";
     ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";

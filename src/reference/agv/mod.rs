@@ -37,6 +37,7 @@ mod stations;
 #[cfg(test)]
 mod tests;
 pub mod tolerances;
+mod updates;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;

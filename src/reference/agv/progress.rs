@@ -48,6 +48,7 @@ impl Agv {
                 break;
             }
         }
+        self.book.asked |= self.book.base_runs_low();
     }
 
     /// Begins actions of the order whose turn it is. A held vehicle begins nothing.
@@ -86,7 +87,8 @@ impl Agv {
             && !offline
             && !stuck
             && !warned
-            && !self.actions.block_driving(self.faults)
+            && (!self.actions.block_driving(self.faults)
+                || self.book.updated && self.faults.has(F::UpdateBreaksBlocking))
     }
 
     fn blocking_action_ended(&self) -> bool {
@@ -351,7 +353,10 @@ impl Agv {
         }
         self.update_last_node(&stop);
         if self.book.cancel.is_none() {
-            self.actions.trigger(Origin::Node(sequence_id), self.faults);
+            let of_update = sequence_id > self.book.first_end;
+            if !(of_update && self.faults.has(F::UpdateActionsNotPerformed)) {
+                self.actions.trigger(Origin::Node(sequence_id), self.faults);
+            }
             let ahead = self.book.edge_ahead().map(|edge| edge.sequence_id);
             if let Some(ahead) = ahead.filter(|_| self.faults.has(F::EdgeActionsOnNode)) {
                 self.actions.trigger(Origin::Edge(ahead), self.faults);

@@ -123,7 +123,7 @@ impl Agv {
             description: refusal.reason,
             life,
         };
-        self.errors.raise(error);
+        self.errors.refused(error, self.now.moment, self.faults);
     }
 
     /// What a faulty vehicle changes when it refuses an order.
@@ -155,6 +155,13 @@ impl Agv {
                 action.end(Status::Failed);
                 self.actions.push(action);
             }
+        }
+        if self.faults.has(F::RejectionDropsHorizon) {
+            self.book.drop_horizon();
+        }
+        if self.faults.has(F::RejectionClearsActionStates) {
+            self.actions
+                .retain(|action| !action.of_order() || !action.status.is_terminal());
         }
         if self.faults.has(F::RejectionStopsOrder)
             || (rule == Rule::Outdated && self.faults.has(F::OutdatedUpdateDropsOrder))

@@ -120,13 +120,27 @@ impl Agv {
     }
 
     fn usual_interval(&self) -> Duration {
-        if self.faults.has(F::StateSilence) {
+        if self.faults.has(F::StateSilence) || self.is_silent_now() {
             Duration::from_secs(45)
         } else if self.faults.has(F::StateIntervalExceeded) {
             self.stated_interval() * 2 + Duration::from_secs(2)
         } else {
             self.stated_interval()
         }
+    }
+
+    /// Whether a faulty vehicle is too busy with what it does to send states.
+    fn is_silent_now(&self) -> bool {
+        let held = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
+        let acts = || {
+            self.actions
+                .iter()
+                .any(|action| action.of_order() && action.status.is_active())
+        };
+        (held && self.faults.has(F::SilentWhileHeld))
+            || (self.holds.pause && self.faults.has(F::SilentWhilePaused))
+            || (self.mode == super::Mode::Manual && self.faults.has(F::SilentByHand))
+            || (self.faults.has(F::SilentWhileActing) && acts())
     }
 
     /// The interval the factsheet promises. A faulty vehicle that keeps events to itself has a long one, so that

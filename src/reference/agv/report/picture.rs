@@ -39,6 +39,12 @@ impl Agv {
         if self.config.line_guided() {
             set("distanceSinceLastNode", json!(self.distance_made()));
         }
+        if let Some((x, y)) = self.book.begun_at.filter(|_| has(F::DistanceNotReset)) {
+            set(
+                "distanceSinceLastNode",
+                json!(self.motion.pose(self.moment()).distance(x, y)),
+            );
+        }
         if has(F::DistanceNegative) {
             set("distanceSinceLastNode", json!(-1.0));
         }
@@ -56,9 +62,10 @@ impl Agv {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             set("paused", json!(self.holds.pause || button || self.holds.emergency));
         }
+        let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
         set(
             "newBaseRequest",
-            json!(self.book.base_runs_low() || self.persona.wants_base || has(F::NewBaseRequestAlways)),
+            json!(self.book.base_runs_low() || self.persona.wants_base || always),
         );
         set(
             "actionStates",
