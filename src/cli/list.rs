@@ -150,12 +150,17 @@ fn tests(library: &Library, pack: &Pack, role: Role) -> String {
             );
         }
     }
-    let moving = all.iter().filter(|test| test.moves).count();
+    let (cases, written): (Vec<_>, Vec<_>) = all.iter().partition(|test| test.drawn.is_some());
+    let moving = written.iter().filter(|test| test.moves).count();
     if !all.is_empty() {
+        let more = match cases.len() {
+            0 => String::new(),
+            cases => format!(", and {cases} cases from schemas"),
+        };
         let _ = writeln!(
             text,
-            "\n{} tests for role {role}, {moving} of them move the vehicle\n",
-            all.len()
+            "\n{} tests for role {role}, {moving} of them move the vehicle{more}\n",
+            written.len()
         );
     }
     text

@@ -1,6 +1,7 @@
 //! What actions do: their stages, their effect on the vehicle, and how a failure is reported.
 
 use std::f64::consts::PI;
+use std::time::Duration;
 
 use super::Agv;
 use super::action_kinds::Deed;
