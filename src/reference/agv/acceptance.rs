@@ -56,11 +56,19 @@ impl Agv {
     }
 
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
-        let mut order = Order::read(message)?;
+        let taken = super::leniency::taken(message, self.faults);
+        let mut order = Order::read(&taken)?;
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
-        let tolerated = |_: &Defect| self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty();
+        let tolerated = |defect: &Defect| {
+            let unchecked = match defect.path.rsplit('.').next() {
+                Some("sequenceId") => self.faults.has(F::SequenceUnchecked),
+                Some("startNodeId" | "endNodeId") => self.faults.has(F::EdgeEndsUnchecked),
+                _ => false,
+            };
+            unchecked || (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
+        };
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
         }

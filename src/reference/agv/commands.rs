@@ -145,6 +145,7 @@ impl Agv {
         self.holds = super::Holds::default();
         self.strayed = false;
         self.locked = false;
+        self.deaf = false;
         self.mode = Mode::Automatic;
         self.charging = false;
         self.report = super::Report::default();

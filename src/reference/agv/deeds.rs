@@ -114,12 +114,17 @@ impl Agv {
         let Some(duration) = self.actions.get(id).map(|action| self.duration_of(action)) else {
             return;
         };
-        let awaits = !self.faults.has(F::TriggerNotAwaited);
+        let given_up = self.faults.has(F::TriggerGivenUp);
+        let awaits = !given_up && !self.faults.has(F::TriggerNotAwaited);
         let stuck = self.faults.has(F::InstantActionStuck);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.status = Status::Running;
         let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
-        let duration = if waits { super::cancel::MOMENT } else { duration };
+        let duration = match waits {
+            true if given_up => Duration::from_millis(1_500),
+            true => super::cancel::MOMENT,
+            false => duration,
+        };
         let awaits = awaits && waits || action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights);
         let endless = awaits || (stuck && !action.of_order());
         action.due = (!endless).then(|| moment + duration);
@@ -386,6 +391,11 @@ impl Agv {
         self.maps.enable_any(map_id);
         let stale = action.of_order() && self.faults.has(F::LiftMapStale);
         let old = self.motion.pose(self.moment()).map_id;
+        let kept = self.motion.pose(self.moment());
+        let (x, y) = match self.faults.has(F::InitPositionKeepsPose) {
+            true => (kept.x, kept.y),
+            false => (x, y),
+        };
         self.motion.place(Pose {
             x,
             y,

@@ -108,6 +108,9 @@ faults! {
     VersionsNumeric "versions-numeric" ["FACT-10", "JSON-06"] "Gives its software version as a number.";
     OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
     MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
+    PickAsInstantAction "pick-as-instant-action" ["ACT-09"] "Declares pick as an instant action.";
+    ChargingOnEdges "charging-on-edges" ["ACT-09"] "Declares startCharging as an action for edges.";
+    StateRequestUnlisted "state-request-unlisted" ["FACT-07"] "Offers stateRequest but does not list it.";
     StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
 
     // Order
@@ -199,6 +202,19 @@ faults! {
     MalformedTakenOver "malformed-taken-over" ["ORD-REJ-01"] "Reports the orderId of a malformed order as its own.";
     UnreadableClearsOrder "unreadable-clears-order" ["ORD-REJ-01", "ORD-FLOW-12"] "Clears its order when it cannot read a message.";
     MissingIdTakenOver "missing-id-taken-over" ["ORD-REJ-01", "STATE-MSG-02"] "Reads a missing orderId as an empty one and reports it.";
+    ReleasedAssumed "released-assumed" ["ORD-REJ-01"] "Takes nodes and edges that do not say whether they are released for released ones.";
+    TextReadAsNumber "text-read-as-number" ["ORD-REJ-01"] "Takes numbers and Booleans that are written as text.";
+    NullReadAsDefault "null-read-as-default" ["ORD-REJ-01"] "Reads null as zero, as false or as nothing in particular.";
+    BlockingTypeUnchecked "blocking-type-unchecked" ["ORD-REJ-01"] "Takes every word it does not know for the blockingType NONE.";
+    MissingListReadAsEmpty "missing-list-read-as-empty" ["ORD-REJ-01"] "Takes a list that is missing for an empty one.";
+    NumbersWrapped "numbers-wrapped" ["ORD-REJ-01"] "Cuts numbers that are no whole numbers of 32 bits until they are.";
+    OptionalTypesUnchecked "optional-types-unchecked" ["ORD-REJ-01"] "Leaves optional members of a wrong type aside, although it supports them.";
+    EdgeEndsAssumed "edge-ends-assumed" ["ORD-11", "ORD-REJ-01"] "Lets every edge lead from the node before it to the one behind it, whatever it says.";
+    EdgeEndsUnchecked "edge-ends-unchecked" ["ORD-11"] "Takes edges that name other nodes than those around them.";
+    SequenceUnchecked "sequence-unchecked" ["ORD-11"] "Takes nodes and edges with doubled or missing sequenceIds.";
+    MalformedStopsOrder "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema.";
+    HeaderUnchecked "header-unchecked" ["ORD-REJ-01"] "Takes over orders whose header is broken.";
+    ParametersUnchecked "parameters-unchecked" ["ORD-REJ-04"] "Takes over orders whatever the parameters of their actions are.";
     ValidationErrorMisspelled "validation-error-misspelled" ["ORD-REJ-02"] "Calls a malformed order validationOrder, as an old figure does.";
     ValidationErrorFatal "validation-error-fatal" ["ORD-REJ-02"] "Reports a malformed order as FATAL.";
     ValidationErrorDroppedEarly "validation-error-dropped-early" ["ORD-REJ-03"] "Forgets the validationError after a moment.";
@@ -272,6 +288,10 @@ faults! {
     DownloadDisablesOthers "download-disables-others" ["MAP-22"] "Disables all other maps when it downloads one.";
     DuplicateMapAccepted "duplicate-map-accepted" ["MAP-23"] "Downloads a map again that it has.";
     DuplicateMapSilent "duplicate-map-silent" ["MAP-23"] "Raises no error for a map it has already.";
+    DownloadReplacesVersion "download-replaces-version" ["MAP-22"] "Disables the version of a map that is enabled when it downloads another one of it.";
+    DownloadDropsVersion "download-drops-version" ["MAP-22", "MAP-31"] "Deletes the other versions of a map when it downloads one.";
+    DeleteTakesAllVersions "delete-takes-all-versions" ["MAP-31", "MAP-29"] "Deletes every version of a map when one is to be deleted.";
+    DownloadNeverEnds "download-never-ends" ["MAP-18"] "Leaves downloadMap RUNNING for ever, although the map is there.";
     TwoMapsEnabled "two-maps-enabled" ["MAP-14", "MAP-24"] "Leaves the old version of a map enabled beside the new one.";
     EnableDisablesOtherMaps "enable-disables-other-maps" ["MAP-24"] "Disables all other maps when one is enabled, whatever their mapId.";
     EnableWithoutEffect "enable-without-effect" ["MAP-24"] "Reports enableMap FINISHED and enables nothing.";
@@ -327,6 +347,7 @@ faults! {
     ChargingTwiceFails "charging-twice-fails" ["ACT-11"] "Fails a startCharging while it charges.";
     ChargingShownAnyway "charging-shown-anyway" ["ACT-20"] "Reports that it charges although startCharging failed.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23", "ACT-24"] "Reports initPosition FINISHED and does nothing.";
+    InitPositionKeepsPose "init-position-keeps-pose" ["ACT-23"] "Takes over the last node of an initPosition, and keeps its pose.";
     InitPositionUninitialized "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose.";
     InitPositionTakenAnyway "init-position-taken-anyway" ["ACT-25"] "Changes its map although it fails an initPosition.";
     InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
@@ -346,13 +367,19 @@ faults! {
     PositioningFailureFinished "positioning-failure-finished" ["ACT-36"] "Reports finePositioning FINISHED although there is no target.";
     FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick, a drop or charging fails.";
     TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
+    TriggerGivenUp "trigger-given-up" ["ACT-37"] "Waits for a trigger for a second and a half only.";
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
     InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09", "ORD-CANCEL-18"] "Performs instant actions without an action state.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
-    UnknownInstantFinished "unknown-instant-finished" ["IACT-06"] "Reports an instant action it does not know as FINISHED.";
+    UnknownInstantFinished "unknown-instant-finished" ["IACT-04", "IACT-06"] "Reports an instant action it does not know as FINISHED.";
+    UnknownInstantSilent "unknown-instant-silent" ["IACT-06"] "Fails an instant action it cannot perform, and raises no error.";
+    UnknownInstantUnreferenced "unknown-instant-unreferenced" ["BP-01"] "Raises an error without references for an instant action it cannot perform.";
+    MalformedInstantDeafens "malformed-instant-deafens" ["IACT-03"] "Takes no instant actions any more once one of them was malformed.";
+    MalformedInstantStopsOrder "malformed-instant-stops-order" ["ORD-06"] "Gives its order up when an instant action is malformed.";
+    InstantActionFadesAway "instant-action-fades-away" ["STATE-MSG-10", "STATE-MSG-11", "STATE-MSG-09"] "Removes running instant actions from its states when another one arrives.";
     OnlyFirstInstantAction "only-first-instant-action" ["IACT-07", "IACT-03"] "Performs only the first action of an instantActions message.";
 
     // State

@@ -23,6 +23,7 @@ mod factsheet;
 pub mod faults;
 mod instant;
 pub mod lapses;
+mod leniency;
 mod maps;
 mod motion;
 mod order_message;
@@ -136,6 +137,8 @@ pub struct Agv {
     obstacles: BTreeSet<String>,
     /// It refuses the next order (`order-error-locks`, `manual-locks` only).
     locked: bool,
+    /// `malformed-instant-deafens`: no instant action is heard any more.
+    deaf: bool,
     /// It has left its corridor and was not put back yet.
     strayed: bool,
     /// Where loads are handed over, and whether one stands there.
@@ -217,6 +220,7 @@ impl Agv {
             loads: Vec::new(),
             obstacles: BTreeSet::new(),
             locked: false,
+            deaf: false,
             strayed: false,
             stations: config.stations.clone(),
             shadow: None,
