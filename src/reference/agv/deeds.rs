@@ -123,8 +123,12 @@ impl Agv {
 
     /// A stage of an action has ended.
     pub(super) fn stage_finished(&mut self, id: &str) {
+        let missed = !self.connection.online && self.faults.has(F::ActionEndMissedOffline);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.due = None;
+        if missed && action.of_order() {
+            return;
+        }
         if action.kind.is_some_and(|kind| kind.deed == Deed::DownloadMap) {
             self.download_failed(id, "the server did not deliver in time");
             return;

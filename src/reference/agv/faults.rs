@@ -22,6 +22,7 @@ faults! {
     OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
     UpdateForgottenOnLinkLoss "update-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-02"] "Goes back to the first orderUpdateId of its order when the link breaks.";
     ActionsForgottenOnLinkLoss "actions-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-10"] "Forgets the actions of its order when the link breaks.";
+    ActionEndMissedOffline "action-end-missed-offline" ["MQTT-04"] "Leaves an action RUNNING for ever that ends while the link is down.";
     StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
     HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07", "MQTT-04"] "Drives into the horizon while the link is down.";
     OldMqtt "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1.";
@@ -134,6 +135,7 @@ faults! {
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
     OnlyFirstUpdate "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before.";
     UpdateActionsLost "update-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its nodes and edges.";
+    UpdateEdgeActionsLost "update-edge-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its edges.";
     UpdateActionsNotPerformed "update-actions-not-performed" ["ACT-01", "NODE-04"] "Lists the actions of an update and never begins them.";
     ReleasedActionsLost "released-actions-lost" ["ASTATE-01"] "Forgets an action of its horizon when an update releases it.";
     ReleasedActionsDoubled "released-actions-doubled" ["STATE-MSG-09", "ASTATE-01"] "Lists an action of its horizon a second time when an update releases it.";
@@ -144,7 +146,7 @@ faults! {
     UpdateBreaksBlocking "update-breaks-blocking" ["BLOCK-04", "BLOCK-07"] "Drives off with an update although an action that stops it still runs.";
     UpdateRefusedWhileActing "update-refused-while-acting" ["ORD-FLOW-09"] "Refuses updates while an action of the order runs.";
     UpdateRefusedWhilePaused "update-refused-while-paused" ["ORD-FLOW-09"] "Refuses updates while it is paused.";
-    UpdateEndsPause "update-ends-pause" ["ACT-12", "ACT-13"] "Goes on with an update although it is paused.";
+    UpdateEndsPause "update-ends-pause" ["ACT-12"] "Goes on with an update although it is paused.";
     UpdateRefusedAfterCut "update-refused-after-cut" ["ORD-FLOW-09"] "Refuses updates of an order that it had before its link broke.";
     CompletedUpdateGapAccepted "completed-update-gap-accepted" ["ORD-FLOW-10"] "Continues a completed order from whatever node the update begins with.";
     ContinuationNotDriven "continuation-not-driven" ["ORD-06", "ORD-FLOW-11"] "Takes over an update of a completed order and does not drive it.";
@@ -167,6 +169,7 @@ faults! {
     CancelKeepsNodes "cancel-keeps-nodes" ["ORD-CANCEL-09"] "Keeps all node states while it drives to the node where it stops.";
     CancelLastNodeStale "cancel-last-node-stale" ["ORD-CANCEL-10"] "Does not report the node where it stopped after a cancellation.";
     CancelClearsLastNode "cancel-clears-last-node" ["STATE-MSG-04"] "Empties the lastNodeId when the order is cancelled.";
+    LastNodeAheadWhenCancelled "last-node-ahead-when-cancelled" ["STATE-MSG-04"] "Names the node ahead as its last one when it is stopped between two nodes.";
     CancelLeavesNodes "cancel-leaves-nodes" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order.";
     CancelDropsActions "cancel-drops-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Removes the action states of a cancelled order.";
     DeadAfterCancel "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation.";
@@ -176,6 +179,7 @@ faults! {
     PausedActionsSurviveCancel "paused-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while actions are PAUSED, and goes on with them after the pause.";
     PreparedActionsSurviveCancel "prepared-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while it prepares an action, and performs it.";
     SecondCancelTakesOver "second-cancel-takes-over" ["ORD-CANCEL-07", "IACT-04"] "Forgets a cancelOrder that is under way when a second one comes.";
+    CancelEndedByUpdate "cancel-ended-by-update" ["ORD-CANCEL-11", "ORD-CANCEL-02", "ORD-CANCEL-06"] "Ends a cancellation that is under way when an update comes, and drives it.";
     CancelMissesEdgeActions "cancel-misses-edge-actions" ["ORD-CANCEL-03"] "Leaves the waiting actions of edges WAITING when the order is cancelled.";
     CancelForgetsLoad "cancel-forgets-load" ["STATE-MSG-06"] "Shows no load any more when its order is cancelled.";
     TemporaryNodeRefused "temporary-node-refused" ["ORD-CANCEL-15"] "Refuses orders that begin at a node it has never heard of.";
@@ -299,7 +303,7 @@ faults! {
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
     PauseLostOnLinkLoss "pause-lost-on-link-loss" ["ACT-12", "ACT-13"] "Ends its pause when the link breaks.";
-    OrderEndsPause "order-ends-pause" ["ACT-12", "ACT-13"] "Drives off with a new order although it is paused.";
+    OrderEndsPause "order-ends-pause" ["ACT-12"] "Drives off with a new order although it is paused.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Pauses and goes on by message although a switch or the button at the vehicle forbids it.";
     BlockedPauseTaken "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
@@ -347,7 +351,7 @@ faults! {
     SilentWhileHeld "silent-while-held" ["STATE-02"] "Sends states only every 45 seconds while it waits for a release.";
     SilentWhilePaused "silent-while-paused" ["STATE-02"] "Sends states only every 45 seconds while it is paused.";
     SilentWhileActing "silent-while-acting" ["STATE-02"] "Sends states only every 45 seconds while an action runs.";
-    SilentByHand "silent-by-hand" ["STATE-02", "MODE-06"] "Sends states only every 45 seconds in MANUAL.";
+    SilentByHand "silent-by-hand" ["STATE-02"] "Sends states only every 45 seconds in MANUAL.";
     StatesByClock "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens.";
     StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
     SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
@@ -426,7 +430,7 @@ faults! {
     ReferenceValueNumeric "reference-value-numeric" ["ERR-05", "ORD-REJ-14"] "Gives numbers as reference values of errors.";
     ErrorsOmittedOnRequest "errors-omitted-on-request" ["ORD-REJ-03", "ORD-REJ-08", "ERR-01"] "Answers a stateRequest without its errors.";
     OwnErrorForgotten "own-error-forgotten" ["ERR-04", "ERR-01"] "Forgets an error of its own a moment later, although its cause is still there.";
-    OwnErrorClearedByOrder "own-error-cleared-by-order" ["ERR-01", "ERR-04"] "Forgets an error of its own with the next order, although its cause is still there.";
+    OwnErrorClearedByOrder "own-error-cleared-by-order" ["ERR-01"] "Forgets an error of its own with the next order, although its cause is still there.";
     OwnErrorKept "own-error-kept" ["ERR-01", "ERR-04"] "Keeps its errors for a minute, also when their cause is gone.";
     FatalDrives "fatal-drives" ["ERR-04"] "Drives on with a FATAL error.";
     OwnErrorMild "own-error-mild" ["ERR-04"] "Reports defects that keep it from running as a WARNING.";
@@ -438,7 +442,8 @@ faults! {
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
     ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
-    ManualKeepsActions "manual-keeps-actions" ["MODE-05"] "Clears its way in MANUAL and goes on with its actions.";
+    ManualDrivesOn "manual-drives-on" ["MODE-05"] "Clears its states in MANUAL and drives its base to the end.";
+    ManualKeepsActions "manual-keeps-actions" ["MODE-05", "MODE-02"] "Clears its way in MANUAL and goes on with its actions.";
     OrderTakenUpAgain "order-taken-up-again" ["MODE-05"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC.";
     ManualLocks "manual-locks" ["MODE-02"] "Refuses the first order after it was driven by hand.";
     ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";
