@@ -42,6 +42,7 @@ struct Job {
     command: Vec<String>,
     run: String,
     no_motion: bool,
+    certifies: bool,
     /// How many mock AGVs there are when a master control is tested.
     vehicles: usize,
 }
@@ -105,6 +106,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         command: std::env::args().collect(),
         run,
         no_motion: arguments.device.no_motion,
+        certifies: arguments.certifies,
         vehicles: arguments.vehicles.map_or(USUAL_FLEET, |count| count as usize),
     };
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -141,7 +143,18 @@ pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
             .hint("take it out of the section [time] of the profile, or wherever `run -v` says it comes from, or use `run`")
             .into());
     }
+    let device = &effective.profile.device;
+    let is_foreign = arguments.profile.is_some() || device.manufacturer.is_some() || device.serial_number.is_some();
+    if is_foreign && device.role == Role::Agv && !effective.profile.motion.allowed {
+        let title = "a certificate is about driving, too, and the profile does not allow motion";
+        return Err(Diagnostic::whole("certify", title)
+            .hint(
+                "set `allowed = true` in the section [motion] of the profile where the vehicle may drive, or use `run`",
+            )
+            .into());
+    }
     run_command(&args::Run {
+        certifies: true,
         device: args::DeviceArgs {
             profile: arguments.profile.clone(),
             ..args::DeviceArgs::default()
@@ -199,6 +212,7 @@ impl Job {
         request.begun = utc;
         request.run.clone_from(&self.run);
         request.command.clone_from(&self.command);
+        request.motion = self.motion();
         let mut terminal = self.screen(&device_name);
         let mut saved = |judge: &RunJudge| drop(write_result(&bundle, &judge.result()));
         let finished = run_virtually(
@@ -252,11 +266,8 @@ impl Job {
             vantage: Vantage::Tap,
             hooks: operator.hooks(),
             maps: true,
-            motion: if self.no_motion {
-                Err(NO_MOTION.to_owned())
-            } else {
-                Ok(())
-            },
+            motion: self.motion(),
+            claims_add: true,
         };
         let session = SessionParts {
             subject: device.subject().clone(),
@@ -328,9 +339,6 @@ impl Job {
             (false, true) => Ok(()),
         };
         let mut limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
-        if let Err(why) = &motion {
-            limits.push(format!("No test that moves the vehicle was run: {why}."));
-        }
         let capabilities = Capabilities {
             factsheet: None,
             statements: statements(&profile.device),
@@ -339,6 +347,7 @@ impl Job {
             hooks: operator.hooks(),
             maps: true,
             motion,
+            claims_add: !self.certifies,
         };
         let session = SessionParts {
             subject,
@@ -373,6 +382,14 @@ impl Job {
             vehicle.config.start_node.clone_from(node);
         }
         fleet
+    }
+
+    fn motion(&self) -> Result<(), String> {
+        if self.no_motion {
+            Err(NO_MOTION.to_owned())
+        } else {
+            Ok(())
+        }
     }
 
     fn screen(&self, device: &str) -> Screen {

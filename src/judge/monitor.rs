@@ -33,6 +33,8 @@ pub struct MonitorJudge {
     findings: Vec<MonitorFinding>,
     /// The first fail since the running test began: requirement and entry.
     broken: Option<(String, u64)>,
+    /// The requirement of the first fail of the run.
+    accuses: Option<String>,
 }
 
 enum Watching {
@@ -71,6 +73,7 @@ impl MonitorJudge {
             judged: 0,
             findings: Vec::new(),
             broken: None,
+            accuses: None,
         })
     }
 
@@ -169,6 +172,7 @@ impl MonitorJudge {
             }
             if verdict == Verdict::Fail && self.broken.is_none() && !self.monitor.hides.is_empty() {
                 self.broken = Some((id.as_str().to_owned(), finding.seq));
+                self.accuses.get_or_insert_with(|| id.as_str().to_owned());
             }
             let known = self
                 .findings
@@ -224,6 +228,15 @@ impl MonitorJudge {
                 seq: *seq,
             })
             .collect()
+    }
+
+    /// The members that show nothing for what was found in this run, with the requirement.
+    pub(super) fn accused(&self) -> Vec<(String, String)> {
+        let Some(requirement) = &self.accuses else {
+            return Vec::new();
+        };
+        let members = self.monitor.hides.iter();
+        members.map(|member| (member.clone(), requirement.clone())).collect()
     }
 
     /// The monitor.

@@ -4,10 +4,14 @@
 //! result at any time. Nothing but the journal and the suites enters it, so judging a journal again gives
 //! the same result, byte for byte.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use serde_json::Value;
+
 use super::decide::mood;
+use super::mend::mended;
 use super::reactions::Reactions;
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
@@ -62,6 +66,8 @@ pub struct RunJudge {
     timeline: Timeline,
     watches: Watches,
     reactions: Reactions,
+    /// The instant actions the harness has sent: type by id.
+    instants: BTreeMap<String, String>,
     current: Option<TestJudge>,
     done: Vec<TestResult>,
     plan: Plan,
@@ -92,6 +98,7 @@ impl RunJudge {
             role,
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: Arc::clone(&bindings),
+            waivers: Vec::new(),
         };
         // What a master control sends names the vehicle it is for.
         let mut of_vehicles = header
@@ -125,6 +132,7 @@ impl RunJudge {
             last: first.at(),
             watches,
             reactions,
+            instants: BTreeMap::new(),
             current: None,
             done: Vec::new(),
             plan: Plan::default(),
@@ -141,7 +149,11 @@ impl RunJudge {
         }
         self.watches
             .observe(entry, subject.as_deref(), &self.timeline, &self.ground);
+        if self.role == Role::Agv {
+            self.note_instants(entry);
+        }
         match entry.event() {
+            Event::Waived { waiver } => self.ground.waivers.push(waiver.clone()),
             Event::Planned { plan } => self.plan = (**plan).clone(),
             // Outside a test, a variable gets its value for the whole run.
             Event::Bound { name, value } if self.current.is_none() => {
@@ -170,9 +182,60 @@ impl RunJudge {
         if matches!(entry.event(), Event::TestEnded { .. })
             && let Some(current) = self.current.take()
         {
-            self.done.push(current.result().clone());
+            self.ended(current.result().clone());
         }
         Ok(())
+    }
+
+    fn note_instants(&mut self, entry: &Entry) {
+        let Event::Sent { topic, .. } = entry.event() else {
+            return;
+        };
+        if self.ground.topics.get("instantActions") != Some(topic) {
+            return;
+        }
+        let actions = entry.json().and_then(|message| message.get("actions")?.as_array());
+        for action in actions.into_iter().flatten() {
+            let text = |name: &str| action.get(name).and_then(Value::as_str).map(str::to_owned);
+            if let (Some(id), Some(kind)) = (text("actionId"), text("actionType")) {
+                self.instants.insert(id, kind);
+            }
+        }
+    }
+
+    /// Keeps the result of a test. One that was tried before and decided nothing is replaced.
+    fn ended(&mut self, mut result: TestResult) {
+        let decided = |result: &TestResult| {
+            let mut decisions = result.decisions.iter();
+            decisions.any(|decision| decision.verdict != Verdict::Inconclusive)
+        };
+        let before = self.done.iter().position(|done| done.id == result.id && !decided(done));
+        if let Some(before) = before {
+            let before = self.done.remove(before);
+            let why = before.reason.unwrap_or_else(|| "it decided nothing".to_owned());
+            result.allowances.push(format!("tried again, since at first: {why}"));
+        }
+        self.done.push(result);
+    }
+
+    /// What the vehicle says of itself: the last state of its present connection, read as it is meant.
+    pub fn state(&self) -> Option<Cow<'_, Value>> {
+        let entry = self.timeline.present("state")?;
+        let state = entry.json()?;
+        Some(match mended(state, entry.seq(), &self.timeline, &self.ground.waivers) {
+            Some((meant, _)) => Cow::Owned(meant),
+            None => Cow::Borrowed(state),
+        })
+    }
+
+    /// The type of an instant action of the harness, by its id.
+    pub fn sent_instant(&self, id: &str) -> Option<String> {
+        self.instants.get(id).cloned()
+    }
+
+    /// The members of the state that show nothing, by what monitors have found in this run: member and requirement.
+    pub fn accused(&self) -> Vec<(String, String)> {
+        self.watches.accused()
     }
 
     /// The journal is at its end without `RunEnded`, as after a crash.
@@ -227,7 +290,17 @@ impl RunJudge {
 
     /// The result as it stands.
     pub fn result(&self) -> RunResult {
+        // Which order they were run in is the harness's own business.
         let mut tests = self.done.clone();
+        let places: BTreeMap<&str, usize> = self
+            .rules
+            .suites
+            .tests
+            .iter()
+            .enumerate()
+            .map(|(at, test)| (test.id.as_str(), at))
+            .collect();
+        tests.sort_by_key(|test| places.get(test.id.as_str()).copied());
         tests.extend(self.set_aside());
         let watched = self.watches.results();
         let all = tests
@@ -304,6 +377,7 @@ impl RunJudge {
                 journal: None,
                 decisions: Vec::new(),
                 steps: Vec::new(),
+                allowances: Vec::new(),
             };
             if test.maturity == crate::suite::model::Maturity::Reviewed {
                 "reviewed".clone_into(&mut result.maturity);
@@ -339,7 +413,7 @@ impl RunJudge {
         for test in tests {
             for decision in &test.decisions {
                 let (verdict, by) = decided.entry(decision.requirement.as_str()).or_default();
-                verdict.add(decision.verdict);
+                verdict.add(decision.verdict());
                 if !by.contains(&test.id) {
                     by.push(test.id.clone());
                 }
@@ -404,19 +478,7 @@ impl RunJudge {
 }
 
 fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
-    Decision {
-        requirement: requirement.to_owned(),
-        verdict: Verdict::Inconclusive,
-        clause,
-        place,
-        witness: None,
-        message: why.to_owned(),
-        expected: None,
-        nearest: None,
-        waited: None,
-        explanation: None,
-        interpretation: None,
-    }
+    Decision::new(requirement, Verdict::Inconclusive, clause, place, why.to_owned())
 }
 
 /// Judges a whole journal.

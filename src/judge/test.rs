@@ -11,16 +11,16 @@ use serde_json::{Map, Value};
 
 use super::decide::decide;
 use super::departure::Departure;
-use super::hidden::{Hidden, take_back};
+use super::hidden::{Hidden, Open, hide};
 use super::step::{Evaluator, Position, Progress, StepOutcome};
 use super::timeline::Timeline;
 use super::window::Scene;
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::{Event, StepEnd};
+use crate::journal::event::{Event, StepEnd, Waiver};
 use crate::pack::{Catalogue, Pack, Role};
 use crate::pattern::Bindings;
-use crate::report::result::{StepResult, TestResult, Waited};
+use crate::report::result::{Decision, StepResult, TestResult, Waited};
 use crate::suite::model::{Maturity, Section, Step, Test, Verb};
 use crate::verdict::{Accumulated, Verdict};
 
@@ -38,6 +38,8 @@ pub struct Ground {
     pub identity: (String, String),
     /// `time`, `device`.
     pub bindings: Arc<Map<String, Value>>,
+    /// Lasting mistakes of the vehicle that do not stand in the way any more.
+    pub waivers: Vec<Waiver>,
 }
 
 /// A test being judged.
@@ -57,6 +59,9 @@ pub struct TestJudge {
     result: TestResult,
     departure: Departure,
     hidden: Vec<Hidden>,
+    /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
+    /// decided before.
+    open: Vec<Open>,
     ended: bool,
 }
 
@@ -104,9 +109,11 @@ impl TestJudge {
                 journal: Some((seq, seq)),
                 decisions: Vec::new(),
                 steps: Vec::new(),
+                allowances: Vec::new(),
             },
             departure: Departure::default(),
             hidden: Vec::new(),
+            open: Vec::new(),
             ended: false,
         }
     }
@@ -191,6 +198,7 @@ impl TestJudge {
             bindings: &self.bindings,
             timeline,
             entries: &self.entries,
+            waivers: &ground.waivers,
         }
     }
 
@@ -240,6 +248,11 @@ impl TestJudge {
         let at = entry.at().moment;
         let outcome = evaluator.end(at, cut_short.as_deref(), &self.scene(timeline, ground));
         self.record_step(&step, &outcome, end, begun, entry);
+        for allowance in &outcome.allowances {
+            if !self.result.allowances.contains(allowance) {
+                self.result.allowances.push(allowance.clone());
+            }
+        }
         if let StepEnd::Broken(why) = end {
             self.broken(section, &step, why);
         }
@@ -276,7 +289,13 @@ impl TestJudge {
             };
             for clause in outcome.clauses {
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
-                self.push(decide(clause, &step.path, waited, &ground.catalogue, &ground.pack));
+                self.open.push(Open {
+                    clause,
+                    path: step.path.clone(),
+                    walks: matches!(step.verb, Verb::Action(_)),
+                    ended: entry.seq(),
+                    waited,
+                });
             }
         }
     }
@@ -306,9 +325,9 @@ impl TestJudge {
         });
     }
 
-    fn push(&mut self, decision: Option<crate::report::result::Decision>) {
+    fn push(&mut self, decision: Option<Decision>) {
         if let Some(decision) = decision {
-            self.verdict.add(decision.verdict);
+            self.verdict.add(decision.verdict());
             self.result.decisions.push(decision);
         }
     }
@@ -324,9 +343,12 @@ impl TestJudge {
             return;
         }
         self.result.seconds = at.since(self.begun.1).as_secs_f64();
-        let hidden = take_back(&mut self.result.decisions, &self.result.steps, &self.hidden);
-        let decided = self.result.decisions.iter();
-        self.verdict = decided.map(|decision| decision.verdict).collect();
+        let mut open = std::mem::take(&mut self.open);
+        let hidden = hide(&mut open, &self.hidden);
+        for open in open {
+            let decision = decide(open.clause, &open.path, open.waited, &ground.catalogue, &ground.pack);
+            self.push(decision);
+        }
         let why = match (&self.trouble, &self.preamble, &self.body) {
             (Some(trouble), _, _) => trouble.clone(),
             (None, Ok(()), _) if hidden.is_some() => hidden.unwrap_or_default(),
@@ -358,19 +380,8 @@ impl TestJudge {
                 if super::decide::mood(&ground.catalogue, &ground.pack, requirement.as_str()).is_none() {
                     continue;
                 }
-                let decision = crate::report::result::Decision {
-                    requirement: requirement.as_str().to_owned(),
-                    verdict: Verdict::Inconclusive,
-                    clause,
-                    place: step.verb_span.place(),
-                    witness: None,
-                    message: why.clone(),
-                    expected: None,
-                    nearest: None,
-                    waited: None,
-                    explanation: None,
-                    interpretation: None,
-                };
+                let place = step.verb_span.place();
+                let decision = Decision::new(requirement.as_str(), Verdict::Inconclusive, clause, place, why.clone());
                 self.push(Some(decision));
             }
         }
@@ -393,7 +404,7 @@ impl TestJudge {
             .result
             .decisions
             .iter()
-            .find(|decision| decision.verdict == verdict);
+            .find(|decision| decision.verdict() == verdict);
         Some(match decisive {
             Some(decision) if verdict != Verdict::Inconclusive => {
                 format!("{}: {}", decision.requirement, decision.message)

@@ -142,6 +142,40 @@ impl Timeline {
         all[..all.partition_point(|entry| entry.seq() < seq)].last()
     }
 
+    /// The last entry of a subject that counts. A state counts from the present connection of the client that
+    /// publishes: what a vehicle said before it went away is not what it says now.
+    #[must_use]
+    pub fn present(&self, subject: &str) -> Option<&Arc<Entry>> {
+        let last = self.of(subject).last()?;
+        let is_past = !self.own && subject == "state" && self.connected().is_some_and(|since| last.seq() < since);
+        (!is_past).then_some(last)
+    }
+
+    /// When the client that publishes the states connected last, as the tap has seen it.
+    fn connected(&self) -> Option<u64> {
+        let publishing = self.publishing()?;
+        let mut later = self
+            .of("mqtt/connect")
+            .iter()
+            .rev()
+            .take_while(|entry| number_of(entry) != Some(publishing));
+        let client = self
+            .of("mqtt/connect")
+            .iter()
+            .rev()
+            .find(|entry| number_of(entry) == Some(publishing))?;
+        let again = later.find(|entry| client_of(entry) == client_of(client));
+        Some(again.unwrap_or(client).seq())
+    }
+
+    /// The connection of the client that published the last state, as the tap has seen it.
+    #[must_use]
+    pub fn publishing(&self) -> Option<u64> {
+        let published = self.of("mqtt/publish").iter().rev();
+        let mut states = published.filter(|entry| self.place(entry).is_some_and(|place| place.name == "state"));
+        number_of(states.next()?)
+    }
+
     /// What the last message of a subject before a journal number said.
     #[must_use]
     pub fn baseline(&self, subject: &str, seq: u64) -> Option<Value> {
@@ -152,6 +186,27 @@ impl Timeline {
     #[must_use]
     pub fn last(&self) -> Option<Stamp> {
         self.last
+    }
+}
+
+/// The number of the connection an entry is about.
+#[must_use]
+pub fn number_of(entry: &Entry) -> Option<u64> {
+    match entry.event() {
+        Event::Packet { connection, .. } | Event::Closed { connection, .. } => Some(*connection),
+        _ => None,
+    }
+}
+
+/// The client id of a CONNECT.
+#[must_use]
+pub fn client_of(entry: &Entry) -> Option<&str> {
+    match entry.event() {
+        Event::Packet {
+            packet: Packet::Connect { client_id, .. },
+            ..
+        } => Some(client_id),
+        _ => None,
     }
 }
 

@@ -148,6 +148,11 @@ impl Watches {
         all.flat_map(MonitorJudge::hidden).collect()
     }
 
+    /// The members that show nothing any more for what monitors have found in this run, with the requirement.
+    pub fn accused(&self) -> Vec<(String, String)> {
+        self.first.monitors.iter().flat_map(MonitorJudge::accused).collect()
+    }
+
     /// What was found, monitor by monitor.
     pub fn results(&self) -> Vec<Watched> {
         let mut all: Vec<Watched> = self.first.monitors.iter().map(of).collect();

@@ -9,6 +9,7 @@ use super::step::Holds;
 use super::timeline::Timeline;
 use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::journal::Entry;
+use crate::journal::event::Waiver;
 use crate::pack::{Pack, Role};
 use crate::pattern::Bindings;
 use crate::suite::model::{Binding, CheckUse};
@@ -33,6 +34,8 @@ pub struct Scene<'a> {
     pub timeline: &'a Timeline,
     /// All entries of the test so far.
     pub entries: &'a [Arc<Entry>],
+    /// Lasting mistakes of the vehicle that do not stand in the way any more.
+    pub waivers: &'a [Waiver],
 }
 
 /// A named check running over a window.

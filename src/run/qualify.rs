@@ -172,7 +172,7 @@ pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
                 requirement: decision.requirement.clone(),
                 place: format!("{} {}", test.id, decision.clause),
             };
-            all.push((decider, decision.verdict));
+            all.push((decider, decision.verdict()));
         }
     }
     for requirement in &result.requirements {

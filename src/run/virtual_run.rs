@@ -43,6 +43,8 @@ pub struct VirtualRun {
     pub coalesce: Duration,
     /// From where the harness sees.
     pub vantage: Vantage,
+    /// Whether the vehicle may drive; `Err` says why not.
+    pub motion: Result<(), String>,
     /// When it begins; virtual time goes on from here.
     pub begun: jiff::Timestamp,
     /// Identifier of the run.
@@ -72,6 +74,7 @@ impl VirtualRun {
             jitter: Duration::ZERO,
             coalesce: Duration::ZERO,
             vantage: Vantage::Tap,
+            motion: Ok(()),
             begun: jiff::Timestamp::UNIX_EPOCH,
             run: "virtual".to_owned(),
             command: Vec::new(),
@@ -180,7 +183,8 @@ pub async fn run_virtually(
             vantage: request.vantage,
             hooks,
             maps: true,
-            motion: Ok(()),
+            motion: request.motion,
+            claims_add: true,
         },
         layout: Some(device.layout().clone()),
         vehicles: mocks,

@@ -43,6 +43,9 @@ pub struct Run {
         conflicts_with = "profile"
     )]
     pub fault: Vec<String>,
+    /// Whether it is for a certificate.
+    #[arg(skip)]
+    pub certifies: bool,
     /// Give the built-in device a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(
         long,

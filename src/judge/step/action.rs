@@ -8,7 +8,9 @@ use super::{Holds, Position, Progress, StepOutcome, backlog, bound_clauses, limi
 use crate::clock::Moment;
 use crate::diagnostic::Span;
 use crate::journal::Entry;
+use crate::journal::event::Waiver;
 use crate::judge::limit::Limit;
+use crate::judge::mend::is_lasting;
 use crate::judge::window::Scene;
 use crate::report::result::NearestMiss;
 use crate::suite::model::{ActionWalk, Step, Walk};
@@ -28,6 +30,10 @@ pub(crate) struct Walking {
     walked: Vec<String>,
     last: Option<Arc<Entry>>,
     seen: u64,
+    /// Actions that are known never to end, where nothing is decided.
+    waivers: Vec<Waiver>,
+    /// It is one of them.
+    lasting: bool,
 }
 
 /// Where on a walk an action can be.
@@ -100,6 +106,12 @@ impl Walking {
             walked: Vec::new(),
             last: None,
             seen: 0,
+            waivers: if verb.checks.is_empty() {
+                scene.waivers.to_vec()
+            } else {
+                Vec::new()
+            },
+            lasting: false,
         };
         for entry in backlog(scene.timeline, TOPIC, sent) {
             this.look_at(&entry);
@@ -128,6 +140,8 @@ impl Walking {
         shown.truncate(shown.char_indices().nth(40).map_or(shown.len(), |(at, _)| at));
         self.walked.push(shown);
         self.last = Some(Arc::clone(entry));
+        let action = entry.json().and_then(|state| action_of(state, &self.id));
+        self.lasting = action.is_some_and(|action| is_lasting(action, &self.waivers));
         self.through.step(status);
         if let Some(tolerated) = &mut self.tolerated {
             tolerated.step(status);
@@ -136,7 +150,19 @@ impl Walking {
 
     fn decided(&self) -> bool {
         let lost = self.through.left() && self.tolerated.as_ref().is_none_or(Track::left);
-        self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost
+        self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost || self.lasting
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        let told = format!(
+            "it is not waited for that this action ends, which is {}",
+            self.walked.join(" -> ")
+        );
+        if self.lasting && !self.through.done() {
+            vec![told]
+        } else {
+            Vec::new()
+        }
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -166,6 +192,8 @@ impl Walking {
                 Some(took) => (Holds::Late, format!("walked {walked}, after {}", seconds(took))),
                 None => (Holds::Yes, format!("walked {walked}")),
             }
+        } else if self.lasting {
+            (Holds::Yes, format!("walked {walked}, and is known to go no further"))
         } else if self.tolerated.as_ref().is_some_and(Track::done) {
             (Holds::Softly, format!("walked {walked}, which a ruling tolerates"))
         } else if self.decided() {
@@ -204,15 +232,18 @@ impl Walking {
             saves: saves.collect(),
             clauses,
             seen: self.seen,
+            allowances: Vec::new(),
         }
     }
 }
 
+fn action_of<'a>(state: &'a Value, id: &str) -> Option<&'a Value> {
+    let mut all = state.get("actionStates")?.as_array()?.iter();
+    all.find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))
+}
+
 fn status_of<'a>(state: &'a Value, id: &str) -> Option<&'a str> {
-    let all = state.get("actionStates")?.as_array()?;
-    let one = all
-        .iter()
-        .find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))?;
+    let one = action_of(state, id)?;
     Some(one.get("actionStatus").and_then(Value::as_str).unwrap_or("no status"))
 }
 

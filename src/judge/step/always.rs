@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::weigh::convinces;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, keep_nearest, limit,
     seconds, shown_path,
 };
 use crate::clock::Moment;
@@ -48,7 +48,11 @@ struct Violation {
 
 impl Holding {
     pub(super) fn begin(verb: &Always, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
-        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?;
+        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
+            &verb.subject(),
+            &ids(&verb.checks),
+            scene,
+        );
         let check = selector
             .check
             .take()
@@ -58,15 +62,17 @@ impl Holding {
             Extent::During(time) => (None, position.begun + limit(time, scene)?.hard),
             Extent::Until(until) => {
                 let limit = limit(&until.within, scene)?;
-                let goal = Goal {
-                    selector: Selector::bind(&until.selection, &until.subject(), &until.at, position, scene)?,
-                    until: (**until).clone(),
-                    limit,
-                    nearest: None,
-                    reached: None,
-                    doubtful: None,
-                    seen: 0,
-                };
+                let goal =
+                    Goal {
+                        selector: Selector::bind(&until.selection, &until.subject(), &until.at, position, scene)?
+                            .lenient(&until.subject(), &ids(&until.checks), scene),
+                        until: (**until).clone(),
+                        limit,
+                        nearest: None,
+                        reached: None,
+                        doubtful: None,
+                        seen: 0,
+                    };
                 (Some(goal), position.base + limit.hard)
             }
         };
@@ -175,6 +181,12 @@ impl Holding {
         self.violated.is_some() || self.until.as_ref().is_some_and(|goal| goal.reached.is_some())
     }
 
+    pub(super) fn allowances(&self) -> Vec<String> {
+        let mut all = self.selector.allowances();
+        all.extend(self.until.iter().flat_map(|goal| goal.selector.allowances()));
+        all
+    }
+
     pub(super) fn progress(&self) -> Progress {
         let doubtful = self.until.as_ref().filter(|goal| goal.doubtful.is_some());
         match doubtful {
@@ -228,6 +240,7 @@ impl Holding {
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
         }
     }
 

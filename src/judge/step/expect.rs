@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::weigh::Weighing;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, keep_nearest, limit,
     seconds, weighed_clause,
 };
 use crate::clock::Moment;
@@ -30,7 +30,11 @@ impl Expecting {
     pub(super) fn begin(verb: &Expect, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
         let limit = limit(&verb.within, scene)?;
         let mut this = Self {
-            selector: Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?,
+            selector: Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
+                &verb.subject(),
+                &ids(&verb.checks),
+                scene,
+            ),
             deadline: position.base + limit.hard,
             verb: verb.clone(),
             position,
@@ -44,7 +48,7 @@ impl Expecting {
         if verb.from == From::Latest {
             // What is already known counts, however old it is; after that only what is new.
             this.deadline = position.begun + limit.hard;
-            if let Some(entry) = scene.timeline.of(&verb.subject()).last().cloned() {
+            if let Some(entry) = scene.timeline.present(&verb.subject()).cloned() {
                 this.look_at(&entry, scene, true);
             }
         } else {
@@ -124,8 +128,13 @@ impl Expecting {
             saves: saves.collect(),
             clauses,
             seen: self.seen,
+            allowances: Vec::new(),
         };
         self.taken = self.weighing.weigh(outcome, &shares, entry, &self.selector, scene);
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        self.selector.allowances()
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -186,6 +195,7 @@ impl Expecting {
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
         }
     }
 

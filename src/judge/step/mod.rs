@@ -17,6 +17,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::limit::Limit;
+use super::mend::Mends;
 use super::timeline::Timeline;
 use super::window::{CheckWindow, Said, Scene};
 use crate::clock::Moment;
@@ -103,6 +104,8 @@ pub struct StepOutcome {
     pub saves: Vec<(String, Value)>,
     /// How many entries of its subject it looked at.
     pub seen: u64,
+    /// Lasting mistakes of the vehicle that would have stood in the way.
+    pub allowances: Vec<String>,
 }
 
 /// What the engine should do next.
@@ -186,7 +189,8 @@ impl Evaluator {
 
     /// The step has ended at `at`; `cut_short` when it was not the deadline that ended it.
     pub(super) fn end(self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
-        match self {
+        let allowances = self.allowances();
+        let mut outcome = match self {
             Self::Plain => StepOutcome::default(),
             Self::Unbound(outcome) => outcome,
             Self::Expect(step) => step.end(at, cut_short),
@@ -194,6 +198,18 @@ impl Evaluator {
             Self::Always(step) => step.end(at, cut_short, scene),
             Self::Action(step) => step.end(at, cut_short),
             Self::Retained(step) => step.end(at, cut_short),
+        };
+        outcome.allowances.extend(allowances);
+        outcome
+    }
+
+    /// Lasting mistakes of the vehicle that would have stood in the way.
+    fn allowances(&self) -> Vec<String> {
+        match self {
+            Self::Expect(step) => step.allowances(),
+            Self::Always(step) => step.allowances(),
+            Self::Action(step) => step.allowances(),
+            _ => Vec::new(),
         }
     }
 }
@@ -213,6 +229,7 @@ pub(super) struct Selector {
     pub(super) check: Option<crate::suite::model::CheckUse>,
     pub(super) baseline: Option<Value>,
     pub(super) span: Span,
+    mends: Mends,
 }
 
 impl Selector {
@@ -234,16 +251,29 @@ impl Selector {
             check: selection.check.clone(),
             baseline: scene.timeline.baseline(subject, position.mark),
             span,
+            mends: Mends::default(),
         })
+    }
+
+    /// From now on the states are read as they are meant, except for what is about a mistake of the vehicle itself.
+    pub(super) fn lenient(mut self, subject: &str, decides: &[&RequirementId], scene: &Scene<'_>) -> Self {
+        self.mends = Mends::of(scene.waivers, subject, decides);
+        self
+    }
+
+    /// The mistakes of the vehicle that would have stood in the way.
+    pub(super) fn allowances(&self) -> Vec<String> {
+        self.mends.used()
     }
 
     /// Whether a message is what is looked for. A named check looks at everything since the test began.
     pub(super) fn takes(&self, entry: &Entry, scene: &Scene<'_>) -> bool {
         let matches = match &self.pattern {
             None => entry.subject().is_some(),
-            Some(pattern) => entry
-                .subject()
-                .is_some_and(|message| pattern.matches(&message, self.baseline.as_ref())),
+            Some(pattern) => entry.subject().is_some_and(|message| {
+                let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
+                takes(&message) || self.mends.make_up_for(entry, scene.timeline, takes)
+            }),
         };
         matches && !matches!(self.check_says(entry, scene), Said::Wrong(..))
     }
@@ -320,6 +350,11 @@ pub(super) fn limit(time: &crate::suite::model::TimeTerm, scene: &Scene<'_>) -> 
     Limit::resolve(time, scene.bindings).ok_or_else(|| "a time limit has no value".to_owned())
 }
 
+/// The requirements of `checks:`.
+fn ids(bindings: &[Binding]) -> Vec<&RequirementId> {
+    bindings.iter().map(|binding| &binding.requirement).collect()
+}
+
 /// The clauses of `checks:`, all with the same outcome.
 pub(super) fn bound_clauses(
     bindings: &[Binding],
@@ -378,7 +413,7 @@ fn weighed_clause(
         nearest: None,
     };
     let selector = match Selector::bind(&assertion.selection, subject, &assertion.span, position, scene) {
-        Ok(selector) => selector,
+        Ok(selector) => selector.lenient(subject, &[&assertion.requirement], scene),
         Err(why) => {
             clause.holds = Holds::Unseen(why.clone());
             clause.message = why;

@@ -126,6 +126,7 @@ impl Forbidding {
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
         }
     }
 }

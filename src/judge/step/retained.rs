@@ -130,6 +130,7 @@ impl Fetching {
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
         }
     }
 }

@@ -72,7 +72,7 @@ impl Agv {
             return;
         }
         let referenced = !self.faults.has(F::IdleCancelUnreferenced);
-        self.errors.raise(ActiveError {
+        let refusal = ActiveError {
             error_type: self.config.errors.no_order_to_cancel.clone(),
             fatal: self.faults.has(F::IdleCancelFatal),
             references: referenced
@@ -81,7 +81,8 @@ impl Agv {
                 .collect(),
             description: "there is no order to cancel".into(),
             life: Life::Until(self.moment() + self.config.error_duration),
-        });
+        };
+        self.errors.refused(refusal, self.now.moment, self.faults);
     }
 
     /// Ends the actions of the order, as far as they can be interrupted (ORD-CANCEL-03 to ORD-CANCEL-05).

@@ -215,6 +215,9 @@ faults! {
     UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
     MemoryUnchecked "memory-unchecked" ["ORD-REJ-15", "STATE-12"] "Takes over orders larger than its stated limits, cut to what fits.";
     OrientationUnchecked "orientation-unchecked" ["ORD-REJ-16"] "Accepts edges with an orientation it cannot take.";
+    RefusalLevelCorrected "refusal-level-corrected" ["ORD-REJ-12", "ORD-REJ-02", "ORD-REJ-06", "ORD-CANCEL-19"] "Reports a refusal as FATAL at first, and right a moment later.";
+    RefusalTypeCorrected "refusal-type-corrected" ["ORD-REJ-06", "ORD-REJ-02", "ORD-REJ-12"] "Reports a refusal as internalError at first, and right a moment later.";
+    RefusalReferencesCorrected "refusal-references-corrected" ["ORD-REJ-14", "ORD-REJ-07", "ORD-CANCEL-20"] "Does not say what a refusal is about at first, and says it a moment later.";
     RejectionSilent "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order.";
 
     // Motion

@@ -123,7 +123,7 @@ impl Agv {
             description: refusal.reason,
             life,
         };
-        self.errors.raise(error);
+        self.errors.refused(error, self.now.moment, self.faults);
     }
 
     /// What a faulty vehicle changes when it refuses an order.
