@@ -265,6 +265,7 @@ impl Agv {
             }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
         }
+        self.pauses += u32::from(self.faults.has(F::PausesCounted));
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
         }
@@ -285,6 +286,13 @@ impl Agv {
         }
         if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
+        }
+        if !self.holds.pause && self.faults.has(F::StopPauseIdleFails) {
+            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
+        }
+        self.pauses = self.pauses.saturating_sub(1);
+        if self.pauses > 0 {
+            return Outcome::Done(None);
         }
         if self.faults.has(F::PauseNotLifted) {
             self.set_holds(|holds| holds.stuck |= holds.pause);

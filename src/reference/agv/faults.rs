@@ -125,6 +125,7 @@ faults! {
     RunningUpdateGapAccepted "running-update-gap-accepted" ["ORD-FLOW-08"] "Takes over an update that does not begin at the decision point.";
     BusyIgnored "busy-ignored" ["ORD-FLOW-01", "ORD-FLOW-03"] "Takes over a new order while another one is being driven.";
     RunningActionIgnored "running-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs.";
+    FreeActionIgnored "free-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs that does not block.";
     HorizonNotBusy "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point.";
     FarOrderAccepted "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is.";
     StartRefusalSilent "start-refusal-silent" ["ORD-REJ-17"] "Raises no error when the first node of an order is out of reach.";
@@ -133,6 +134,8 @@ faults! {
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
+    UpdateIdsComparedAcrossOrders "update-ids-compared-across-orders" ["ORD-FLOW-06", "ORD-04"] "Refuses a new order whose orderUpdateId is lower than that of the last order.";
+    UpdateIdCarriedOver "update-id-carried-over" ["ORD-FLOW-06"] "Reports a new order with the orderUpdateId of the last one.";
     OnlyFirstUpdate "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before.";
     UpdateActionsLost "update-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its nodes and edges.";
     UpdateEdgeActionsLost "update-edge-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its edges.";
@@ -301,6 +304,8 @@ faults! {
     EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
     PauseTwiceFails "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused.";
+    PausesCounted "pauses-counted" ["ACT-11", "ACT-13"] "Counts its pauses, and ends them only with as many stopPause.";
+    StopPauseIdleFails "stop-pause-idle-fails" ["ACT-11"] "Fails a stopPause while it is not paused.";
     PauseDrivesOn "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses.";
     PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
@@ -359,6 +364,7 @@ faults! {
     StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
     SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
     OrderWithoutState "order-without-state" ["STATE-03"] "Does not send a state when an order arrives.";
+    UpdateWithoutState "update-without-state" ["STATE-03"] "Does not send a state when an order update arrives.";
     LoadWithoutState "load-without-state" ["STATE-04", "ACT-28", "ACT-01"] "Does not send a state when its load changes.";
     ErrorWithoutState "error-without-state" ["STATE-05"] "Does not send a state when an error appears.";
     NodeWithoutState "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node.";
@@ -381,6 +387,7 @@ faults! {
     RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
     PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06", "ORD-CANCEL-15"] "Reports its coordinates as strings.";
     LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
+    LoadForgottenWithOrder "load-forgotten-with-order" ["STATE-MSG-06"] "Shows no load any more when it takes over a new order.";
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
     DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";
     DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
@@ -403,6 +410,7 @@ faults! {
     TraversalSplit "traversal-split" ["NODE-03"] "Removes the node state and updates the last node in two states.";
     LastNodeStale "last-node-stale" ["NODE-03", "STATE-MSG-04", "STATE-06"] "Reports the new lastNodeId with the old lastNodeSequenceId.";
     NodeActionsEarly "node-actions-early" ["NODE-04", "ASTATE-02"] "Begins the actions of a node when it sets out for it.";
+    LoopActionsEarly "loop-actions-early" ["ASTATE-02", "NODE-04"] "Performs the actions of a second visit of a node on the first.";
     EdgeStatesStay "edge-states-stay" ["NODE-05", "STATE-12"] "Keeps the edge it has left in its states.";
     EdgeActionsLate "edge-actions-late" ["NODE-06", "ACT-02"] "Begins the actions of an edge at its end.";
     EdgeActionsOnNode "edge-actions-on-node" ["NODE-07"] "Begins the actions of an edge while it is held on the node before.";

@@ -357,6 +357,10 @@ impl Agv {
             if !(of_update && self.faults.has(F::UpdateActionsNotPerformed)) {
                 self.actions.trigger(Origin::Node(sequence_id), self.faults);
             }
+            let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == stop.node.id);
+            for ahead in again.filter(|_| self.faults.has(F::LoopActionsEarly)) {
+                self.actions.trigger(Origin::Node(ahead.node.sequence_id), self.faults);
+            }
             let ahead = self.book.edge_ahead().map(|edge| edge.sequence_id);
             if let Some(ahead) = ahead.filter(|_| self.faults.has(F::EdgeActionsOnNode)) {
                 self.actions.trigger(Origin::Edge(ahead), self.faults);

@@ -60,6 +60,7 @@ impl Agv {
             action.end(Status::Finished);
         }
         self.book.updated = true;
+        self.report.update_received = true;
         let keep = if order.nodes.iter().any(|node| !node.released) {
             self.faults.has(F::HorizonAppended)
         } else {
