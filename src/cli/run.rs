@@ -338,7 +338,7 @@ impl Job {
             (false, false) => Err("the profile does not allow motion ([motion] allowed = true)".to_owned()),
             (false, true) => Ok(()),
         };
-        let mut limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
+        let limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
         let capabilities = Capabilities {
             factsheet: None,
             statements: statements(&profile.device),

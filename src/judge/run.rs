@@ -207,7 +207,7 @@ impl RunJudge {
     fn ended(&mut self, mut result: TestResult) {
         let decided = |result: &TestResult| {
             let mut decisions = result.decisions.iter();
-            decisions.any(|decision| decision.verdict != Verdict::Inconclusive)
+            decisions.any(|decision| decision.verdict() != Verdict::Inconclusive)
         };
         let before = self.done.iter().position(|done| done.id == result.id && !decided(done));
         if let Some(before) = before {
