@@ -134,8 +134,8 @@ faults! {
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
-    UpdateIdsComparedAcrossOrders "update-ids-compared-across-orders" ["ORD-FLOW-06", "ORD-04"] "Refuses a new order whose orderUpdateId is lower than that of the last order.";
-    UpdateIdCarriedOver "update-id-carried-over" ["ORD-FLOW-06"] "Reports a new order with the orderUpdateId of the last one.";
+    UpdateIdsComparedAcrossOrders "update-ids-compared-across-orders" ["ORD-FLOW-06", "ORD-04", "ORD-13"] "Refuses a new order whose orderUpdateId is lower than that of the last order.";
+    UpdateIdCarriedOver "update-id-carried-over" ["ORD-FLOW-06", "STATE-12"] "Reports a new order with the orderUpdateId of the last one.";
     OnlyFirstUpdate "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before.";
     UpdateActionsLost "update-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its nodes and edges.";
     UpdateEdgeActionsLost "update-edge-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its edges.";
@@ -155,7 +155,7 @@ faults! {
     ContinuationNotDriven "continuation-not-driven" ["ORD-06", "ORD-FLOW-11"] "Takes over an update of a completed order and does not drive it.";
     CompletedNotContinued "completed-not-continued" ["ORD-FLOW-11"] "Refuses updates of a completed order.";
     RejectionStopsOrder "rejection-stops-order" ["ORD-FLOW-12", "ORD-REJ-11"] "Stops driving when it has to refuse a message.";
-    RejectionDropsHorizon "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12"] "Forgets its horizon when it has to refuse a message.";
+    RejectionDropsHorizon "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12", "ORD-FLOW-03"] "Forgets its horizon when it has to refuse a message.";
     RejectionClearsActionStates "rejection-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when it has to refuse an order.";
 
     // Cancel
@@ -176,7 +176,7 @@ faults! {
     CancelLeavesNodes "cancel-leaves-nodes" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order.";
     CancelDropsActions "cancel-drops-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Removes the action states of a cancelled order.";
     DeadAfterCancel "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation.";
-    CancelledOrderRevived "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02"] "Goes on with a cancelled order when an update of it comes late.";
+    CancelledOrderRevived "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02", "ORD-CANCEL-11"] "Goes on with a cancelled order when an update of it comes late.";
     CancelWaitsForPause "cancel-waits-for-pause" ["ORD-CANCEL-07"] "Does not finish cancelOrder as long as it is paused.";
     PausedOrderSurvivesCancel "paused-order-survives-cancel" ["ORD-CANCEL-02"] "Goes on with an order that was cancelled in a pause when the pause ends.";
     PausedActionsSurviveCancel "paused-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while actions are PAUSED, and goes on with them after the pause.";
@@ -304,7 +304,7 @@ faults! {
     EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
     PauseTwiceFails "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused.";
-    PausesCounted "pauses-counted" ["ACT-11", "ACT-13"] "Counts its pauses, and ends them only with as many stopPause.";
+    PausesCounted "pauses-counted" ["ACT-13", "ACT-11"] "Counts its pauses, and ends them only with as many stopPause.";
     StopPauseIdleFails "stop-pause-idle-fails" ["ACT-11"] "Fails a stopPause while it is not paused.";
     PauseDrivesOn "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses.";
     PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
@@ -387,7 +387,7 @@ faults! {
     RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
     PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06", "ORD-CANCEL-15"] "Reports its coordinates as strings.";
     LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
-    LoadForgottenWithOrder "load-forgotten-with-order" ["STATE-MSG-06"] "Shows no load any more when it takes over a new order.";
+    LoadForgottenWithOrder "load-forgotten-with-order" ["STATE-MSG-06", "ACT-29"] "Shows no load any more when it takes over a new order.";
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
     DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";
     DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";

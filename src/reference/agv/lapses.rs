@@ -98,10 +98,7 @@ pub const LAPSES: &[(&str, &str)] = &[
     ("new-base-request-stays", "It breaks a recommendation only."),
     ("distance-negative", "It breaks a recommendation only."),
     ("distance-not-reset", "It breaks a recommendation only."),
-    (
-        "own-error-cleared-by-order",
-        "To keep listing it is the recommendation ERR-01; what needs a vehicle under its warning is not reached.",
-    ),
+    ("own-error-cleared-by-order", "It breaks a recommendation only."),
     (
         "semiautomatic-ends-order",
         "The text says that orders are executed in both modes, and nothing about those that are switched over.",

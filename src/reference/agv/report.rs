@@ -245,11 +245,17 @@ impl Agv {
 
     /// Whether a faulty vehicle keeps an event to itself. What it swallows is never told on its own.
     fn suppressed(&mut self, changes: Changes, requested: bool, body: &Map<String, Value>) -> bool {
+        if std::mem::take(&mut self.report.update_received) && self.faults.has(F::UpdateWithoutState) {
+            self.report.order_received = false;
+            if let Some((_, last)) = &mut self.report.last {
+                last.clone_from(body);
+            }
+            return true;
+        }
         let event = |change: bool, fault: F| change && self.faults.has(fault);
         let held = self.report.silenced
             || (self.faults.has(F::StatesByClock) && !requested)
             || event(changes.order, F::OrderWithoutState)
-            || event(self.report.update_received, F::UpdateWithoutState)
             || event(changes.load, F::LoadWithoutState)
             || event(changes.error, F::ErrorWithoutState)
             || event(changes.mode, F::ModeWithoutState)
