@@ -132,8 +132,12 @@ impl Agv {
 
     /// A stage of an action has ended.
     pub(super) fn stage_finished(&mut self, id: &str) {
+        let missed = !self.connection.online && self.faults.has(F::ActionEndMissedOffline);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.due = None;
+        if missed && action.of_order() {
+            return;
+        }
         if action.kind.is_some_and(|kind| kind.deed == Deed::DownloadMap) {
             self.download_failed(id, "the server did not deliver in time");
             return;
@@ -270,6 +274,7 @@ impl Agv {
             }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
         }
+        self.pauses += u32::from(self.faults.has(F::PausesCounted));
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
         }
@@ -290,6 +295,13 @@ impl Agv {
         }
         if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
+        }
+        if !self.holds.pause && self.faults.has(F::StopPauseIdleFails) {
+            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
+        }
+        self.pauses = self.pauses.saturating_sub(1);
+        if self.pauses > 0 {
+            return Outcome::Done(None);
         }
         if self.faults.has(F::PauseNotLifted) {
             self.set_holds(|holds| holds.stuck |= holds.pause);

@@ -101,7 +101,14 @@ pub const LAPSES: &[(&str, &str)] = &[
     ),
     ("state-bursts", "It breaks a recommendation only."),
     ("new-base-request-always", "It breaks a recommendation only."),
+    ("new-base-request-stays", "It breaks a recommendation only."),
     ("distance-negative", "It breaks a recommendation only."),
+    ("distance-not-reset", "It breaks a recommendation only."),
+    ("own-error-cleared-by-order", "It breaks a recommendation only."),
+    (
+        "semiautomatic-ends-order",
+        "The text says that orders are executed in both modes, and nothing about those that are switched over.",
+    ),
     (
         "traversal-split",
         "Two states of one moment are remarked on; tests that look at single states are not reached.",

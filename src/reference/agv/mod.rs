@@ -150,6 +150,8 @@ pub struct Agv {
     undocking: Option<Moment>,
     /// A switch keeps it from pausing and from going on.
     pause_blocked: bool,
+    /// How often it was paused (`pauses-counted` only).
+    pauses: u32,
     /// Something keeps it from ending its charging.
     charger_locked: bool,
     /// The order it gave up in a mode for people (`order-taken-up-again` only).
@@ -227,6 +229,7 @@ impl Agv {
             charging: false,
             undocking: None,
             pause_blocked: false,
+            pauses: 0,
             charger_locked: false,
             remembered: None,
             lost: false,

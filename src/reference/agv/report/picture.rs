@@ -124,7 +124,15 @@ impl Agv {
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
 
+    /// `manual-drives-on`: drives a way it does not show.
+    fn hides_route(&self) -> bool {
+        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesOn)
+    }
+
     fn node_states(&self, complete: bool) -> Value {
+        if self.hides_route() {
+            return json!([]);
+        }
         let left = self.book.left.0.as_ref().filter(|_| {
             (!complete && self.faults.has(F::TraversedNodesListed))
                 || (complete && self.book.has_order() && self.faults.has(F::FinishedOrderListed))
@@ -165,6 +173,9 @@ impl Agv {
     }
 
     fn edge_states(&self, complete: bool) -> Value {
+        if self.hides_route() {
+            return json!([]);
+        }
         let stays = self.faults.has(F::EdgeStatesStay) && !complete;
         let left = self.book.left.1.as_ref().filter(|_| stays);
         let shown = self
