@@ -16,7 +16,7 @@ use super::reactions::Reactions;
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
-use crate::clock::Stamp;
+use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, RunHeader};
 use crate::pack::{Catalogue, Decided, Packs, Role};
@@ -68,6 +68,7 @@ pub struct RunJudge {
     reactions: Reactions,
     /// The instant actions the harness has sent: type by id.
     instants: BTreeMap<String, String>,
+    last_order: Option<(Moment, String)>,
     current: Option<TestJudge>,
     done: Vec<TestResult>,
     plan: Plan,
@@ -133,6 +134,7 @@ impl RunJudge {
             watches,
             reactions,
             instants: BTreeMap::new(),
+            last_order: None,
             current: None,
             done: Vec::new(),
             plan: Plan::default(),
@@ -191,6 +193,10 @@ impl RunJudge {
         let Event::Sent { topic, .. } = entry.event() else {
             return;
         };
+        if self.ground.topics.get("order") == Some(topic) {
+            let id = entry.json().and_then(|order| order.get("orderId")?.as_str());
+            self.last_order = id.map(|id| (entry.at().moment, id.to_owned()));
+        }
         if self.ground.topics.get("instantActions") != Some(topic) {
             return;
         }
@@ -226,6 +232,11 @@ impl RunJudge {
             Some((meant, _)) => Cow::Owned(meant),
             None => Cow::Borrowed(state),
         })
+    }
+
+    /// The order the harness has sent last: when, and its id.
+    pub fn last_order(&self) -> Option<&(Moment, String)> {
+        self.last_order.as_ref()
     }
 
     /// The type of an instant action of the harness, by its id.

@@ -13,6 +13,9 @@ use crate::clock::Moment;
 use crate::journal::event::{Event, Reading, Waiver};
 use crate::judge::RunJudge;
 
+/// Two states of a vehicle that stands are at least so far apart.
+const APART: Duration = Duration::from_secs(1);
+
 /// What is known besides the states.
 pub(super) struct Idle {
     /// The vehicle has ended a cancelOrder, one way or the other: it has no order.
@@ -21,6 +24,8 @@ pub(super) struct Idle {
     pub(super) since: Moment,
     /// So long something that is about to end may take.
     pub(super) patience: Duration,
+    /// When the last test began.
+    pub(super) test: Moment,
 }
 
 /// The mistakes that show in the last state, and are not known yet.
@@ -137,7 +142,7 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
             &["STATE-12", "STATE-13", "NODE-05", "ORD-CANCEL-09", "ORD-CANCEL-11"],
         ));
     }
-    if obstacles.contains(&Obstacle::Driving) && stays(judge, idle) {
+    if (obstacles.contains(&Obstacle::Driving) && stays(judge, idle)) || stood_driving(judge, idle.test) {
         let about = ["STATE-MSG-08", "STATE-08", "ORD-UPD-01", "BLOCK-03", "BLOCK-04"];
         let why = "it says that it drives while it stands";
         all.push(waiver("driving", Reading::Standing, &about, why));
@@ -205,9 +210,13 @@ fn unfinished(judge: &RunJudge, action: &Value) -> Option<Waiver> {
     let status: String = text("actionStatus").unwrap_or("nothing").chars().take(40).collect();
     let about = ["IACT-04", "ORD-CANCEL-07", "ORD-CANCEL-13", "STATE-MSG-14", "ASTATE-05"];
     if !has_known_status(action) {
-        let like = json!({ "actionStatus": text("actionStatus") });
-        let why = format!("it calls the status of actions {status:?}");
-        return Some(waiver("actionStates", Reading::Without { like }, &about, why));
+        let why = format!("it says {status:?} of actions that are over, which is no status");
+        let reading = Reading::Status {
+            shown: text("actionStatus")?.to_owned(),
+            meant: "FINISHED".to_owned(),
+        };
+        let about = ["STATE-MSG-14", "ASTATE-05", "JSON-02"];
+        return Some(waiver("actionStates", reading, &about, why));
     }
     if let Some(kind) = instant(judge, id) {
         let like = json!({ "actionType": kind, "actionStatus": status });
@@ -258,6 +267,37 @@ fn stays(judge: &RunJudge, idle: &Idle) -> bool {
     let mut places = since.iter().map(|entry| place(entry));
     let first = places.next().flatten();
     long && since.len() > 1 && first.is_some() && places.all(|place| place == first)
+}
+
+/// Whether the vehicle has said that it drives while it waited, in two states apart: it stands where it stood, no node to
+/// come is released, and no action is under way.
+fn stood_driving(judge: &RunJudge, since: Moment) -> bool {
+    let states = judge.timeline().of("state").iter().rev();
+    let mut later: Option<&crate::journal::Entry> = None;
+    for entry in states.take_while(|entry| entry.at().moment >= since) {
+        let Some(state) = entry.json() else { continue };
+        let list = |name: &str| state.get(name).and_then(Value::as_array).into_iter().flatten();
+        let ahead = list("nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
+        let waits = list("nodeStates").next().is_some() && !ahead && list("actionStates").all(is_over_or_waits);
+        if state.get("driving") != Some(&Value::Bool(true)) || !waits {
+            later = None;
+            continue;
+        }
+        let stood = later.is_some_and(|later| {
+            let apart = later.at().moment.since(entry.at().moment);
+            let same = later.json().and_then(super::rest::place_of) == super::rest::place_of(state);
+            apart >= APART && same && super::rest::place_of(state).is_some()
+        });
+        if stood {
+            return true;
+        }
+        later.get_or_insert(entry);
+    }
+    false
+}
+
+fn is_over_or_waits(action: &Value) -> bool {
+    is_over(action) || action.get("actionStatus").and_then(Value::as_str) == Some("WAITING")
 }
 
 /// Whether the vehicle has taken over an order while it showed this error.

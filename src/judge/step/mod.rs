@@ -207,6 +207,7 @@ impl Evaluator {
     fn allowances(&self) -> Vec<String> {
         match self {
             Self::Expect(step) => step.allowances(),
+            Self::Never(step) => step.allowances(),
             Self::Always(step) => step.allowances(),
             Self::Action(step) => step.allowances(),
             _ => Vec::new(),
@@ -272,10 +273,18 @@ impl Selector {
             None => entry.subject().is_some(),
             Some(pattern) => entry.subject().is_some_and(|message| {
                 let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
-                takes(&message) || self.mends.make_up_for(entry, scene.timeline, takes)
+                takes(&message) || self.mends.make_up_for(entry, scene, takes)
             }),
         };
         matches && !matches!(self.check_says(entry, scene), Said::Wrong(..))
+    }
+
+    /// Whether a message is what is looked for only for a lasting mistake of the vehicle.
+    pub(super) fn is_excused(&self, entry: &Entry, scene: &Scene<'_>) -> bool {
+        let Some(pattern) = &self.pattern else { return false };
+        let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
+        self.mends
+            .make_up_for(entry, scene, |message: &Value| !takes(message))
     }
 
     /// What the named check says about this entry; right where there is no check.
