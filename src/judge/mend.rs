@@ -52,8 +52,8 @@ impl Mends {
             return false;
         }
         let Some(state) = entry.json() else { return false };
-        let (mut state, mut used) = mended(state, entry.seq(), scene.timeline, &self.waivers)
-            .unwrap_or_else(|| (state.clone(), Vec::new()));
+        let (mut state, mut used) =
+            mended(state, entry.seq(), scene.timeline, &self.waivers).unwrap_or_else(|| (state.clone(), Vec::new()));
         let mut fits = !used.is_empty() && takes(&state);
         if !fits && self.free && self.name_order_of_one_node(&mut state, entry, scene) {
             used.extend(self.waivers.iter().filter(|waiver| waiver.reading == Reading::Kept));

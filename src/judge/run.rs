@@ -363,10 +363,23 @@ impl RunJudge {
                 })
                 .collect(),
             fleet: self.reactions.result(),
-            limits: self.plan.limits.clone(),
+            limits: self.limits(),
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
         }
+    }
+
+    /// What restricts the statement, the harness's own lag included.
+    fn limits(&self) -> Vec<String> {
+        let mut limits = self.plan.limits.clone();
+        let lag = self.timeline.longest_lag();
+        if !lag.is_zero() {
+            limits.push(format!(
+                "The harness itself was held up for up to {:.1} s; what that can explain was not held against the device.",
+                lag.as_secs_f64()
+            ));
+        }
+        limits
     }
 
     /// The planned tests that did not run, with the reason.

@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 use super::decide::decide;
 use super::departure::Departure;
 use super::hidden::{Hidden, take_back};
-use super::step::{Evaluator, Position, Progress, StepOutcome};
+use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use super::window::Scene;
 use crate::clock::Moment;
@@ -59,6 +59,8 @@ pub struct TestJudge {
     result: TestResult,
     departure: Departure,
     hidden: Vec<Hidden>,
+    /// Decisions about time, by their number.
+    timings: Vec<(usize, Timing)>,
     ended: bool,
 }
 
@@ -110,6 +112,7 @@ impl TestJudge {
             },
             departure: Departure::default(),
             hidden: Vec::new(),
+            timings: Vec::new(),
             ended: false,
         }
     }
@@ -174,7 +177,10 @@ impl TestJudge {
                 self.base = entry.at().moment;
             }
             Event::Bound { name, value } => self.bindings.set(name, value.clone()),
-            Event::TestEnded { .. } => self.finish(entry.at().moment, ground),
+            Event::TestEnded { .. } => {
+                self.allow_for_lag(timeline);
+                self.finish(entry.at().moment, ground);
+            }
             _ => {
                 if let Some(mut running) = self.running.take() {
                     running.evaluator.observe(entry, subject, &self.scene(timeline, ground));
@@ -284,8 +290,22 @@ impl TestJudge {
                 messages: outcome.seen,
             };
             for clause in outcome.clauses {
+                // A walk that went wrong, or a message that shows what it must not, is no matter of time.
+                let of_time = match (&clause.holds, &outcome.timing) {
+                    (Holds::Late, timing) => *timing,
+                    (Holds::No, Some(timing @ Timing::Missed(_)))
+                        if clause.witness.is_none() || matches!(step.verb, Verb::Action(_)) =>
+                    {
+                        Some(*timing)
+                    }
+                    _ => None,
+                };
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
+                let before = self.result.decisions.len();
                 self.push(decide(clause, &step.path, waited, &ground.catalogue, &ground.pack));
+                if let Some(timing) = of_time.filter(|_| self.result.decisions.len() > before) {
+                    self.timings.push((before, timing));
+                }
             }
         }
     }
@@ -325,6 +345,24 @@ impl TestJudge {
     /// Tells it what shows nothing in this test, before it ends.
     pub(super) fn hide(&mut self, hidden: Vec<Hidden>) {
         self.hidden = hidden;
+    }
+
+    /// What the harness's own lag can explain is not held against the device.
+    fn allow_for_lag(&mut self, timeline: &Timeline) {
+        for (at, timing) in &self.timings {
+            let Some(lag) = timing.explained(timeline) else {
+                continue;
+            };
+            let Some(decision) = self.result.decisions.get_mut(*at) else {
+                continue;
+            };
+            decision.verdict = Verdict::Inconclusive;
+            decision.message = format!(
+                "cannot be told, since the harness itself was held up for {:.1} s meanwhile; {}",
+                lag.as_secs_f64(),
+                decision.message
+            );
+        }
     }
 
     /// Clauses that were never reached are inconclusive, and a test that decided nothing is an error.

@@ -104,8 +104,25 @@ fn broken_words(judge: &RunJudge) -> Vec<Waiver> {
             read_as(member, json!([]), &["STATE-01", "STATE-MSG-01", "ERR-01", "JSON-10"]);
         }
     }
-    if broken("driving") && !matches!(state.get("driving"), Some(Value::Bool(_))) {
-        read_as("driving", json!(false), &["STATE-MSG-08", "STATE-08", "STATE-01"]);
+    let about = ["STATE-MSG-08", "STATE-08", "STATE-01"];
+    match state.get("driving") {
+        Some(Value::String(word)) if word.eq_ignore_ascii_case("false") => {
+            read_as("driving", json!(false), &about);
+            let shown = Some(json!(if word == "false" { "true" } else { "True" }));
+            let why = "`driving` is a text in its states";
+            all.push(waiver(
+                "driving",
+                Reading::As {
+                    shown,
+                    meant: json!(true),
+                },
+                &about,
+                why,
+            ));
+        }
+        Some(Value::Bool(_)) => {}
+        _ if broken("driving") => read_as("driving", json!(false), &about),
+        _ => {}
     }
     all
 }
@@ -159,7 +176,7 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
     };
     // What an order began may really be under way, as long as cancelOrder waits for it.
     if idle.answered || open.iter().all(is_own) {
-        all.extend(open.into_iter().filter_map(|action| unfinished(judge, action)));
+        all.extend(open.into_iter().flat_map(|action| unfinished(judge, action)));
     }
     if !obstacles
         .iter()
@@ -204,36 +221,52 @@ fn passed(state: &Value, answered: bool, member: &str, about: &[&str]) -> Vec<Wa
 }
 
 /// An action that does not end although nothing goes on: an instant action of ours by its type, any other by its id.
-fn unfinished(judge: &RunJudge, action: &Value) -> Option<Waiver> {
+fn unfinished(judge: &RunJudge, action: &Value) -> Vec<Waiver> {
     let text = |name: &str| action.get(name).and_then(Value::as_str);
-    let id = text("actionId")?;
+    let Some(id) = text("actionId") else { return Vec::new() };
     let status: String = text("actionStatus").unwrap_or("nothing").chars().take(40).collect();
     let about = ["IACT-04", "ORD-CANCEL-07", "ORD-CANCEL-13", "STATE-MSG-14", "ASTATE-05"];
     if !has_known_status(action) {
-        let why = format!("it says {status:?} of actions that are over, which is no status");
-        let reading = Reading::Status {
-            shown: text("actionStatus")?.to_owned(),
-            meant: "FINISHED".to_owned(),
-        };
-        let about = ["STATE-MSG-14", "ASTATE-05", "JSON-02"];
-        return Some(waiver("actionStates", reading, &about, why));
+        return strange_status(text("actionStatus").unwrap_or_default());
     }
     if let Some(kind) = instant(judge, id) {
         let like = json!({ "actionType": kind, "actionStatus": status });
         let why = format!("it leaves {kind} {status}");
         let named = text("actionType") == Some(kind.as_str());
         let like = if named { like } else { json!({ "actionId": id }) };
-        return Some(waiver("actionStates", Reading::Without { like }, &about, why));
+        return vec![waiver("actionStates", Reading::Without { like }, &about, why)];
     }
     let why = format!("it leaves action {id:?} of an order that is over {status}");
-    Some(waiver(
-        "actionStates",
-        Reading::Without {
-            like: json!({ "actionId": id }),
-        },
-        &about,
-        why,
-    ))
+    let like = json!({ "actionId": id });
+    vec![waiver("actionStates", Reading::Without { like }, &about, why)]
+}
+
+/// A word for a status that is none: of an action that is over, it means that it is finished. Known words in another
+/// spelling mean what they say.
+fn strange_status(shown: &str) -> Vec<Waiver> {
+    let known = ["WAITING", "INITIALIZING", "RUNNING", "PAUSED", "FINISHED", "FAILED"];
+    let about = ["STATE-MSG-14", "ASTATE-05", "JSON-02"];
+    let one = |shown: String, meant: &str, why: String| {
+        let meant = meant.to_owned();
+        waiver("actionStates", Reading::Status { shown, meant }, &about, why)
+    };
+    let Some(meant) = known.iter().find(|word| word.eq_ignore_ascii_case(shown)) else {
+        let word: String = shown.chars().take(40).collect();
+        let why = format!("it says {word:?} of actions that are over, which is no status");
+        return vec![one(shown.to_owned(), "FINISHED", why)];
+    };
+    let lower = shown == meant.to_ascii_lowercase();
+    let spelled = |word: &str| {
+        let (first, rest) = word.split_at(1);
+        if lower {
+            word.to_ascii_lowercase()
+        } else {
+            format!("{first}{}", rest.to_ascii_lowercase())
+        }
+    };
+    let why = format!("it spells the status of actions {shown:?}");
+    let all = known.iter();
+    all.map(|word| one(spelled(word), word, why.clone())).collect()
 }
 
 fn has_known_status(action: &Value) -> bool {

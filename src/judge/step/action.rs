@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::{Holds, Position, Progress, StepOutcome, backlog, bound_clauses, ids, limit, seconds};
+use super::{Holds, Position, Progress, StepOutcome, Timing, backlog, bound_clauses, ids, limit, seconds};
 use crate::clock::Moment;
 use crate::diagnostic::Span;
 use crate::journal::Entry;
@@ -155,6 +155,17 @@ impl Walking {
         self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost || self.lasting
     }
 
+    pub(super) fn timing(&self) -> Option<Timing> {
+        let (since, limit) = (self.position.base, self.limit.soft);
+        match &self.last {
+            Some(last) if self.decided() => {
+                let at = last.at().moment;
+                Some(Timing::Late { since, at, limit })
+            }
+            _ => Some(Timing::Missed(self.deadline)),
+        }
+    }
+
     pub(super) fn allowances(&self) -> Vec<String> {
         let told = format!(
             "it is not waited for that this action ends, which is {}",
@@ -238,6 +249,7 @@ impl Walking {
             clauses,
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         }
     }
 }

@@ -135,6 +135,7 @@ impl Forbidding {
             saves: Vec::new(),
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         }
     }
 }
