@@ -111,6 +111,10 @@ pub(super) struct Session<'a, L, O> {
     pub(super) ladders: u32,
     /// The id of the last cancelOrder on that way.
     pub(super) cancelled: Option<String>,
+    /// The vehicle was found to refuse every order, until it was restarted.
+    pub(super) refuses: bool,
+    /// How often in a row a restart did not make it take orders again.
+    pub(super) unhelped: u32,
     /// How many orders were sent on that way.
     pub(super) orders: u32,
     /// Preconditions that are not reached again and again.
@@ -130,6 +134,8 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             home: Home::default(),
             ladders: 0,
             cancelled: None,
+            refuses: false,
+            unhelped: 0,
             orders: 0,
             strikes: Strikes::default(),
         }
@@ -293,7 +299,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
 
     fn bindings(&self, test: &Test, number: usize) -> Result<Map<String, Value>, String> {
         let judge = self.engine.recorder.judge();
-        let course = course_of(test, self.setup.layout.as_ref(), judge)?;
+        let course = course_of(test, self.setup.layout.as_ref(), judge, &self.home)?;
         Ok(own_bindings(test, course, judge, &self.setup.run, number))
     }
 
@@ -306,7 +312,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         number: usize,
     ) -> Result<Option<String>, EngineError> {
         let known = self.engine.recorder.judge().ground().waivers.len();
-        self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        self.look_at_home();
         self.engine
             .run_test(test, own, &mut AsWatcher(&mut *self.progress))
             .await?;
@@ -338,7 +344,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         if let Ok(own) = self.bindings(test, number) {
             self.progress
                 .note("the precondition was not reached; the test is tried once more");
-            self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+            self.look_at_home();
             self.engine
                 .run_test(test, own, &mut AsWatcher(&mut *self.progress))
                 .await?;
@@ -349,6 +355,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             None => self.strikes.reached(test),
         }
         Ok(None)
+    }
+
+    fn look_at_home(&mut self) {
+        self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        self.home.since = self.engine.link.now().moment;
     }
 
     /// Where the precondition of the test that ended last was not reached.
@@ -375,6 +386,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         } else {
             self.bring_to_rest().await?
         };
+        if left.is_empty() {
+            self.still_takes_orders().await?;
+        }
         if !left.iter().any(Obstacle::halts) {
             self.halted = None;
         } else if self.halted.is_none() {

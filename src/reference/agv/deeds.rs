@@ -168,7 +168,9 @@ impl Agv {
     /// Ends an action with success.
     pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
         let stuck = self.faults.has(F::InstantActionStuck);
+        let requests_stay = self.faults.has(F::StateRequestStuck);
         if let Some(action) = self.actions.get_mut(id) {
+            let stuck = stuck || (requests_stay && action.request.action_type == "stateRequest");
             let stuck = stuck && action.origin == Origin::Instant;
             action.end(if stuck { Status::Running } else { Status::Finished });
             action.result = result;

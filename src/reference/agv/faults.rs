@@ -381,6 +381,7 @@ faults! {
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
     InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09", "ORD-CANCEL-18"] "Performs instant actions without an action state.";
+    StateRequestStuck "state-request-stuck" ["ACT-26", "IACT-04"] "Leaves stateRequest RUNNING for ever.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
     UnknownInstantFinished "unknown-instant-finished" ["IACT-04", "IACT-06"] "Reports an instant action it does not know as FINISHED.";
@@ -412,9 +413,14 @@ faults! {
     StateBursts "state-bursts" ["STATE-11"] "Sends every state five times.";
     TraversedNodesListed "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last.";
     FinishedOrderListed "finished-order-listed" ["STATE-13"] "Keeps the last node in its states when the order is complete.";
+    LastEdgeListed "last-edge-listed" ["STATE-13"] "Keeps the last edge in its states when the order is complete.";
+    LastRouteListed "last-route-listed" ["STATE-13", "NODE-03"] "Keeps the last node and the last edge in its states when the order is complete.";
     NewBaseRequestAlways "new-base-request-always" ["STATE-16"] "Asks for a new base all the time.";
     NewBaseRequestStays "new-base-request-stays" ["STATE-16"] "Asks for a new base until its next order, once it has done so.";
     SafetyStateMissing "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states.";
+    ModeMissing "mode-missing" ["STATE-MSG-01", "STATE-01", "JSON-10"] "Leaves operatingMode out of its states.";
+    ModeNumeric "mode-numeric" ["MODE-01", "JSON-10", "JSON-06"] "Gives a number as its operating mode.";
+    EmptyListsNull "empty-lists-null" ["JSON-10", "JSON-06", "STATE-MSG-01"] "Writes null for lists of nodes, edges and actions that are empty.";
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02", "ORD-CANCEL-08"] "Empties the orderId when the order is complete.";
     UpdateIdResetWhenDone "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
@@ -427,6 +433,8 @@ faults! {
     LoadForgottenWithOrder "load-forgotten-with-order" ["STATE-MSG-06", "ACT-29"] "Shows no load any more when it takes over a new order.";
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
     DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";
+    DrivingAsText "driving-as-text" ["JSON-07", "JSON-10", "STATE-MSG-08"] "Sends driving as a word in quotes.";
+    DrivingKept "driving-kept" ["STATE-MSG-08", "STATE-08"] "Says that it drives from its first order on, also when it stands.";
     DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
     FinishedInstantForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
     LastInstantActionOnly "last-instant-action-only" ["STATE-MSG-10", "STATE-MSG-09"] "Removes finished instant actions from its states when another one arrives.";
@@ -438,9 +446,11 @@ faults! {
     DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
     DistanceNotReset "distance-not-reset" ["STATE-MSG-18"] "Counts the distance since its last node from the beginning of its order.";
     StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant.";
+    StatusLowerCase "status-lower-case" ["STATE-MSG-14", "JSON-02", "JSON-10"] "Spells the statuses of actions in lower case.";
     ChargeGoodBad "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent.";
     ChargeMissing "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state.";
     EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
+    EmergencyStopNull "emergency-stop-null" ["STATE-MSG-17", "JSON-10", "JSON-02"] "Writes null where no emergency stop is active.";
     EmergencyStopUnreported "emergency-stop-unreported" ["STATE-MSG-17"] "Does not report an emergency stop.";
 
     // Traversal
