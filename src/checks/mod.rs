@@ -31,6 +31,7 @@ mod state_maps;
 mod state_order;
 mod state_paused;
 mod state_period;
+mod state_place;
 mod state_predefined;
 mod state_route;
 mod state_triggers;
@@ -183,6 +184,7 @@ static REGISTRY: &[Check] = &[
     state_triggers::TRIGGERS,
     blocking::BLOCKING,
     state_paused::PAUSED,
+    state_place::LAST_NODE_PLACE,
     state_values::IDLE_EMPTY,
     state_maps::MAPS,
     state_values::POSITION_RANGE,

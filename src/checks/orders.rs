@@ -278,13 +278,13 @@ pub(super) fn last_node(state: &Value) -> Option<(String, u64)> {
 }
 
 /// Whether a state reports something that may end an order without a word: another operating mode than the
-/// automatic ones, an emergency stop, a fatal error, or a failed action.
+/// automatic ones, an emergency stop (a word that is none of the standard is neither, and a finding of its own), a fatal error, or a failed action.
 pub(super) fn may_abandon(state: &Value) -> bool {
-    let automatic = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
+    let manual = matches!(text(state, "operatingMode"), "MANUAL" | "SERVICE" | "TEACHIN");
     let stopped = state
         .pointer("/safetyState/eStop")
-        .is_some_and(|stop| stop.as_str() != Some("NONE"));
+        .is_some_and(|stop| matches!(stop.as_str(), Some("AUTOACK" | "MANUAL" | "REMOTE")));
     let fatal = elements(state, "errors").any(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"));
     let failed = elements(state, "actionStates").any(|action| text(action, "actionStatus") == "FAILED");
-    !automatic || stopped || fatal || failed
+    manual || stopped || fatal || failed
 }

@@ -46,7 +46,8 @@ pub(super) const POSITION_MOVES: Check = Check {
     name: "state/position-moves",
     decides: &["MAP-01"],
     doc: "The position of a vehicle that has come from one node to another, more than a metre away by the positions in \
-          its orders, is another one. Judged when it did not change twice in a row.",
+          its orders, is another one. Judged when it did not change twice in a row, and not for nodes that count as \
+          reached from more than a metre away.",
     arguments: &[],
     start: |_| Box::new(PositionMoves::default()),
 };
@@ -234,7 +235,10 @@ impl PositionMoves {
             let (Some(x), Some(y)) = (number("x"), number("y")) else {
                 continue;
             };
-            if self.nodes.len() < NODES {
+            // Who is counted as on a node from afar need not come to it.
+            if number("allowedDeviationXY").is_some_and(|range| range > APART) {
+                self.nodes.remove(text(node, "nodeId"));
+            } else if self.nodes.len() < NODES {
                 let place = (text(position, "mapId").chars().take(512).collect(), x, y);
                 self.nodes
                     .insert(text(node, "nodeId").chars().take(512).collect(), place);

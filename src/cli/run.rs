@@ -38,6 +38,8 @@ struct Job {
     effective: Effective,
     tests: Vec<Arc<Test>>,
     complete: bool,
+    /// Which cases that come from a schema are run.
+    draw: Option<u64>,
     output: args::OutputArgs,
     command: Vec<String>,
     run: String,
@@ -70,9 +72,18 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     if tests.is_empty() {
         return Err(Problem::NothingToDo("no test was selected".to_owned()));
     }
+    let random = uuid::Uuid::new_v4();
     let run = match arguments.seed {
         Some(seed) => format!("seed{seed}"),
-        None => uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
+        None => random.simple().to_string()[..8].to_owned(),
+    };
+    // Whoever names a single case means it; the parts of one run have to draw the same.
+    let whole = arguments.thorough || arguments.tests.iter().any(|pattern| pattern.contains('['));
+    let draw = match arguments.seed {
+        _ if whole => None,
+        Some(seed) => Some(seed),
+        None if arguments.shard.is_some() || arguments.certificate => Some(1),
+        None => Some(u64::from(random.as_fields().0)),
     };
     let device = &effective.profile.device;
     let built_in =
@@ -98,6 +109,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     check_faults(role, &arguments.fault)?;
     let job = Job {
         complete: tests.len() == all.len(),
+        draw,
         library,
         pack,
         effective,
@@ -160,6 +172,8 @@ pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
             ..args::DeviceArgs::default()
         },
         output: arguments.output.clone(),
+        thorough: arguments.thorough,
+        certificate: true,
         ..args::Run::default()
     })
 }
@@ -208,6 +222,7 @@ impl Job {
         request.faults.clone_from(&arguments.fault);
         request.tests.clone_from(&self.tests);
         request.complete = self.complete;
+        request.draw = self.draw;
         request.seed = arguments.seed.unwrap_or(1);
         request.begun = utc;
         request.run.clone_from(&self.run);
@@ -338,7 +353,7 @@ impl Job {
             (false, false) => Err("the profile does not allow motion ([motion] allowed = true)".to_owned()),
             (false, true) => Ok(()),
         };
-        let mut limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
+        let limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
         let capabilities = Capabilities {
             factsheet: None,
             statements: statements(&profile.device),
@@ -470,6 +485,7 @@ impl Job {
         let setup = Setup {
             tests: self.tests.clone(),
             complete: self.complete,
+            draw: self.draw,
             capabilities: session.capabilities,
             layout: session.layout,
             vehicles,

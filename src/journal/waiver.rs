@@ -39,6 +39,13 @@ pub enum Reading {
         /// What is meant.
         meant: Value,
     },
+    /// One status of actions is read as another.
+    Status {
+        /// What is shown.
+        shown: String,
+        /// What is meant.
+        meant: String,
+    },
     /// Where nothing is shown, what was shown last still holds.
     Kept,
     /// True is read as false while the vehicle stays where it is.

@@ -7,7 +7,7 @@
 
 use crate::report::result::Waited;
 
-use super::step::{Clause, Holds};
+use super::step::{Clause, Holds, Timing};
 
 /// A clause of a step that has ended, not decided yet.
 pub(super) struct Open {
@@ -21,6 +21,8 @@ pub(super) struct Open {
     pub ended: u64,
     /// What was waited for.
     pub waited: Option<Waited>,
+    /// What it says about time, if it is a finding about time.
+    pub of_time: Option<Timing>,
 }
 
 /// A member of the state that shows nothing in a test.
@@ -116,6 +118,7 @@ mod tests {
             walks: false,
             ended: 30,
             waited: None,
+            of_time: None,
         }
     }
 

@@ -16,7 +16,7 @@ use super::reactions::Reactions;
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
-use crate::clock::Stamp;
+use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, RunHeader};
 use crate::pack::{Catalogue, Decided, Packs, Role};
@@ -68,6 +68,7 @@ pub struct RunJudge {
     reactions: Reactions,
     /// The instant actions the harness has sent: type by id.
     instants: BTreeMap<String, String>,
+    last_order: Option<(Moment, String)>,
     current: Option<TestJudge>,
     done: Vec<TestResult>,
     plan: Plan,
@@ -133,6 +134,7 @@ impl RunJudge {
             watches,
             reactions,
             instants: BTreeMap::new(),
+            last_order: None,
             current: None,
             done: Vec::new(),
             plan: Plan::default(),
@@ -191,6 +193,10 @@ impl RunJudge {
         let Event::Sent { topic, .. } = entry.event() else {
             return;
         };
+        if self.ground.topics.get("order") == Some(topic) {
+            let id = entry.json().and_then(|order| order.get("orderId")?.as_str());
+            self.last_order = id.map(|id| (entry.at().moment, id.to_owned()));
+        }
         if self.ground.topics.get("instantActions") != Some(topic) {
             return;
         }
@@ -226,6 +232,11 @@ impl RunJudge {
             Some((meant, _)) => Cow::Owned(meant),
             None => Cow::Borrowed(state),
         })
+    }
+
+    /// The order the harness has sent last: when, and its id.
+    pub fn last_order(&self) -> Option<&(Moment, String)> {
+        self.last_order.as_ref()
     }
 
     /// The type of an instant action of the harness, by its id.
@@ -352,10 +363,23 @@ impl RunJudge {
                 })
                 .collect(),
             fleet: self.reactions.result(),
-            limits: self.plan.limits.clone(),
+            limits: self.limits(),
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
         }
+    }
+
+    /// What restricts the statement, the harness's own lag included.
+    fn limits(&self) -> Vec<String> {
+        let mut limits = self.plan.limits.clone();
+        let lag = self.timeline.longest_lag();
+        if !lag.is_zero() {
+            limits.push(format!(
+                "The harness itself was held up for up to {:.1} s; what that can explain was not held against the device.",
+                lag.as_secs_f64()
+            ));
+        }
+        limits
     }
 
     /// The planned tests that did not run, with the reason.

@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 use super::decide::decide;
 use super::departure::Departure;
 use super::hidden::{Hidden, Open, hide};
-use super::step::{Evaluator, Position, Progress, StepOutcome};
+use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use super::window::Scene;
 use crate::clock::Moment;
@@ -178,7 +178,10 @@ impl TestJudge {
                 self.base = entry.at().moment;
             }
             Event::Bound { name, value } => self.bindings.set(name, value.clone()),
-            Event::TestEnded { .. } => self.finish(entry.at().moment, ground),
+            Event::TestEnded { .. } => {
+                self.allow_for_lag(timeline);
+                self.finish(entry.at().moment, ground);
+            }
             _ => {
                 if let Some(mut running) = self.running.take() {
                     running.evaluator.observe(entry, subject, &self.scene(timeline, ground));
@@ -288,6 +291,16 @@ impl TestJudge {
                 messages: outcome.seen,
             };
             for clause in outcome.clauses {
+                // A walk that went wrong, or a message that shows what it must not, is no matter of time.
+                let of_time = match (&clause.holds, &outcome.timing) {
+                    (Holds::Late, timing) => *timing,
+                    (Holds::No, Some(timing @ Timing::Missed(_)))
+                        if clause.witness.is_none() || matches!(step.verb, Verb::Action(_)) =>
+                    {
+                        Some(*timing)
+                    }
+                    _ => None,
+                };
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
                 self.open.push(Open {
                     clause,
@@ -295,6 +308,7 @@ impl TestJudge {
                     walks: matches!(step.verb, Verb::Action(_)),
                     ended: entry.seq(),
                     waited,
+                    of_time,
                 });
             }
         }
@@ -335,6 +349,21 @@ impl TestJudge {
     /// Tells it what shows nothing in this test, before it ends.
     pub(super) fn hide(&mut self, hidden: Vec<Hidden>) {
         self.hidden = hidden;
+    }
+
+    /// What the harness's own lag can explain is not held against the device.
+    fn allow_for_lag(&mut self, timeline: &Timeline) {
+        for open in &mut self.open {
+            let Some(lag) = open.of_time.and_then(|timing| timing.explained(timeline)) else {
+                continue;
+            };
+            let why = format!(
+                "the harness itself was held up for {:.1} s meanwhile",
+                lag.as_secs_f64()
+            );
+            open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+            open.clause.holds = Holds::Unseen(why);
+        }
     }
 
     /// Clauses that were never reached are inconclusive, and a test that decided nothing is an error.

@@ -9,10 +9,11 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::clock::Stamp;
+use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Direction, Event, MockVehicle, Packet};
 
@@ -35,6 +36,8 @@ pub struct Timeline {
     /// Whether what the harness sends is filed, too.
     own: bool,
     subjects: BTreeMap<String, Vec<Arc<Entry>>>,
+    /// When the harness itself was late: from when until when.
+    lags: Vec<(Moment, Moment)>,
     last: Option<Stamp>,
 }
 
@@ -64,6 +67,11 @@ impl Timeline {
     /// Takes in one entry and returns its subject, if it has one.
     pub fn add(&mut self, entry: &Arc<Entry>) -> Option<String> {
         self.last = Some(entry.at());
+        if let Event::Lag { micros, .. } = entry.event() {
+            let end = entry.at().moment;
+            let begun = Moment::from_micros(end.micros().saturating_sub(*micros));
+            self.lags.push((begun, end));
+        }
         let subject = self.subject_of(entry)?;
         self.subjects
             .entry(subject.clone())
@@ -180,6 +188,32 @@ impl Timeline {
     #[must_use]
     pub fn baseline(&self, subject: &str, seq: u64) -> Option<Value> {
         self.before(subject, seq)?.json().cloned()
+    }
+
+    /// How long the harness itself was held up between two moments.
+    #[must_use]
+    pub fn lag(&self, from: Moment, to: Moment) -> Duration {
+        let mut all: Vec<(Moment, Moment)> = self
+            .lags
+            .iter()
+            .map(|(begun, end)| ((*begun).max(from), (*end).min(to)))
+            .filter(|(begun, end)| begun < end)
+            .collect();
+        all.sort_unstable();
+        let mut total = Duration::ZERO;
+        let mut until = from;
+        for (begun, end) in all {
+            total += end.since(begun.max(until));
+            until = until.max(end);
+        }
+        total
+    }
+
+    /// The longest time for which the harness was held up.
+    #[must_use]
+    pub fn longest_lag(&self) -> Duration {
+        let all = self.lags.iter().map(|(begun, end)| end.since(*begun));
+        all.max().unwrap_or_default()
     }
 
     /// When the last entry happened.

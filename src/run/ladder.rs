@@ -6,9 +6,25 @@ use super::between::power_cycle;
 use super::lasting::{self, Idle, has_ended, lasting};
 use super::rest::{Obstacle, place_of};
 use super::session::Session;
+use crate::clock::Moment;
 use crate::engine::{EngineError, Operator};
 use crate::journal::event::Event;
+use crate::judge::RunJudge;
 use crate::link::Link;
+
+/// Whether no state has named the last order that was sent since then, although states came.
+fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
+    let Some((sent, order)) = judge.last_order().filter(|(sent, _)| *sent >= since) else {
+        return false;
+    };
+    let states = judge.timeline().of("state").iter().rev();
+    let mut later = states.take_while(|entry| entry.at().moment >= *sent).peekable();
+    later.peek().is_some()
+        && later.all(|entry| {
+            let shown = entry.json().and_then(|state| state.get("orderId")?.as_str());
+            shown != Some(order.as_str())
+        })
+}
 
 /// So often in a row the whole ladder is tried before only a moment is given.
 const WHOLE_LADDERS: u32 = 3;
@@ -168,7 +184,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             "nodeId": node.id, "sequenceId": 0, "released": true, "nodePosition": position, "actions": [],
         }]);
         self.order(nodes, json!([])).await?;
-        self.rests_within(self.time("react")).await?;
+        self.shows_own_order().await?;
+        self.rests_within(self.time("settle")).await?;
         Ok(())
     }
 
@@ -208,6 +225,44 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
+    /// A vehicle that looks idle and refuses everything is of no use to the next test. It is asked when the last order
+    /// of a test never showed, and from the first time it was found so after every test.
+    pub(super) async fn still_takes_orders(&mut self) -> Result<(), EngineError> {
+        let may = self.setup.capabilities.motion.is_ok() && self.has_hook("power-cycle") && self.unhelped < 2;
+        let judge = self.engine.recorder.judge();
+        let asked = self.refuses || last_order_never_showed(judge, self.home.since);
+        if !may || !asked || self.engine.interrupted() {
+            return Ok(());
+        }
+        let before = self.orders;
+        self.order_where_it_stands().await?;
+        if self.orders == before || self.shows_own_order().await? {
+            return Ok(());
+        }
+        self.refuses = true;
+        self.unhelped += 1;
+        if self.restart().await? {
+            let before = self.orders;
+            self.order_where_it_stands().await?;
+            if self.orders == before || self.shows_own_order().await? {
+                self.unhelped = 0;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the order sent last on the way to rest shows in the states.
+    async fn shows_own_order(&mut self) -> Result<bool, EngineError> {
+        let id = format!("{}-rest-{}", self.setup.run, self.orders);
+        let until = self.engine.link.now().moment + self.time("slow");
+        let shows = |recorder: &crate::engine::Recorder| {
+            let states = recorder.judge().timeline().of("state").iter().rev().take(20);
+            let mut orders = states.filter_map(|entry| entry.json()?.get("orderId")?.as_str());
+            orders.any(|order| order == id)
+        };
+        self.engine.watch(until, shows).await
+    }
+
     async fn order(&mut self, nodes: Value, edges: Value) -> Result<(), EngineError> {
         self.orders += 1;
         let id = format!("{}-rest-{}", self.setup.run, self.orders);
@@ -231,6 +286,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             answered: self.cancelled.as_deref().is_some_and(|id| has_ended(judge, id)),
             since,
             patience: self.time("settle"),
+            test: self.home.since,
         };
         let found = lasting(judge, &self.obstacles(), &idle);
         let any = !found.is_empty();

@@ -13,6 +13,9 @@ use crate::clock::Moment;
 use crate::journal::event::{Event, Reading, Waiver};
 use crate::judge::RunJudge;
 
+/// Two states of a vehicle that stands are at least so far apart.
+const APART: Duration = Duration::from_secs(1);
+
 /// What is known besides the states.
 pub(super) struct Idle {
     /// The vehicle has ended a cancelOrder, one way or the other: it has no order.
@@ -21,6 +24,8 @@ pub(super) struct Idle {
     pub(super) since: Moment,
     /// So long something that is about to end may take.
     pub(super) patience: Duration,
+    /// When the last test began.
+    pub(super) test: Moment,
 }
 
 /// The mistakes that show in the last state, and are not known yet.
@@ -99,8 +104,25 @@ fn broken_words(judge: &RunJudge) -> Vec<Waiver> {
             read_as(member, json!([]), &["STATE-01", "STATE-MSG-01", "ERR-01", "JSON-10"]);
         }
     }
-    if broken("driving") && !matches!(state.get("driving"), Some(Value::Bool(_))) {
-        read_as("driving", json!(false), &["STATE-MSG-08", "STATE-08", "STATE-01"]);
+    let about = ["STATE-MSG-08", "STATE-08", "STATE-01"];
+    match state.get("driving") {
+        Some(Value::String(word)) if word.eq_ignore_ascii_case("false") => {
+            read_as("driving", json!(false), &about);
+            let shown = Some(json!(if word == "false" { "true" } else { "True" }));
+            let why = "`driving` is a text in its states";
+            all.push(waiver(
+                "driving",
+                Reading::As {
+                    shown,
+                    meant: json!(true),
+                },
+                &about,
+                why,
+            ));
+        }
+        Some(Value::Bool(_)) => {}
+        _ if broken("driving") => read_as("driving", json!(false), &about),
+        _ => {}
     }
     all
 }
@@ -137,7 +159,7 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
             &["STATE-12", "STATE-13", "NODE-05", "ORD-CANCEL-09", "ORD-CANCEL-11"],
         ));
     }
-    if obstacles.contains(&Obstacle::Driving) && stays(judge, idle) {
+    if (obstacles.contains(&Obstacle::Driving) && stays(judge, idle)) || stood_driving(judge, idle.test) {
         let about = ["STATE-MSG-08", "STATE-08", "ORD-UPD-01", "BLOCK-03", "BLOCK-04"];
         let why = "it says that it drives while it stands";
         all.push(waiver("driving", Reading::Standing, &about, why));
@@ -154,7 +176,7 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
     };
     // What an order began may really be under way, as long as cancelOrder waits for it.
     if idle.answered || open.iter().all(is_own) {
-        all.extend(open.into_iter().filter_map(|action| unfinished(judge, action)));
+        all.extend(open.into_iter().flat_map(|action| unfinished(judge, action)));
     }
     if !obstacles
         .iter()
@@ -199,32 +221,52 @@ fn passed(state: &Value, answered: bool, member: &str, about: &[&str]) -> Vec<Wa
 }
 
 /// An action that does not end although nothing goes on: an instant action of ours by its type, any other by its id.
-fn unfinished(judge: &RunJudge, action: &Value) -> Option<Waiver> {
+fn unfinished(judge: &RunJudge, action: &Value) -> Vec<Waiver> {
     let text = |name: &str| action.get(name).and_then(Value::as_str);
-    let id = text("actionId")?;
+    let Some(id) = text("actionId") else { return Vec::new() };
     let status: String = text("actionStatus").unwrap_or("nothing").chars().take(40).collect();
     let about = ["IACT-04", "ORD-CANCEL-07", "ORD-CANCEL-13", "STATE-MSG-14", "ASTATE-05"];
     if !has_known_status(action) {
-        let like = json!({ "actionStatus": text("actionStatus") });
-        let why = format!("it calls the status of actions {status:?}");
-        return Some(waiver("actionStates", Reading::Without { like }, &about, why));
+        return strange_status(text("actionStatus").unwrap_or_default());
     }
     if let Some(kind) = instant(judge, id) {
         let like = json!({ "actionType": kind, "actionStatus": status });
         let why = format!("it leaves {kind} {status}");
         let named = text("actionType") == Some(kind.as_str());
         let like = if named { like } else { json!({ "actionId": id }) };
-        return Some(waiver("actionStates", Reading::Without { like }, &about, why));
+        return vec![waiver("actionStates", Reading::Without { like }, &about, why)];
     }
     let why = format!("it leaves action {id:?} of an order that is over {status}");
-    Some(waiver(
-        "actionStates",
-        Reading::Without {
-            like: json!({ "actionId": id }),
-        },
-        &about,
-        why,
-    ))
+    let like = json!({ "actionId": id });
+    vec![waiver("actionStates", Reading::Without { like }, &about, why)]
+}
+
+/// A word for a status that is none: of an action that is over, it means that it is finished. Known words in another
+/// spelling mean what they say.
+fn strange_status(shown: &str) -> Vec<Waiver> {
+    let known = ["WAITING", "INITIALIZING", "RUNNING", "PAUSED", "FINISHED", "FAILED"];
+    let about = ["STATE-MSG-14", "ASTATE-05", "JSON-02"];
+    let one = |shown: String, meant: &str, why: String| {
+        let meant = meant.to_owned();
+        waiver("actionStates", Reading::Status { shown, meant }, &about, why)
+    };
+    let Some(meant) = known.iter().find(|word| word.eq_ignore_ascii_case(shown)) else {
+        let word: String = shown.chars().take(40).collect();
+        let why = format!("it says {word:?} of actions that are over, which is no status");
+        return vec![one(shown.to_owned(), "FINISHED", why)];
+    };
+    let lower = shown == meant.to_ascii_lowercase();
+    let spelled = |word: &str| {
+        let (first, rest) = word.split_at(1);
+        if lower {
+            word.to_ascii_lowercase()
+        } else {
+            format!("{first}{}", rest.to_ascii_lowercase())
+        }
+    };
+    let why = format!("it spells the status of actions {shown:?}");
+    let all = known.iter();
+    all.map(|word| one(spelled(word), word, why.clone())).collect()
 }
 
 fn has_known_status(action: &Value) -> bool {
@@ -258,6 +300,37 @@ fn stays(judge: &RunJudge, idle: &Idle) -> bool {
     let mut places = since.iter().map(|entry| place(entry));
     let first = places.next().flatten();
     long && since.len() > 1 && first.is_some() && places.all(|place| place == first)
+}
+
+/// Whether the vehicle has said that it drives while it waited, in two states apart: it stands where it stood, no node to
+/// come is released, and no action is under way.
+fn stood_driving(judge: &RunJudge, since: Moment) -> bool {
+    let states = judge.timeline().of("state").iter().rev();
+    let mut later: Option<&crate::journal::Entry> = None;
+    for entry in states.take_while(|entry| entry.at().moment >= since) {
+        let Some(state) = entry.json() else { continue };
+        let list = |name: &str| state.get(name).and_then(Value::as_array).into_iter().flatten();
+        let ahead = list("nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
+        let waits = list("nodeStates").next().is_some() && !ahead && list("actionStates").all(is_over_or_waits);
+        if state.get("driving") != Some(&Value::Bool(true)) || !waits {
+            later = None;
+            continue;
+        }
+        let stood = later.is_some_and(|later| {
+            let apart = later.at().moment.since(entry.at().moment);
+            let same = later.json().and_then(super::rest::place_of) == super::rest::place_of(state);
+            apart >= APART && same && super::rest::place_of(state).is_some()
+        });
+        if stood {
+            return true;
+        }
+        later.get_or_insert(entry);
+    }
+    false
+}
+
+fn is_over_or_waits(action: &Value) -> bool {
+    is_over(action) || action.get("actionStatus").and_then(Value::as_str) == Some("WAITING")
 }
 
 /// Whether the vehicle has taken over an order while it showed this error.

@@ -6,6 +6,7 @@
 use serde_json::Value;
 
 use super::between::says_online;
+use crate::clock::Moment;
 use crate::course::Layout;
 use crate::judge::RunJudge;
 use crate::pack::Pack;
@@ -85,6 +86,8 @@ impl Obstacle {
 pub(super) struct Home {
     /// Its first state.
     pub(super) first: Option<Value>,
+    /// When the running test began.
+    pub(super) since: Moment,
     /// Its state when the running test began.
     pub(super) before: Option<Value>,
 }
@@ -237,6 +240,7 @@ mod tests {
         let home = Home {
             before: Some(first.clone()),
             first: Some(first),
+            ..Home::default()
         };
         let mut all = Vec::new();
         home.of_place(now, Some(&layout()), &mut all);

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use super::between::{Presence, revive, settle_link};
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
+use super::draw::draw;
 use super::estimate::{self, Estimate};
 use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
@@ -27,6 +28,8 @@ pub struct Setup {
     pub tests: Vec<Arc<Test>>,
     /// Whether that is every test there is for this role and version.
     pub complete: bool,
+    /// Of the cases that come from a schema, those are run that this seed draws; all of them without one.
+    pub draw: Option<u64>,
     /// What is known before the device is there.
     pub capabilities: Capabilities,
     /// Where the vehicle may drive.
@@ -108,6 +111,10 @@ pub(super) struct Session<'a, L, O> {
     pub(super) ladders: u32,
     /// The id of the last cancelOrder on that way.
     pub(super) cancelled: Option<String>,
+    /// The vehicle was found to refuse every order, until it was restarted.
+    pub(super) refuses: bool,
+    /// How often in a row a restart did not make it take orders again.
+    pub(super) unhelped: u32,
     /// How many orders were sent on that way.
     pub(super) orders: u32,
     /// Preconditions that are not reached again and again.
@@ -127,13 +134,17 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             home: Home::default(),
             ladders: 0,
             cancelled: None,
+            refuses: false,
+            unhelped: 0,
             orders: 0,
             strikes: Strikes::default(),
         }
     }
 
     async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
-        if let Err(why) = self.admit().await? {
+        let admitted = self.admit().await?;
+        self.draw();
+        if let Err(why) = admitted {
             let end = self.stopped().unwrap_or_else(|| End::NoDevice(why.clone()));
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
@@ -201,6 +212,21 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         }
         self.record_plan(&plan)?;
         Ok(self.stopped().unwrap_or(End::Completed))
+    }
+
+    /// Leaves out cases that come from a schema, where the run need not be thorough.
+    fn draw(&mut self) {
+        let Some(seed) = self.setup.draw else { return };
+        let runs = |test: &Test| self.setup.capabilities.gate(test) == Gate::Runs;
+        let drawing = draw(&self.setup.tests, seed, runs);
+        if drawing.taken < drawing.of {
+            self.setup.limits.push(format!(
+                "Of {} messages broken after the schemas, {} were to be sent, drawn by the seed {seed}; `--thorough` \
+                 sends all of them.",
+                drawing.of, drawing.taken
+            ));
+        }
+        self.setup.tests = drawing.tests;
     }
 
     /// How the run ended before its time, if it did.
@@ -273,7 +299,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
 
     fn bindings(&self, test: &Test, number: usize) -> Result<Map<String, Value>, String> {
         let judge = self.engine.recorder.judge();
-        let course = course_of(test, self.setup.layout.as_ref(), judge)?;
+        let course = course_of(test, self.setup.layout.as_ref(), judge, &self.home)?;
         Ok(own_bindings(test, course, judge, &self.setup.run, number))
     }
 
@@ -286,7 +312,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         number: usize,
     ) -> Result<Option<String>, EngineError> {
         let known = self.engine.recorder.judge().ground().waivers.len();
-        self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        self.look_at_home();
         self.engine
             .run_test(test, own, &mut AsWatcher(&mut *self.progress))
             .await?;
@@ -318,7 +344,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         if let Ok(own) = self.bindings(test, number) {
             self.progress
                 .note("the precondition was not reached; the test is tried once more");
-            self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+            self.look_at_home();
             self.engine
                 .run_test(test, own, &mut AsWatcher(&mut *self.progress))
                 .await?;
@@ -329,6 +355,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             None => self.strikes.reached(test),
         }
         Ok(None)
+    }
+
+    fn look_at_home(&mut self) {
+        self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        self.home.since = self.engine.link.now().moment;
     }
 
     /// Where the precondition of the test that ended last was not reached.
@@ -355,6 +386,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         } else {
             self.bring_to_rest().await?
         };
+        if left.is_empty() {
+            self.still_takes_orders().await?;
+        }
         if !left.iter().any(Obstacle::halts) {
             self.halted = None;
         } else if self.halted.is_none() {

@@ -35,6 +35,8 @@ pub struct VirtualRun {
     pub tests: Vec<Arc<Test>>,
     /// Whether that is every test.
     pub complete: bool,
+    /// Which cases that come from a schema are run; all of them without a seed.
+    pub draw: Option<u64>,
     /// Seed of the jitter.
     pub seed: u64,
     /// Jitter on every packet.
@@ -70,6 +72,7 @@ impl VirtualRun {
             faults: Vec::new(),
             tests: library.tests(role, &pack.id),
             complete: true,
+            draw: Some(1),
             seed: 1,
             jitter: Duration::ZERO,
             coalesce: Duration::ZERO,
@@ -176,6 +179,7 @@ pub async fn run_virtually(
     let setup = Setup {
         tests: request.tests,
         complete: request.complete,
+        draw: request.draw,
         capabilities: Capabilities {
             factsheet: None,
             statements: device.statements(),

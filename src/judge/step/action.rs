@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::{Holds, Position, Progress, StepOutcome, backlog, bound_clauses, limit, seconds};
+use super::{Holds, Position, Progress, StepOutcome, Timing, backlog, bound_clauses, ids, limit, seconds};
 use crate::clock::Moment;
 use crate::diagnostic::Span;
 use crate::journal::Entry;
 use crate::journal::event::Waiver;
 use crate::judge::limit::Limit;
-use crate::judge::mend::is_lasting;
+use crate::judge::mend::{Mends, is_lasting, status_meant};
 use crate::judge::window::Scene;
 use crate::report::result::NearestMiss;
 use crate::suite::model::{ActionWalk, Step, Walk};
@@ -32,6 +32,8 @@ pub(crate) struct Walking {
     seen: u64,
     /// Actions that are known never to end, where nothing is decided.
     waivers: Vec<Waiver>,
+    /// What stands in the way of reading its status as it is.
+    meant: Option<String>,
     /// It is one of them.
     lasting: bool,
 }
@@ -106,11 +108,8 @@ impl Walking {
             walked: Vec::new(),
             last: None,
             seen: 0,
-            waivers: if verb.checks.is_empty() {
-                scene.waivers.to_vec()
-            } else {
-                Vec::new()
-            },
+            waivers: Mends::of(scene.waivers, TOPIC, &ids(&verb.checks)).into_waivers(),
+            meant: None,
             lasting: false,
         };
         for entry in backlog(scene.timeline, TOPIC, sent) {
@@ -141,16 +140,30 @@ impl Walking {
         self.walked.push(shown);
         self.last = Some(Arc::clone(entry));
         let action = entry.json().and_then(|state| action_of(state, &self.id));
-        self.lasting = action.is_some_and(|action| is_lasting(action, &self.waivers));
+        self.lasting = self.verb.checks.is_empty() && action.is_some_and(|action| is_lasting(action, &self.waivers));
+        let meant = status_meant(status, &self.waivers).map(|(meant, waiver)| (meant.to_owned(), waiver.why.clone()));
+        let status = meant.as_ref().map_or(status, |(meant, _)| meant.as_str());
         self.through.step(status);
         if let Some(tolerated) = &mut self.tolerated {
             tolerated.step(status);
         }
+        self.meant = meant.map(|(_, why)| why).or(self.meant.take());
     }
 
     fn decided(&self) -> bool {
         let lost = self.through.left() && self.tolerated.as_ref().is_none_or(Track::left);
         self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost || self.lasting
+    }
+
+    pub(super) fn timing(&self) -> Option<Timing> {
+        let (since, limit) = (self.position.base, self.limit.soft);
+        match &self.last {
+            Some(last) if self.decided() => {
+                let at = last.at().moment;
+                Some(Timing::Late { since, at, limit })
+            }
+            _ => Some(Timing::Missed(self.deadline)),
+        }
     }
 
     pub(super) fn allowances(&self) -> Vec<String> {
@@ -161,7 +174,7 @@ impl Walking {
         if self.lasting && !self.through.done() {
             vec![told]
         } else {
-            Vec::new()
+            self.meant.iter().cloned().collect()
         }
     }
 
@@ -196,6 +209,9 @@ impl Walking {
             (Holds::Yes, format!("walked {walked}, and is known to go no further"))
         } else if self.tolerated.as_ref().is_some_and(Track::done) {
             (Holds::Softly, format!("walked {walked}, which a ruling tolerates"))
+        } else if let (true, Some(meant)) = (self.decided(), &self.meant) {
+            let why = format!("walked {walked}, which cannot be told, since {meant}");
+            (Holds::Unseen(why.clone()), why)
         } else if self.decided() {
             (Holds::No, format!("walked {walked}"))
         } else if let Some(why) = cut_short {
@@ -233,6 +249,7 @@ impl Walking {
             clauses,
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         }
     }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::weigh::convinces;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, keep_nearest, limit,
-    seconds, shown_path,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
+    limit, seconds, shown_path,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -181,6 +181,15 @@ impl Holding {
         self.violated.is_some() || self.until.as_ref().is_some_and(|goal| goal.reached.is_some())
     }
 
+    pub(super) fn timing(&self) -> Option<Timing> {
+        let goal = self.until.as_ref()?;
+        let (since, limit) = (self.position.base, goal.limit.soft);
+        Some(match goal.reached.or(goal.doubtful) {
+            Some((_, at)) => Timing::Late { since, at, limit },
+            None => Timing::Missed(self.ends),
+        })
+    }
+
     pub(super) fn allowances(&self) -> Vec<String> {
         let mut all = self.selector.allowances();
         all.extend(self.until.iter().flat_map(|goal| goal.selector.allowances()));
@@ -241,6 +250,7 @@ impl Holding {
             saves: Vec::new(),
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         }
     }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::weigh::Weighing;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, keep_nearest, limit,
-    seconds, weighed_clause,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
+    limit, seconds, weighed_clause,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -22,6 +22,8 @@ pub(crate) struct Expecting {
     nearest: Option<Near>,
     seen: u64,
     late: Option<u64>,
+    /// When it came, later than it should.
+    came: Option<Moment>,
     taken: Option<StepOutcome>,
     weighing: Weighing,
 }
@@ -42,6 +44,7 @@ impl Expecting {
             nearest: None,
             seen: 0,
             late: None,
+            came: None,
             taken: None,
             weighing: Weighing::of(verb, position, scene),
         };
@@ -85,6 +88,9 @@ impl Expecting {
     fn take(&mut self, entry: &Arc<Entry>, at: Moment, whenever: bool, scene: &Scene<'_>) {
         let took = at.since(self.position.base);
         let late = took > self.limit.soft && !whenever;
+        if late {
+            self.came = Some(at);
+        }
         let (holds, message) = if late {
             let message = format!(
                 "#{} came after {}, which is later than {}",
@@ -129,8 +135,19 @@ impl Expecting {
             clauses,
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         };
         self.taken = self.weighing.weigh(outcome, &shares, entry, &self.selector, scene);
+    }
+
+    pub(super) fn timing(&self) -> Option<Timing> {
+        match &self.taken {
+            Some(_) => {
+                let (since, limit) = (self.position.base, self.limit.soft);
+                self.came.map(|at| Timing::Late { since, at, limit })
+            }
+            None => Some(Timing::Missed(self.deadline)),
+        }
     }
 
     pub(super) fn allowances(&self) -> Vec<String> {
@@ -196,6 +213,7 @@ impl Expecting {
             saves: Vec::new(),
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         }
     }
 

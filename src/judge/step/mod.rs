@@ -106,7 +106,42 @@ pub struct StepOutcome {
     pub seen: u64,
     /// Lasting mistakes of the vehicle that would have stood in the way.
     pub allowances: Vec<String>,
+    /// What came too late, or did not come in time.
+    pub timing: Option<Timing>,
 }
+
+/// A finding about time.
+#[derive(Clone, Copy, Debug)]
+pub enum Timing {
+    /// It came later than it should.
+    Late {
+        /// From when it counts.
+        since: Moment,
+        /// When it came.
+        at: Moment,
+        /// How long it may take.
+        limit: Duration,
+    },
+    /// It had not come by then.
+    Missed(Moment),
+}
+
+impl Timing {
+    /// How long the harness was held up itself, if that can explain it.
+    pub(super) fn explained(self, timeline: &Timeline) -> Option<Duration> {
+        let lag = match self {
+            Self::Late { since, at, limit } => {
+                let lag = timeline.lag(since, at);
+                return (at.since(since).saturating_sub(lag) <= limit && !lag.is_zero()).then_some(lag);
+            }
+            Self::Missed(deadline) => timeline.lag(deadline, deadline + AFTERWARDS),
+        };
+        (!lag.is_zero()).then_some(lag)
+    }
+}
+
+/// A harness that was held up at the end of a step has not read yet what came before.
+const AFTERWARDS: Duration = Duration::from_millis(500);
 
 /// What the engine should do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,6 +225,7 @@ impl Evaluator {
     /// The step has ended at `at`; `cut_short` when it was not the deadline that ended it.
     pub(super) fn end(self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
         let allowances = self.allowances();
+        let timing = self.timing();
         let mut outcome = match self {
             Self::Plain => StepOutcome::default(),
             Self::Unbound(outcome) => outcome,
@@ -200,13 +236,24 @@ impl Evaluator {
             Self::Retained(step) => step.end(at, cut_short),
         };
         outcome.allowances.extend(allowances);
+        outcome.timing = timing;
         outcome
+    }
+
+    fn timing(&self) -> Option<Timing> {
+        match self {
+            Self::Expect(step) => step.timing(),
+            Self::Always(step) => step.timing(),
+            Self::Action(step) => step.timing(),
+            _ => None,
+        }
     }
 
     /// Lasting mistakes of the vehicle that would have stood in the way.
     fn allowances(&self) -> Vec<String> {
         match self {
             Self::Expect(step) => step.allowances(),
+            Self::Never(step) => step.allowances(),
             Self::Always(step) => step.allowances(),
             Self::Action(step) => step.allowances(),
             _ => Vec::new(),
@@ -272,10 +319,17 @@ impl Selector {
             None => entry.subject().is_some(),
             Some(pattern) => entry.subject().is_some_and(|message| {
                 let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
-                takes(&message) || self.mends.make_up_for(entry, scene.timeline, takes)
+                takes(&message) || self.mends.make_up_for(entry, scene, takes)
             }),
         };
         matches && !matches!(self.check_says(entry, scene), Said::Wrong(..))
+    }
+
+    /// Whether a message is what is looked for only for a lasting mistake of the vehicle.
+    pub(super) fn is_excused(&self, entry: &Entry, scene: &Scene<'_>) -> bool {
+        let Some(pattern) = &self.pattern else { return false };
+        let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
+        self.mends.make_up_for(entry, scene, |message: &Value| !takes(message))
     }
 
     /// What the named check says about this entry; right where there is no check.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, limit, seconds};
+use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, limit, seconds};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
@@ -30,7 +30,11 @@ impl Forbidding {
             .get("time.broker")
             .and_then(serde_json::Value::as_u64)
             .unwrap_or(5_000);
-        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?;
+        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
+            &verb.subject(),
+            &ids(&verb.checks),
+            scene,
+        );
         let check = selector
             .check
             .take()
@@ -71,9 +75,13 @@ impl Forbidding {
             if let Said::Wrong(_, found) = check.observe(entry, scene) {
                 self.violated = Some((entry.seq(), found));
             }
-        } else if self.selector.takes(entry, scene) {
+        } else if self.selector.takes(entry, scene) && !self.selector.is_excused(entry, scene) {
             self.violated = Some((entry.seq(), format!("#{} is what must not come", entry.seq())));
         }
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        self.selector.allowances()
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -127,6 +135,7 @@ impl Forbidding {
             saves: Vec::new(),
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         }
     }
 }

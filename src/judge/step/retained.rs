@@ -131,6 +131,7 @@ impl Fetching {
             saves: Vec::new(),
             seen: self.seen,
             allowances: Vec::new(),
+            timing: None,
         }
     }
 }

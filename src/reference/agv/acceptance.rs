@@ -56,11 +56,19 @@ impl Agv {
     }
 
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
-        let mut order = Order::read(message)?;
+        let taken = super::leniency::taken(message, self.faults);
+        let mut order = Order::read(&taken)?;
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
-        let tolerated = |_: &Defect| self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty();
+        let tolerated = |defect: &Defect| {
+            let unchecked = match defect.path.rsplit('.').next() {
+                Some("sequenceId") => self.faults.has(F::SequenceUnchecked),
+                Some("startNodeId" | "endNodeId") => self.faults.has(F::EdgeEndsUnchecked),
+                _ => false,
+            };
+            unchecked || (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
+        };
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
         }
@@ -89,7 +97,8 @@ impl Agv {
             let again = self.faults.has(F::DuplicateExecuted) && !self.is_busy();
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
-        if !new && order.update_id < self.book.update_id && !self.faults.has(F::OutdatedUpdateTakenOver) {
+        let compared = !new || self.faults.has(F::UpdateIdsComparedAcrossOrders);
+        if compared && order.update_id < self.book.update_id && !self.faults.has(F::OutdatedUpdateTakenOver) {
             return Err(Refusal::new(
                 Rule::Outdated,
                 "the order update is older than the current one",
@@ -151,7 +160,11 @@ impl Agv {
 
     /// Nodes left, an order action not ended, or a cancellation under way; a horizon keeps it busy.
     pub(super) fn is_busy(&self) -> bool {
-        let actions = self.actions.order_unfinished() && !self.faults.has(F::RunningActionIgnored);
+        let free = |action: &Action| {
+            self.faults.has(F::FreeActionIgnored) && action.request.blocking == super::order_message::Blocking::None
+        };
+        let open = |action: &Action| action.of_order() && !action.status.is_terminal() && !free(action);
+        let actions = self.actions.iter().any(open) && !self.faults.has(F::RunningActionIgnored);
         let counts = |released: bool| released || !self.faults.has(F::HorizonNotBusy);
         let nodes = !self.book.cancelled && self.book.nodes.iter().any(|stop| counts(stop.node.released));
         (nodes || actions || self.book.cancel.is_some()) && !self.faults.has(F::BusyIgnored)
@@ -210,15 +223,20 @@ impl Agv {
             self.set_holds(|holds| holds.stuck = false);
         }
         let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
+        let last_update = self.book.has_order().then_some(self.book.update_id);
         self.book = super::book::Book::empty(last.0);
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
-        self.book.update_id = order.update_id;
+        let carried = last_update.filter(|_| self.faults.has(F::UpdateIdCarriedOver));
+        self.book.update_id = carried.unwrap_or(order.update_id);
         self.book.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
         self.book.first_end = self.book.nodes.back().map_or(0, |stop| stop.node.sequence_id);
         let pose = self.motion.pose(self.moment());
         self.book.begun_at = Some((pose.x, pose.y));
+        if self.faults.has(F::LoadForgottenWithOrder) {
+            self.loads.clear();
+        }
         if self.faults.has(F::OwnErrorClearedByOrder) {
             self.errors.cleared();
         }

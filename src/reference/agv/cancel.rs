@@ -128,6 +128,11 @@ impl Agv {
         }
         self.book.cancel = None;
         self.book.cancelled = true;
+        if self.faults.has(F::LastNodeAheadWhenCancelled)
+            && let Some(ahead) = self.book.nodes.front().filter(|_| self.book.entered)
+        {
+            (self.book.last_node, self.book.last_sequence) = (ahead.node.id.clone(), ahead.node.sequence_id);
+        }
         if !self.faults.has(F::CancelLeavesNodes) {
             self.book.drop_route();
         } else if cancel.to_node {

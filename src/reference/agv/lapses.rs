@@ -33,12 +33,30 @@ pub const LAPSES: &[(&str, &str)] = &[
         "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
     ),
     (
+        "state-request-unlisted",
+        "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
+    ),
+    (
         "min-state-interval-ignored",
         "FACT-14 contradicts the sending on events; its ruling leaves a warning.",
     ),
     ("horizon-actions-stay", "It breaks a recommendation only."),
     ("cancel-lets-run", "It breaks a recommendation only."),
     ("cancel-fails-early", "It breaks a recommendation only."),
+    (
+        "validation-error-lingers",
+        "That the error goes with the next order is implied only; the ruling of ORD-REJ-03 is a warning.",
+    ),
+    (
+        "header-unchecked",
+        "No sentence says what becomes of an order whose header is broken; that it is malformed is a matter of reading.",
+    ),
+    ("unknown-instant-silent", "It breaks a recommendation only."),
+    ("unknown-instant-unreferenced", "It breaks a recommendation only."),
+    (
+        "order-error-as-validation",
+        "The name within the family is a preference by the ruling of ORD-REJ-06, and what follows is not reached.",
+    ),
     (
         "max-rotation-speed-ignored",
         "The turn takes place while the edge is entered; whether it belongs to the edge yet is a matter of reading.",
@@ -83,7 +101,14 @@ pub const LAPSES: &[(&str, &str)] = &[
     ),
     ("state-bursts", "It breaks a recommendation only."),
     ("new-base-request-always", "It breaks a recommendation only."),
+    ("new-base-request-stays", "It breaks a recommendation only."),
     ("distance-negative", "It breaks a recommendation only."),
+    ("distance-not-reset", "It breaks a recommendation only."),
+    ("own-error-cleared-by-order", "It breaks a recommendation only."),
+    (
+        "semiautomatic-ends-order",
+        "The text says that orders are executed in both modes, and nothing about those that are switched over.",
+    ),
     (
         "traversal-split",
         "Two states of one moment are remarked on; tests that look at single states are not reached.",

@@ -23,6 +23,7 @@ mod factsheet;
 pub mod faults;
 mod instant;
 pub mod lapses;
+mod leniency;
 mod maps;
 mod motion;
 mod order_message;
@@ -136,6 +137,8 @@ pub struct Agv {
     obstacles: BTreeSet<String>,
     /// It refuses the next order (`order-error-locks`, `manual-locks` only).
     locked: bool,
+    /// `malformed-instant-deafens`: no instant action is heard any more.
+    deaf: bool,
     /// It has left its corridor and was not put back yet.
     strayed: bool,
     /// Where loads are handed over, and whether one stands there.
@@ -147,6 +150,8 @@ pub struct Agv {
     undocking: Option<Moment>,
     /// A switch keeps it from pausing and from going on.
     pause_blocked: bool,
+    /// How often it was paused (`pauses-counted` only).
+    pauses: u32,
     /// Something keeps it from ending its charging.
     charger_locked: bool,
     /// The order it gave up in a mode for people (`order-taken-up-again` only).
@@ -217,12 +222,14 @@ impl Agv {
             loads: Vec::new(),
             obstacles: BTreeSet::new(),
             locked: false,
+            deaf: false,
             strayed: false,
             stations: config.stations.clone(),
             shadow: None,
             charging: false,
             undocking: None,
             pause_blocked: false,
+            pauses: 0,
             charger_locked: false,
             remembered: None,
             lost: false,

@@ -78,7 +78,7 @@ impl Agv {
         let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
         let stuck = stuck || self.faults.has(F::StuckAfterEdgeAction) && self.blocking_edge_action_ended();
         let warned = self.faults.has(F::WarningBlocks) && !self.errors.is_empty();
-        self.mode.takes_orders()
+        (self.mode.takes_orders() || self.faults.has(F::ManualDrivesOn))
             && !self.persona.halted
             && !self.persona.lost
             && self.lingers_until.is_none()
@@ -357,6 +357,10 @@ impl Agv {
             let of_update = sequence_id > self.book.first_end;
             if !(of_update && self.faults.has(F::UpdateActionsNotPerformed)) {
                 self.actions.trigger(Origin::Node(sequence_id), self.faults);
+            }
+            let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == stop.node.id);
+            for ahead in again.filter(|_| self.faults.has(F::LoopActionsEarly)) {
+                self.actions.trigger(Origin::Node(ahead.node.sequence_id), self.faults);
             }
             let ahead = self.book.edge_ahead().map(|edge| edge.sequence_id);
             if let Some(ahead) = ahead.filter(|_| self.faults.has(F::EdgeActionsOnNode)) {

@@ -138,6 +138,9 @@ impl Agv {
             id.clone_into(&mut self.book.order_id);
         }
         if rule == Rule::Malformed {
+            if message.is_object() && self.faults.has(F::MalformedStopsOrder) {
+                self.give_up_order();
+            }
             let without_id = message.is_object() && message.get("orderId").is_none();
             if without_id && self.faults.has(F::MissingIdTakenOver) {
                 self.book.order_id.clear();

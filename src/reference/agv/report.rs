@@ -20,6 +20,8 @@ use super::tolerances::ToleranceName as T;
 pub(super) struct Report {
     /// An order message arrived (STATE-03).
     pub(super) order_received: bool,
+    /// It was an update, and it was taken over (`update-without-state` only).
+    pub(super) update_received: bool,
     /// A state was asked for (ACT-26).
     pub(super) requested: bool,
     /// No state before the next periodic one (`state-request-unanswered`).
@@ -37,9 +39,10 @@ pub(super) struct Report {
 const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
 
 /// Faults that keep events from the state.
-const KEPT_EVENTS: [F; 9] = [
+const KEPT_EVENTS: [F; 10] = [
     F::StatesByClock,
     F::OrderWithoutState,
+    F::UpdateWithoutState,
     F::LoadWithoutState,
     F::ErrorWithoutState,
     F::ModeWithoutState,
@@ -242,6 +245,13 @@ impl Agv {
 
     /// Whether a faulty vehicle keeps an event to itself. What it swallows is never told on its own.
     fn suppressed(&mut self, changes: Changes, requested: bool, body: &Map<String, Value>) -> bool {
+        if std::mem::take(&mut self.report.update_received) && self.faults.has(F::UpdateWithoutState) {
+            self.report.order_received = false;
+            if let Some((_, last)) = &mut self.report.last {
+                last.clone_from(body);
+            }
+            return true;
+        }
         let event = |change: bool, fault: F| change && self.faults.has(fault);
         let held = self.report.silenced
             || (self.faults.has(F::StatesByClock) && !requested)

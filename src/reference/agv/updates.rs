@@ -11,7 +11,8 @@ impl Agv {
     pub(super) fn check_update(&self, order: &mut Order) -> Result<(), Refusal> {
         let busy = self.is_busy();
         let cancelled = self.book.cancel.is_some() || self.book.cancelled;
-        if cancelled && !self.faults.has(F::CancelledOrderRevived) {
+        let ended = self.book.cancel.is_some() && self.faults.has(F::CancelEndedByUpdate);
+        if cancelled && !ended && !self.faults.has(F::CancelledOrderRevived) {
             return Err(Refusal::new(Rule::BrokenUpdate, "the order was cancelled"));
         }
         if self.refuses_updates_now() {
@@ -54,7 +55,13 @@ impl Agv {
     pub(super) fn continue_with(&mut self, mut order: Order) {
         self.book.continued |= !self.is_busy();
         self.book.cancelled = false;
+        if let Some(cancel) = self.book.cancel.take()
+            && let Some(action) = self.actions.get_mut(&cancel.action_id)
+        {
+            action.end(Status::Finished);
+        }
         self.book.updated = true;
+        self.report.update_received = true;
         let keep = if order.nodes.iter().any(|node| !node.released) {
             self.faults.has(F::HorizonAppended)
         } else {
@@ -102,6 +109,9 @@ impl Agv {
 
     /// What a faulty vehicle does to its actions, or to those of an update, when it takes the update over.
     fn continue_actions_wrongly(&mut self, order: &mut Order) {
+        if self.faults.has(F::UpdateEdgeActionsLost) {
+            order.edges.iter_mut().for_each(|edge| edge.actions.clear());
+        }
         if self.faults.has(F::UpdateActionsLost) {
             order.nodes.iter_mut().skip(1).for_each(|node| node.actions.clear());
             order.edges.iter_mut().for_each(|edge| edge.actions.clear());

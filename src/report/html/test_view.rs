@@ -27,6 +27,8 @@ pub struct TestView {
     pub title: String,
     pub why: String,
     pub reason: Option<String>,
+    /// What was read over, and what else was done to get here.
+    pub allowances: Vec<String>,
     pub not_applicable: bool,
     pub watchlist: bool,
     pub seconds: String,
@@ -152,6 +154,7 @@ fn view(
                 .then(|| "the test decided nothing".to_owned())
                 .filter(|_| test.decisions.is_empty())
         }),
+        allowances: test.allowances.clone(),
         not_applicable: verdict.is_none(),
         watchlist: test.maturity == "watchlist",
         seconds: seconds(test.seconds),

@@ -57,7 +57,14 @@ impl Agv {
         }
         set("velocity", self.velocity_picture());
         set("loads", self.loads_picture());
-        set("driving", json!(self.shows_driving()));
+        set(
+            "driving",
+            if has(F::DrivingAsText) {
+                json!(self.shows_driving().to_string())
+            } else {
+                json!(self.shows_driving())
+            },
+        );
         if !has(F::PauseFlagMissing) {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             set("paused", json!(self.holds.pause || button || self.holds.emergency));
@@ -84,7 +91,11 @@ impl Agv {
         } else {
             "operatingMode"
         };
-        set(key, json!(self.mode_literal()));
+        if has(F::ModeNumeric) {
+            set(key, json!(self.mode as u8));
+        } else if !has(F::ModeMissing) {
+            set(key, json!(self.mode_literal()));
+        }
         if !(has(F::ErrorsOmitted) && self.errors.is_empty()) {
             set("errors", self.errors.picture(self.faults));
         }
@@ -104,6 +115,13 @@ impl Agv {
         if !has(F::SafetyStateMissing) {
             set("safetyState", self.safety());
         }
+        if has(F::EmptyListsNull) {
+            let lists = ["nodeStates", "edgeStates", "actionStates"];
+            let empty = |state: &Map<String, Value>, list: &str| state.get(list) == Some(&json!([]));
+            for list in lists.into_iter().filter(|list| empty(&state, list)).collect::<Vec<_>>() {
+                state.insert(list.to_owned(), Value::Null);
+            }
+        }
         state
     }
 
@@ -121,13 +139,22 @@ impl Agv {
         (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning)
             || idle
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
+            || (self.book.has_order() && self.faults.has(F::DrivingKept))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
 
+    /// `manual-drives-on`: drives a way it does not show.
+    fn hides_route(&self) -> bool {
+        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesOn)
+    }
+
     fn node_states(&self, complete: bool) -> Value {
+        if self.hides_route() {
+            return json!([]);
+        }
         let left = self.book.left.0.as_ref().filter(|_| {
             (!complete && self.faults.has(F::TraversedNodesListed))
-                || (complete && self.book.has_order() && self.faults.has(F::FinishedOrderListed))
+                || (complete && self.book.has_order() && self.keeps_last_node())
         });
         let shown = self
             .book
@@ -138,6 +165,10 @@ impl Agv {
             .chain(shown)
             .map(|stop| self.node_state(stop))
             .collect()
+    }
+
+    fn keeps_last_node(&self) -> bool {
+        self.faults.has(F::FinishedOrderListed) || self.faults.has(F::LastRouteListed)
     }
 
     /// The node traversed last, as if it were still ahead (`route-repeated-on-request`).
@@ -165,7 +196,11 @@ impl Agv {
     }
 
     fn edge_states(&self, complete: bool) -> Value {
-        let stays = self.faults.has(F::EdgeStatesStay) && !complete;
+        if self.hides_route() {
+            return json!([]);
+        }
+        let kept = self.faults.has(F::LastEdgeListed) || self.faults.has(F::LastRouteListed);
+        let stays = (self.faults.has(F::EdgeStatesStay) && !complete) || (kept && complete && self.book.has_order());
         let left = self.book.left.1.as_ref().filter(|_| stays);
         let shown = self
             .book
@@ -210,6 +245,12 @@ impl Agv {
             Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
             status => status.literal(),
+        };
+        let lower = self.faults.has(F::StatusLowerCase);
+        let status = if lower {
+            status.to_ascii_lowercase()
+        } else {
+            status.to_owned()
         };
         let mut picture = json!({
             "actionId": action.request.id,
@@ -352,6 +393,9 @@ impl Agv {
             () if stopped => "MANUAL",
             () if self.holds.field => "AUTOACK",
             () if self.faults.has(F::EmergencyStopSpelled) => "Off",
+            () if self.faults.has(F::EmergencyStopNull) => {
+                return json!({ "eStop": null, "fieldViolation": self.holds.field });
+            }
             () => "NONE",
         };
         json!({ "eStop": emergency_stop, "fieldViolation": self.holds.field })
