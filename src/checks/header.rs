@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use regex::Regex;
 
-use super::traffic::{Traffic, broken, quote, remark, says_broken};
+use super::traffic::{Traffic, broken, quote, remark, says_broken, show};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -118,8 +118,13 @@ impl Running for Timestamp {
             return false;
         };
         let Some(value) = entry.json() else { return false };
-        let Some(written) = value.get("timestamp").and_then(|written| written.as_str()) else {
+        let Some(written) = value.get("timestamp") else {
             return false;
+        };
+        let Some(written) = written.as_str() else {
+            let text = format!("timestamp {} on {} is no time in UTC", show(written), message.name);
+            findings.push(broken("HDR-03", entry.seq(), text));
+            return true;
         };
         let form = TIMESTAMP_FORM.as_ref().and_then(|form| form.captures(written));
         let (Some(form), Ok(time)) = (form, written.parse::<jiff::Timestamp>()) else {

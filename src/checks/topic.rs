@@ -122,7 +122,6 @@ impl Names {
             else {
                 continue;
             };
-            self.proper.insert(name.to_owned());
             let text = format!("{name} is published on {} and never on {}", quote(&topic), quote(usual));
             let level = |of: &str, at: usize| of.split('/').nth(at).map(str::to_owned);
             findings.push(if topic.rsplit('/').next() != Some(name) {
@@ -366,6 +365,47 @@ mod tests {
         assert!(trace.judge("topic/names").findings.is_empty());
         let own = at_tap("acme/diagnostics").judge("topic/names");
         assert!(own.findings.is_empty() && own.judged == 0);
+    }
+
+    #[test]
+    fn messages_on_another_topic_are_found_when_they_never_come_on_their_own() {
+        let state = json!({ "actionStates": [], "operatingMode": "AUTOMATIC" });
+        let mut trace = Trace::tap();
+        trace
+            .publish(1, "states", 0, false, &state)
+            .wait(40.0)
+            .publish(1, "states", 0, false, &state);
+        assert_eq!(trace.judge("topic/names").summary(), ["TOPIC-01"]);
+        assert!(trace.judge("state/period").findings.is_empty(), "states do come");
+        trace.publish(1, "state", 0, false, &state);
+        let mut copied = Trace::tap();
+        copied
+            .publish(1, "state", 0, false, &state)
+            .publish(1, "states", 0, false, &state)
+            .wait(40.0);
+        assert!(copied.judge("topic/names").findings.is_empty(), "a copy for others");
+        let mut other = Trace::tap();
+        let (own, minor) = (other.prefix.clone(), other.prefix.replacen("/v", "/v1.", 1));
+        other.prefix = minor;
+        let topic = other.topic("state");
+        other.prefix = own;
+        let payload = crate::journal::Payload::keep(bytes::Bytes::from(state.to_string().into_bytes()));
+        let packet = Packet::Publish {
+            topic,
+            qos: 0,
+            retain: false,
+            dup: false,
+            packet_id: None,
+            payload,
+        };
+        other
+            .add(
+                Source::Tap,
+                Some(Direction::FromDevice),
+                Event::Packet { connection: 1, packet },
+            )
+            .wait(40.0);
+        assert_eq!(other.judge("topic/names").summary(), ["TOPIC-03 warning"]);
     }
 
     #[test]

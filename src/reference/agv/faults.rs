@@ -232,7 +232,7 @@ faults! {
     OrderErrorAsValidation "order-error-as-validation" ["ORD-REJ-06"] "Reports orders it cannot perform as malformed.";
     OrderErrorFatal "order-error-fatal" ["ORD-REJ-06"] "Reports orders it cannot perform as FATAL.";
     OrderErrorUnreferenced "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform.";
-    OrderErrorLocks "order-error-locks" ["ORD-13", "ORD-REJ-08"] "Refuses the order that follows one it could not perform.";
+    OrderErrorLocks "order-error-locks" ["ORD-FLOW-06", "ORD-REJ-08"] "Refuses the order that follows one it could not perform.";
     OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a moment.";
     OutdatedUpdateTakenOver "outdated-update-taken-over" ["ORD-REJ-10"] "Goes back to an outdated order update.";
     OutdatedUpdateDropsOrder "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives.";
