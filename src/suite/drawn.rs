@@ -121,7 +121,7 @@ pub(super) fn rows(
         );
     } else if found.is_empty() && !claimed.is_empty() {
         problems.at(
-            "empty-cases",
+            "no-cases",
             &cases.span,
             "a table without rows",
             "no member of the schema can be broken so",

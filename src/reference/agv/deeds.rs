@@ -406,9 +406,10 @@ impl Agv {
         let stale = action.of_order() && self.faults.has(F::LiftMapStale);
         let old = self.motion.pose(self.moment()).map_id;
         let kept = self.motion.pose(self.moment());
-        let (x, y) = match self.faults.has(F::InitPositionKeepsPose) {
-            true => (kept.x, kept.y),
-            false => (x, y),
+        let (x, y) = if self.faults.has(F::InitPositionKeepsPose) {
+            (kept.x, kept.y)
+        } else {
+            (x, y)
         };
         self.motion.place(Pose {
             x,

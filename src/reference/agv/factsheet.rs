@@ -213,6 +213,7 @@ impl Agv {
         for (deed, scope, fault) in [
             (Deed::StartPause, "NODE", F::StartPauseOnNodes),
             (Deed::Pick, "INSTANT", F::PickAsInstantAction),
+            (Deed::FinePositioning, "INSTANT", F::PositioningAsInstantAction),
             (Deed::StartCharging, "EDGE", F::ChargingOnEdges),
         ] {
             if kind.deed == deed && self.faults.has(fault) {

@@ -110,6 +110,7 @@ faults! {
     OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
     MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
     PickAsInstantAction "pick-as-instant-action" ["ACT-09"] "Declares pick as an instant action.";
+    PositioningAsInstantAction "positioning-as-instant-action" ["ACT-09"] "Declares finePositioning as an instant action.";
     ChargingOnEdges "charging-on-edges" ["ACT-09"] "Declares startCharging as an action for edges.";
     StateRequestUnlisted "state-request-unlisted" ["FACT-07"] "Offers stateRequest but does not list it.";
     StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
@@ -385,6 +386,7 @@ faults! {
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
     UnknownInstantFinished "unknown-instant-finished" ["IACT-04", "IACT-06"] "Reports an instant action it does not know as FINISHED.";
+    UnknownInstantWaits "unknown-instant-waits" ["IACT-06"] "Leaves an instant action it does not know WAITING for ever.";
     UnknownInstantSilent "unknown-instant-silent" ["IACT-06"] "Fails an instant action it cannot perform, and raises no error.";
     UnknownInstantUnreferenced "unknown-instant-unreferenced" ["BP-01"] "Raises an error without references for an instant action it cannot perform.";
     MalformedInstantDeafens "malformed-instant-deafens" ["IACT-03"] "Takes no instant actions any more once one of them was malformed.";

@@ -108,6 +108,7 @@ impl Agv {
         let action = Action::waiting(request, kind, Origin::Instant);
         self.actions.push(action.clone());
         match refusal {
+            Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantWaits) => {}
             Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
             Some(reason) => {
                 self.take_map_anyway(&action);

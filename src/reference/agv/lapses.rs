@@ -51,6 +51,11 @@ pub const LAPSES: &[(&str, &str)] = &[
         "header-unchecked",
         "No sentence says what becomes of an order whose header is broken; that it is malformed is a matter of reading.",
     ),
+    (
+        "positioning-as-instant-action",
+        "The ruling of ACT-09 leaves a warning.",
+    ),
+    ("unknown-instant-waits", "It breaks a recommendation only."),
     ("unknown-instant-silent", "It breaks a recommendation only."),
     ("unknown-instant-unreferenced", "It breaks a recommendation only."),
     (
