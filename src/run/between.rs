@@ -116,7 +116,9 @@ async fn power_cycle<L: Link, O: Operator>(
     let before = session.engine.note(Event::Note { text: reason })?;
     match session.engine.hook("power-cycle", Map::new(), true).await? {
         HookOutcome::Done(_) => {}
-        HookOutcome::Failed(failed) => return Ok(Err(format!("hook `power-cycle` failed: {failed}"))),
+        HookOutcome::Failed(failed) | HookOutcome::Refused(failed) => {
+            return Ok(Err(format!("hook `power-cycle` failed: {failed}")));
+        }
         HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),
     }
     let after = session

@@ -34,7 +34,12 @@ enum Fate {
 impl Site {
     /// Looks after the running order.
     pub(super) fn watch_order(&mut self, vehicle: &mut Vehicle) {
-        if vehicle.cancel.is_some() || !self.commandable(vehicle) {
+        if vehicle.cancel.is_some() && self.faults.has(F::UpdatedWhileCancelled) {
+            self.extend_all_the_same(vehicle);
+            return;
+        }
+        let stubborn = self.faults.has(F::UpdatesInService) && self.reachable(vehicle);
+        if vehicle.cancel.is_some() || !(self.commandable(vehicle) || stubborn) {
             return;
         }
         let Some(mut running) = vehicle.running.take() else {
@@ -73,6 +78,16 @@ impl Site {
         }
     }
 
+    /// `updated-while-cancelled`: as if nobody had called the order off.
+    fn extend_all_the_same(&mut self, vehicle: &mut Vehicle) {
+        if let Some(mut running) = vehicle.running.take() {
+            if running.confirmed {
+                self.extend_base(vehicle, &mut running);
+            }
+            vehicle.running = Some(running);
+        }
+    }
+
     fn fate(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
         let shown = state.order_id == running.id;
         if shown {
@@ -82,7 +97,8 @@ impl Site {
         if !running.confirmed && !running.refused {
             if let Some(kind) = refusal(running, state) {
                 if running.accepted {
-                    running.refused = true;
+                    running.refused = !self.faults.has(F::RefusedUpdateExtended);
+                    running.confirmed |= !running.refused;
                 } else if self.faults.has(F::RefusedOrderRepeated) && running.resends < FLOOD {
                     self.repeat_refused(vehicle, running);
                 } else if kind.to_ascii_lowercase().contains("noroute") && running.transport.begun < 2 {
@@ -104,7 +120,16 @@ impl Site {
         if !shown && !alien {
             return Fate::Again;
         }
-        progress(running, state)
+        let fate = progress(running, state);
+        let driven = state.route_empty() && running.is_whole() && running.confirmed;
+        match fate {
+            Fate::Runs if driven && self.faults.has(F::ActionNotAwaited) => Fate::Over,
+            Fate::Again if running.confirmed && self.faults.has(F::ClearedOrderUpdated) => {
+                running.changed = true;
+                Fate::Runs
+            }
+            fate => fate,
+        }
     }
 
     /// Sends the unchanged message again when it was not seen in time; false when that was done often enough.

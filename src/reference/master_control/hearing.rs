@@ -19,6 +19,11 @@ impl MasterControl {
         if payload.len() > MAX_MESSAGE {
             return;
         }
+        self.site.take_odd(vehicle, name, payload);
+        if self.site.dead {
+            self.shut_down();
+            return;
+        }
         let Ok(message) = serde_json::from_slice::<Value>(payload) else {
             return;
         };
@@ -91,6 +96,7 @@ impl Site {
         }
         if presence == Presence::Online && vehicle.presence != Presence::Online {
             vehicle.give_time(self.now.moment);
+            vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
         }
         vehicle.presence = presence;
     }

@@ -103,7 +103,8 @@ impl Site {
         let mut ready = true;
         for map_id in maps {
             let Some(state) = &vehicle.state else { return false };
-            if state.map_enabled(map_id) {
+            let sent = self.faults.has(F::MapEnabledBlindly) && vehicle.enabling.contains_key(map_id);
+            if state.map_enabled(map_id) || sent {
                 vehicle.enabling.remove(map_id);
                 continue;
             }

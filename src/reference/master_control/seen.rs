@@ -257,6 +257,8 @@ pub(super) struct Factsheet {
     pub(super) devices: Vec<String>,
     /// Types of loads.
     pub(super) load_types: Vec<String>,
+    /// Whether a limit is 0 (`zero-is-a-limit`).
+    pub(super) has_zeros: bool,
 }
 
 impl Factsheet {
@@ -302,6 +304,7 @@ impl Factsheet {
                 .map_or(0.0, |seconds| seconds.clamp(0.0, 3600.0)),
             devices: texts(list("/loadSpecification/loadPositions")),
             load_types: load_types.map(str::to_owned).collect(),
+            has_zeros: at("/protocolLimits/maxArrayLens").is_some_and(|limits| limits["order.nodes"] == 0),
         }
     }
 

@@ -45,6 +45,7 @@ tolerances! {
     NewestMqtt "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5.";
     AsksForStates "asks-for-states" ["ACT-08"] "Asks for a state when it has begun an order.";
     AsksForFactsheet "asks-for-factsheet" ["ACT-08"] "Asks for the factsheet although it has one.";
+    OrdersToFaulted "orders-to-faulted" ["CONN-14"] "Begins what it is asked for on a vehicle with a FATAL error.";
     SoftActions "soft-actions" ["FACT-15"] "Uses the blocking type SOFT where the vehicle allows it.";
 }
 

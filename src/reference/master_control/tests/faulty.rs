@@ -211,6 +211,15 @@ fn strange(fault: &[&str]) -> Bench {
             Value::Null,
         ),
         (json!({ "maps": [] }), Value::Null),
+        (json!({ "lastNodeId": "" }), Value::Null),
+        (json!({ "vendor": null }), Value::Null),
+        (json!({ "orderUpdateId": "0" }), Value::Null),
+        (json!({ "paused": true }), Value::Null),
+        (json!({ "vendor": "Größe" }), Value::Null),
+        (
+            json!({ "actionStates": [{ "actionId": "x", "actionStatus": "FINISHED" }] }),
+            Value::Null,
+        ),
     ];
     for (changes, sheet) in cases {
         let other = fresh(changes, sheet);
