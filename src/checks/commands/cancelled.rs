@@ -79,7 +79,9 @@ impl BaseKept {
             .states
             .iter()
             .any(|seen| status(seen, id) == Some("FAILED"));
-        let taken = self.taken && !self.free && seen.is_some_and(|seen| seen.order == self.order);
+        // Where the vehicle never heard of cancelOrder, this is not the mistake to speak of.
+        let heard = self.vehicle.states.iter().any(|seen| status(seen, id).is_some());
+        let taken = heard && self.taken && !self.free && seen.is_some_and(|seen| seen.order == self.order);
         if failed || !taken || self.newest.is_none_or(|newest| update <= newest) || now.since(*since) < CROSSING {
             return false;
         }

@@ -97,8 +97,7 @@ impl Site {
         if !running.confirmed && !running.refused {
             if let Some(kind) = refusal(running, state) {
                 if running.accepted {
-                    running.refused = !self.faults.has(F::RefusedUpdateExtended);
-                    running.confirmed |= !running.refused;
+                    running.refused = true;
                 } else if self.faults.has(F::RefusedOrderRepeated) && running.resends < FLOOD {
                     self.repeat_refused(vehicle, running);
                 } else if kind.to_ascii_lowercase().contains("noroute") && running.transport.begun < 2 {
@@ -124,6 +123,10 @@ impl Site {
         let driven = state.route_empty() && running.is_whole() && running.confirmed;
         match fate {
             Fate::Runs if driven && self.faults.has(F::ActionNotAwaited) => Fate::Over,
+            Fate::CalledOff if running.refused && self.faults.has(F::RefusedUpdateExtended) => {
+                (running.refused, running.confirmed) = (false, true);
+                Fate::Runs
+            }
             Fate::Again if running.confirmed && self.faults.has(F::ClearedOrderUpdated) => {
                 running.changed = true;
                 Fate::Runs
@@ -237,13 +240,15 @@ impl Site {
             released: target.max(running.released),
             end: free.min(target.max(running.released).saturating_add(self.config.horizon_length)),
         };
-        running.update_id += 1;
+        let stuck = running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats);
+        let before = running.update_id;
+        running.update_id += u32::from(!stuck);
         match self.order_message(vehicle, running, window) {
             Some((message, window)) if window.released > running.released || running.changed => {
                 running.released = window.released;
                 self.send_order(vehicle, running, message);
             }
-            _ => running.update_id -= 1,
+            _ => running.update_id = before,
         }
     }
 

@@ -129,6 +129,7 @@ faults! {
     BaseReplaced "base-replaced" ["ORD-UPD-03", "ORD-CANCEL-01"] "Changes the base by an update when the destination changes.";
     OrderIdPerUpdate "order-id-per-update" ["ORD-UPD-04"] "Gives every update an orderId of its own.";
     UpdateIdKept "update-id-kept" ["ORD-UPD-04"] "Does not raise orderUpdateId.";
+    SecondUpdateRepeats "second-update-repeats" ["ORD-UPD-04"] "Gives every update the number of the first one.";
     UpdateIdFalls "update-id-falls" ["ORD-UPD-04"] "Counts orderUpdateId down.";
     StitchingMissing "stitching-missing" ["ORD-UPD-05"] "Begins updates with the first new node.";
     RefusedUpdateExtended "refused-update-extended" ["ORD-UPD-05"] "Goes on from the end of an update that was refused.";

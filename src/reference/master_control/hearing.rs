@@ -124,6 +124,7 @@ impl Site {
         if let Some((index, _)) = near.next_back() {
             let sequence = u32::try_from(2 * index).unwrap_or(u32::MAX);
             state.last_node_sequence_id = state.last_node_sequence_id.max(sequence);
+            state.node_states.retain(|node| node.sequence_id.is_some_and(|id| id > sequence));
         }
     }
 
@@ -132,6 +133,7 @@ impl Site {
         if vehicle.running.is_none() {
             believe(vehicle.shown_at.as_ref(), &mut state);
         }
+        vehicle.absolved &= !state.is_fit(self.config.low_battery);
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
         if back {

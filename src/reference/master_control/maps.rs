@@ -104,7 +104,10 @@ impl Site {
         for map_id in maps {
             let Some(state) = &vehicle.state else { return false };
             let sent = self.faults.has(F::MapEnabledBlindly) && vehicle.enabling.contains_key(map_id);
-            if state.map_enabled(map_id) || sent {
+            if sent {
+                continue;
+            }
+            if state.map_enabled(map_id) {
                 vehicle.enabling.remove(map_id);
                 continue;
             }

@@ -122,7 +122,10 @@ impl Site {
         if let Some(text) = field("nodePosition.mapDescription", None, json!(stop.map_id)) {
             position["mapDescription"] = text;
         }
-        node["nodePosition"] = position;
+        let listed = sheet.is_none_or(Factsheet::knows_positions);
+        if listed || !self.takes(T::PositionWhereListed) {
+            node["nodePosition"] = position;
+        }
         node["actions"] = json!(stop.actions);
         node
     }

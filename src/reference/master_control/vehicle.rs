@@ -106,7 +106,8 @@ impl Running {
     /// Index of the node the vehicle has reached.
     pub(super) fn reached(&self, state: Option<&State>) -> usize {
         let sequence = state.filter(|state| state.order_id == self.id);
-        let sequence = sequence.map_or(0, |state| state.last_node_sequence_id / 2);
+        // A vehicle that has just taken the order over may still name the last node of the one before.
+        let sequence = sequence.map_or(0, |state| state.last_node_sequence_id.min(state.before_next_node()) / 2);
         usize::try_from(sequence)
             .unwrap_or(usize::MAX)
             .min(self.stops.len().saturating_sub(1))
