@@ -255,6 +255,10 @@ static REGISTRY: &[Check] = &[
     commands::DUPLICATES,
     commands::MODES,
     commands::NOT_ASKED,
+    commands::FIRST_PLACE,
+    commands::HEALTH,
+    commands::ALIVE,
+    commands::LISTENS,
 ];
 
 #[cfg(test)]

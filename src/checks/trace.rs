@@ -318,7 +318,8 @@ impl Trace {
         .into_iter()
         .map(|name| (name.to_owned(), self.topic(name)))
         .collect();
-        let Value::Object(bindings) = json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000 } })
+        let Value::Object(bindings) =
+            json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000, "notice": 1_000 } })
         else {
             unreachable!()
         };

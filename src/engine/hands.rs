@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use super::vehicle::has_any_open_connection;
 use super::{Engine, EngineError, HookOutcome, Operator, operator};
 use crate::clock::Moment;
 use crate::journal::event::{Event, Occurrence, Source, StepEnd};
@@ -65,9 +66,24 @@ impl<L: Link, O: Operator> Engine<L, O> {
         }
         Ok(match outcome {
             HookOutcome::Done(_) => StepEnd::Decided,
+            HookOutcome::Failed(why) if self.master_control_is_gone() => StepEnd::Refused(format!(
+                "hook `{}` failed, and the master control has no connection any more: {why}",
+                operator.hook
+            )),
             HookOutcome::Failed(why) => StepEnd::Broken(format!("hook `{}` failed: {why}", operator.hook)),
-            HookOutcome::Missing => StepEnd::Broken(format!("the profile has no hook `{}`", operator.hook)),
+            HookOutcome::Refused(why) => StepEnd::Refused(format!(
+                "the device refuses what hook `{}` asks for: {why}",
+                operator.hook
+            )),
+            HookOutcome::Missing => StepEnd::Refused(format!("there is nobody for hook `{}`", operator.hook)),
         })
+    }
+
+    /// Whether a master control has had connections, and now has none, though nobody keeps it away.
+    fn master_control_is_gone(&self) -> bool {
+        let judge = self.recorder.judge();
+        let connected = !judge.timeline().of("mqtt/connect").is_empty();
+        judge.role() == Role::MasterControl && connected && !has_any_open_connection(judge)
     }
 
     pub(super) async fn vehicle_step(&mut self, vehicle: &VehicleStep, step: &Step) -> Result<StepEnd, EngineError> {
@@ -199,7 +215,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
         };
         let (ok, detail) = match &outcome {
             HookOutcome::Done(detail) => (true, detail.clone()),
-            HookOutcome::Failed(detail) => (false, detail.clone()),
+            HookOutcome::Failed(detail) | HookOutcome::Refused(detail) => (false, detail.clone()),
             HookOutcome::Missing => (false, "no such hook".to_owned()),
         };
         let occurrence = Occurrence {

@@ -51,6 +51,8 @@ pub enum StepEnd {
     Interrupted,
     /// The harness could not do it; the text says why.
     Broken(String),
+    /// The device does not do what a hook asks of it, or cannot be asked any more; the text says why.
+    Refused(String),
 }
 
 /// One thing that happened.

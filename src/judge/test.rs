@@ -221,6 +221,7 @@ impl TestJudge {
             cursor: self.cursor,
             base: self.base,
             begun: begun.1,
+            step: begun.0,
         };
         let evaluator = Evaluator::begin(&step, position, &self.scene(timeline, ground));
         self.running = Some(Running {
@@ -246,7 +247,7 @@ impl TestJudge {
         let cut_short = match end {
             StepEnd::Decided | StepEnd::Deadline => None,
             StepEnd::Interrupted => Some("the run was interrupted".to_owned()),
-            StepEnd::Broken(why) => Some(why.clone()),
+            StepEnd::Broken(why) | StepEnd::Refused(why) => Some(why.clone()),
         };
         let at = entry.at().moment;
         let outcome = evaluator.end(at, cut_short.as_deref(), &self.scene(timeline, ground));
@@ -256,8 +257,10 @@ impl TestJudge {
                 self.result.allowances.push(allowance.clone());
             }
         }
-        if let StepEnd::Broken(why) = end {
-            self.broken(section, &step, why);
+        match end {
+            StepEnd::Broken(why) => self.broken(section, &step, why),
+            StepEnd::Refused(why) => self.refused(section, &step, why),
+            _ => {}
         }
         for (name, value) in &outcome.saves {
             self.bindings.set(name, value.clone());
@@ -314,6 +317,15 @@ impl TestJudge {
         }
     }
 
+    /// A device that does not do what it is asked for leaves the test undecided; it is nobody's breakdown.
+    fn refused(&mut self, section: Section, step: &Step, why: &str) {
+        match section {
+            Section::Given => self.preamble = Err(format!("the precondition was not reached: {}: {why}", step.path)),
+            Section::Steps => self.body = Err(format!("{}: {why}", step.path)),
+            Section::Finally => {}
+        }
+    }
+
     fn broken(&mut self, section: Section, step: &Step, why: &str) {
         if section != Section::Finally {
             self.trouble.get_or_insert_with(|| format!("{}: {why}", step.path));
@@ -323,6 +335,7 @@ impl TestJudge {
     fn record_step(&mut self, step: &Step, outcome: &StepOutcome, end: &StepEnd, begun: (u64, Moment), entry: &Entry) {
         let word = match (end, &outcome.reached) {
             (StepEnd::Broken(_), _) => "broken",
+            (StepEnd::Refused(_), _) => "failed",
             (StepEnd::Interrupted, _) => "interrupted",
             (_, Some(Err(_))) => "failed",
             _ => "done",

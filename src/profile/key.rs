@@ -378,6 +378,7 @@ pub const KEYS: &[Key] = &[
     key("time.will", Kind::Duration),
     key("time.quiet", Kind::Duration),
     key("time.settle", Kind::Duration),
+    key("time.notice", Kind::Duration),
     key("time.broker", Kind::Duration),
     key("maps.files", Kind::Files),
 ];

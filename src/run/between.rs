@@ -136,7 +136,9 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     let before = next_seq(&session.engine.recorder);
     match session.engine.hook("power-cycle", Map::new(), true).await? {
         HookOutcome::Done(_) => {}
-        HookOutcome::Failed(failed) => return Ok(Err(format!("hook `power-cycle` failed: {failed}"))),
+        HookOutcome::Failed(failed) | HookOutcome::Refused(failed) => {
+            return Ok(Err(format!("hook `power-cycle` failed: {failed}")));
+        }
         HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),
     }
     let after = next_seq(&session.engine.recorder);

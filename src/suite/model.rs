@@ -357,6 +357,8 @@ pub enum From {
     Mark,
     /// At the cursor.
     Here,
+    /// Where the step itself begins: what came while an earlier step only waited is left aside.
+    Now,
     /// The most recent message there is, whenever it came; then new ones.
     Latest,
     /// At the start of the test.

@@ -41,10 +41,11 @@ const VERBS: [(&str, &[&str]); 11] = [
     ("use", &["with"]),
 ];
 
-const FROM: [(&str, From); 5] = [
+const FROM: [(&str, From); 6] = [
     ("cursor", From::Here),
     ("mark", From::Mark),
     ("here", From::Here),
+    ("now", From::Now),
     ("latest", From::Latest),
     ("test", From::Test),
 ];

@@ -223,6 +223,7 @@ impl Expecting {
             return format!("the {topic} message came too late, in #{late}");
         }
         match self.seen {
+            0 if topic == "order" => format!("no order came within {}: the vehicle is not served", seconds(waited)),
             0 => format!("no {topic} message came within {}", seconds(waited)),
             1 => format!(
                 "1 {topic} message came within {}, and it does not match",

@@ -41,6 +41,8 @@ pub struct Position {
     pub base: Moment,
     /// When this step began.
     pub begun: Moment,
+    /// Journal number at which this step began.
+    pub step: u64,
 }
 
 impl Position {
@@ -48,6 +50,7 @@ impl Position {
         match if from == From::Usual { usual } else { from } {
             From::Mark => self.mark,
             From::Test => self.test,
+            From::Now => self.step,
             From::Usual | From::Here | From::Latest => self.cursor,
         }
     }
