@@ -148,7 +148,9 @@ pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
     if is_foreign && device.role == Role::Agv && !effective.profile.motion.allowed {
         let title = "a certificate is about driving, too, and the profile does not allow motion";
         return Err(Diagnostic::whole("certify", title)
-            .hint("set `allowed = true` in the section [motion] of the profile where the vehicle may drive, or use `run`")
+            .hint(
+                "set `allowed = true` in the section [motion] of the profile where the vehicle may drive, or use `run`",
+            )
             .into());
     }
     run_command(&args::Run {
@@ -336,7 +338,7 @@ impl Job {
             (false, false) => Err("the profile does not allow motion ([motion] allowed = true)".to_owned()),
             (false, true) => Ok(()),
         };
-        let mut limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
+        let limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
         let capabilities = Capabilities {
             factsheet: None,
             statements: statements(&profile.device),
@@ -383,7 +385,11 @@ impl Job {
     }
 
     fn motion(&self) -> Result<(), String> {
-        if self.no_motion { Err(NO_MOTION.to_owned()) } else { Ok(()) }
+        if self.no_motion {
+            Err(NO_MOTION.to_owned())
+        } else {
+            Ok(())
+        }
     }
 
     fn screen(&self, device: &str) -> Screen {

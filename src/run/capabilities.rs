@@ -79,9 +79,9 @@ impl Capabilities {
             Need::MapServer if self.maps => Gate::Runs,
             Need::MapServer => Gate::Unobservable("the device cannot reach the map server".to_owned()),
             Need::Hook(name) if self.hooks.iter().any(|hook| hook == name) => Gate::Runs,
-            Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => Gate::NotApplicable(format!(
-                "the profile says that the device has nothing for the hook `{name}`"
-            )),
+            Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => Gate::NotApplicable(
+                format!("the profile says that the device has nothing for the hook `{name}`"),
+            ),
             Need::Hook(name) => Gate::Unobservable(format!("the profile has no hook `{name}` ([hooks.{name}])")),
             Need::Profile(name) => match self.statements.get(name) {
                 Some(true) => Gate::Runs,
@@ -133,9 +133,9 @@ impl Capabilities {
             (Some(Some(true)), _) | (_, Some(true)) => Gate::Runs,
             (_, Some(false)) => Gate::NotApplicable(format!("the profile says that the device does not have: {name}")),
             (Some(Some(false)), None) => Gate::NotApplicable(format!("the factsheet does not list: {name}")),
-            (Some(None), None) => {
-                Gate::Unobservable(format!("the factsheet has no list that could say whether it has: {name}"))
-            }
+            (Some(None), None) => Gate::Unobservable(format!(
+                "the factsheet has no list that could say whether it has: {name}"
+            )),
             (None, None) => Gate::Unobservable(format!("there is no factsheet that could say whether it has: {name}")),
         }
     }
@@ -155,10 +155,13 @@ impl Capabilities {
                 ["limit", path] => has_limit(sheet, path),
                 _ => None,
             }?;
-            let (sheet_says, profile_says) = if *claimed { ("does not list", "has") } else { ("lists", "does not have") };
-            (listed != *claimed).then(|| {
-                format!("The factsheet {sheet_says} what the profile says the device {profile_says}: {name}.")
-            })
+            let (sheet_says, profile_says) = if *claimed {
+                ("does not list", "has")
+            } else {
+                ("lists", "does not have")
+            };
+            (listed != *claimed)
+                .then(|| format!("The factsheet {sheet_says} what the profile says the device {profile_says}: {name}."))
         };
         self.claims.iter().filter_map(one).collect()
     }
@@ -200,7 +203,11 @@ impl Capabilities {
             all.entry(name.clone())
                 .and_modify(|(listed, source)| {
                     let agrees = *claimed == !matches!(listed.as_str(), "no");
-                    let both = if agrees { "factsheet, and the profile" } else { "factsheet; the profile says the opposite" };
+                    let both = if agrees {
+                        "factsheet, and the profile"
+                    } else {
+                        "factsheet; the profile says the opposite"
+                    };
                     both.clone_into(source);
                 })
                 .or_insert_with(|| (said.to_owned(), "profile".to_owned()));

@@ -131,7 +131,11 @@ impl Weighing {
             if new.is_empty() {
                 return false;
             }
-            let kinds = self.asserted.iter().chain(&selector.pattern).flat_map(Bound::kinds_of_new);
+            let kinds = self
+                .asserted
+                .iter()
+                .chain(&selector.pattern)
+                .flat_map(Bound::kinds_of_new);
             let kinds: Vec<(&str, &Bound)> = kinds.collect();
             let of_kind = |element: &&&Value| {
                 let fits = |(name, kind): &(&str, &Bound)| element.get(name).is_some_and(|it| kind.matches(it, None));

@@ -184,7 +184,7 @@ impl Agv {
         };
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
         let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
-        let keeps = leaves || self.faults.has(F::ManualKeepsOrder);
+        let keeps = leaves || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             let given_up = self.book.clone();
             self.give_up_order();

@@ -29,6 +29,8 @@ pub struct TestView {
     pub reason: Option<String>,
     pub not_applicable: bool,
     pub watchlist: bool,
+    pub maturity_note: Option<String>,
+    pub reviewed: bool,
     pub seconds: String,
     /// Whether there is something to look at.
     pub finding: bool,
@@ -154,6 +156,8 @@ fn view(
         }),
         not_applicable: verdict.is_none(),
         watchlist: test.maturity == "watchlist",
+        maturity_note: test.maturity_note.clone(),
+        reviewed: test.maturity == "reviewed",
         seconds: seconds(test.seconds),
         finding,
         decisions,
