@@ -20,7 +20,7 @@ use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, RunHeader};
 use crate::pack::{Catalogue, Decided, Packs, Role};
-use crate::report::result::{Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult};
+use crate::report::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
 use crate::suite::Suites;
 use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};
@@ -50,6 +50,9 @@ pub enum JudgeError {
     /// It was made for a protocol version this program does not have.
     #[error("the journal is about protocol version {0}, which this program does not have")]
     Version(String),
+    /// It is about a side of the interface nobody knows.
+    #[error("the journal is about the role `{0}`, which there is not")]
+    Role(String),
     /// It names a test the suites do not have.
     #[error("the journal names the test `{0}`, which the suites do not have")]
     UnknownTest(String),
@@ -86,11 +89,10 @@ impl RunJudge {
             .packs
             .get(&header.protocol)
             .ok_or_else(|| JudgeError::Version(header.protocol.clone()))?;
-        let role = if header.role == Role::Agv.word() {
-            Role::Agv
-        } else {
-            Role::MasterControl
-        };
+        let role = [Role::Agv, Role::MasterControl]
+            .into_iter()
+            .find(|role| role.word() == header.role)
+            .ok_or_else(|| JudgeError::Role(header.role.clone()))?;
         let bindings = Arc::new(header.bindings.clone());
         let ground_of = |topics: &BTreeMap<String, String>, manufacturer: &str, serial_number: &str| Ground {
             pack: Arc::clone(pack),
@@ -397,15 +399,13 @@ impl RunJudge {
                 not_applicable: None,
                 seconds: 0.0,
                 reason: None,
-                maturity: "watchlist".to_owned(),
+                maturity: test.maturity.word().to_owned(),
+                maturity_note: test.maturity.note().map(str::to_owned),
                 journal: None,
                 decisions: Vec::new(),
                 steps: Vec::new(),
                 allowances: Vec::new(),
             };
-            if test.maturity == crate::suite::model::Maturity::Reviewed {
-                "reviewed".clone_into(&mut result.maturity);
-            }
             let why = match &planned.gate {
                 Gate::NotApplicable(why) => {
                     result.not_applicable = Some(why.clone());
@@ -433,14 +433,11 @@ impl RunJudge {
     }
 
     fn requirements(&self, tests: &[TestResult], watched: &[Watched]) -> Vec<RequirementResult> {
-        let mut decided: BTreeMap<&str, (Accumulated, Vec<String>)> = BTreeMap::new();
+        let mut decided: BTreeMap<&str, Opinions> = BTreeMap::new();
         for test in tests {
             for decision in &test.decisions {
-                let (verdict, by) = decided.entry(decision.requirement.as_str()).or_default();
-                verdict.add(decision.verdict());
-                if !by.contains(&test.id) {
-                    by.push(test.id.clone());
-                }
+                let opinions = decided.entry(decision.requirement.as_str()).or_default();
+                opinions.add(decision.verdict(), &test.id, test.journal.is_some());
             }
         }
         let monitored: Vec<(String, Vec<(String, Verdict)>)> = watched
@@ -449,11 +446,7 @@ impl RunJudge {
             .collect();
         for (id, decisions) in &monitored {
             for (requirement, verdict) in decisions {
-                let (all, by) = decided.entry(requirement.as_str()).or_default();
-                all.add(*verdict);
-                if !by.contains(id) {
-                    by.push(id.clone());
-                }
+                decided.entry(requirement.as_str()).or_default().add(*verdict, id, true);
             }
         }
         let mut all = Vec::new();
@@ -462,15 +455,17 @@ impl RunJudge {
                 continue;
             }
             let id = requirement.id.as_str();
-            let (verdict, decided_by) = decided.remove(id).unwrap_or_default();
-            let not_decided = match verdict.get() {
+            let opinions = decided.remove(id).unwrap_or_default();
+            let verdict = opinions.verdict();
+            let not_decided = match verdict {
                 Some(_) => None,
                 None => Some(self.why_not(id, &requirement.decided, tests, watched)),
             };
             all.push(RequirementResult {
                 id: id.to_owned(),
-                verdict: verdict.get(),
-                decided_by,
+                verdict,
+                verdicts: opinions.verdicts(),
+                decided_by: opinions.by,
                 not_decided,
             });
         }
@@ -498,6 +493,50 @@ impl RunJudge {
             result.not_applicable.clone()
         });
         reason.map_or_else(|| "not selected".to_owned(), |why| format!("not applicable: {why}"))
+    }
+}
+
+/// What tests and monitors say about one requirement.
+#[derive(Default)]
+struct Opinions {
+    /// Of those that ran.
+    run: Accumulated,
+    /// Of tests that were set aside before they began: for a hook that is missing, or motion that is not permitted.
+    aside: Accumulated,
+    by: Vec<String>,
+    given: BTreeMap<Verdict, Vec<String>>,
+}
+
+impl Opinions {
+    fn add(&mut self, verdict: Verdict, by: &str, ran: bool) {
+        if ran {
+            self.run.add(verdict);
+        } else {
+            self.aside.add(verdict);
+        }
+        let given = self.given.entry(verdict).or_default();
+        for list in [&mut self.by, given] {
+            if !list.iter().any(|known| known == by) {
+                list.push(by.to_owned());
+            }
+        }
+    }
+
+    /// What could not be tried does not make undecided what was decided.
+    fn verdict(&self) -> Option<Verdict> {
+        self.run.get().or(self.aside.get())
+    }
+
+    /// All of them, the worst first; nothing where they agree.
+    fn verdicts(&self) -> Vec<Given> {
+        if self.given.len() < 2 {
+            return Vec::new();
+        }
+        let given = self.given.iter().rev().map(|(verdict, by)| Given {
+            verdict: *verdict,
+            by: by.clone(),
+        });
+        given.collect()
     }
 }
 

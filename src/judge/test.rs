@@ -21,7 +21,7 @@ use crate::journal::event::{Event, StepEnd, Waiver};
 use crate::pack::{Catalogue, Pack, Role};
 use crate::pattern::Bindings;
 use crate::report::result::{Decision, StepResult, TestResult, Waited};
-use crate::suite::model::{Maturity, Section, Step, Test, Verb};
+use crate::suite::model::{Section, Step, Test, Verb};
 use crate::verdict::{Accumulated, Verdict};
 
 /// What does not change during a run.
@@ -40,6 +40,49 @@ pub struct Ground {
     pub bindings: Arc<Map<String, Value>>,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
+}
+
+/// What the vehicle itself says is wrong, in its last state.
+fn reported(timeline: &Timeline) -> Option<String> {
+    let state = timeline.of("state").last()?.json()?;
+    let errors = state.get("errors")?.as_array()?;
+    let text = |value: &Value, name: &str| -> String {
+        let found = value.get(name).and_then(Value::as_str).unwrap_or_default();
+        found.chars().take(60).collect()
+    };
+    let one = |error: &Value| {
+        let references = error.get("errorReferences").and_then(Value::as_array);
+        let named: Vec<String> = references
+            .into_iter()
+            .flatten()
+            .take(3)
+            .map(|reference| {
+                format!(
+                    "{} {}",
+                    text(reference, "referenceKey"),
+                    text(reference, "referenceValue")
+                )
+            })
+            .collect();
+        let named = if named.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", named.join(", "))
+        };
+        format!("{} {}{named}", text(error, "errorLevel"), text(error, "errorType"))
+    };
+    let all: Vec<String> = errors.iter().take(2).map(one).collect();
+    (!all.is_empty()).then(|| format!("the vehicle itself reports {}", all.join(" and ")))
+}
+
+/// How a precondition comes out that is itself an obligation: it is broken when what is seen contradicts it. Coming late is
+/// no matter of it, and nothing at all shows nothing.
+fn of_precondition(holds: Holds, seen: u64) -> Holds {
+    match holds {
+        Holds::Late | Holds::Softly => Holds::Yes,
+        Holds::No if seen == 0 => Holds::Unseen("nothing came that could have shown it".to_owned()),
+        other => other,
+    }
 }
 
 /// A test being judged.
@@ -80,10 +123,6 @@ impl TestJudge {
         if let Some(own) = own.as_object() {
             bindings.extend(own);
         }
-        let maturity = match test.maturity {
-            Maturity::Watchlist => "watchlist",
-            Maturity::Reviewed => "reviewed",
-        };
         let (seq, moment) = (entry.seq(), entry.at().moment);
         Self {
             test: Arc::clone(test),
@@ -105,7 +144,8 @@ impl TestJudge {
                 not_applicable: None,
                 seconds: 0.0,
                 reason: None,
-                maturity: maturity.to_owned(),
+                maturity: test.maturity.word().to_owned(),
+                maturity_note: test.maturity.note().map(str::to_owned),
                 journal: Some((seq, seq)),
                 decisions: Vec::new(),
                 steps: Vec::new(),
@@ -281,19 +321,27 @@ impl TestJudge {
                 step.title.clone().unwrap_or_else(|| step.path.clone()),
                 step.span.place()
             );
+            let own = reported(timeline).map(|own| format!("; {own}")).unwrap_or_default();
             match section {
-                Section::Given => self.preamble = Err(format!("the precondition was not reached: {place}: {why}")),
+                Section::Given => {
+                    self.preamble = Err(format!("the precondition was not reached: {place}: {why}{own}"));
+                }
                 Section::Steps => self.body = Err(format!("{place}: {why}")),
                 Section::Finally => {}
             }
         }
-        if section == Section::Steps {
+        let owed = section == Section::Given && step.owes;
+        if owed || section == Section::Steps {
             let waited = Waited {
                 seconds: at.since(base).as_secs_f64(),
                 since: self.mark,
                 messages: outcome.seen,
             };
-            for clause in outcome.clauses {
+            for mut clause in outcome.clauses {
+                if owed {
+                    clause.word = "owes";
+                    clause.holds = of_precondition(clause.holds, outcome.seen);
+                }
                 // A walk that went wrong, or a message that shows what it must not, is no matter of time.
                 let of_time = match (&clause.holds, &outcome.timing) {
                     (Holds::Late, timing) => *timing,

@@ -158,8 +158,11 @@ pub struct TestResult {
     /// Why the verdict is not a pass, in one line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// `watchlist` or `reviewed`.
+    /// `reviewed`, `not reviewed` or `watchlist`.
     pub maturity: String,
+    /// When it was reviewed and what was looked at, or what is disputed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub maturity_note: Option<String>,
     /// First and last journal number.
     pub journal: Option<(u64, u64)>,
     /// What was decided.
@@ -328,6 +331,16 @@ pub struct MonitorFinding {
     pub interpretation: Option<String>,
 }
 
+/// A verdict on a requirement, and who gave it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Given {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Tests and monitors.
+    pub by: Vec<String>,
+}
+
 /// What is known about one requirement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -338,6 +351,9 @@ pub struct RequirementResult {
     pub verdict: Option<Verdict>,
     /// Tests and monitors that decided it.
     pub decided_by: Vec<String>,
+    /// Where they disagree: every verdict with those that gave it, the worst first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub verdicts: Vec<Given>,
     /// Why nothing did: `not applicable`, `no test`, `not testable: …`, `not selected`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_decided: Option<String>,

@@ -231,6 +231,7 @@ mod tests {
             title: None,
             spec: None,
             verb,
+            owes: false,
             verb_span: span.clone(),
             span,
         }
@@ -245,7 +246,7 @@ mod tests {
             spec: ">=1".parse().expect("range"),
             needs: Vec::new(),
             moves: false,
-            maturity: Maturity::Reviewed,
+            maturity: Maturity::Open,
             why: "because".to_owned(),
             given: Vec::new(),
             steps,

@@ -300,7 +300,11 @@ pub fn qualify_tests(
         blemishes,
         deciders,
         kills,
-        excused: excused.filter(|one| one.role == role).cloned().collect(),
+        excused: excused
+            .filter(|one| one.role == role)
+            .filter(|one| one.spec.as_ref().is_none_or(|spec| spec.contains(pack.version)))
+            .cloned()
+            .collect(),
     })
 }
 

@@ -264,6 +264,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             .as_ref()
             .and_then(|sheet| sheet.pointer("/typeSpecification/seriesName"));
         let mut limits = self.setup.limits.clone();
+        if let Err(why) = &self.setup.capabilities.motion {
+            limits.push(format!("No test that moves the vehicle was run: {why}."));
+        }
         limits.extend(self.halted.clone());
         if !self.setup.complete {
             limits.push("Only a selection of the tests was run.".to_owned());

@@ -246,7 +246,7 @@ fn lint_state(
         spec,
         needs: Vec::new(),
         moves: true,
-        maturity: Maturity::Watchlist,
+        maturity: Maturity::Open,
         why: String::new(),
         given,
         steps: Vec::new(),

@@ -80,7 +80,8 @@ impl Test {
     #[must_use]
     pub fn requirements(&self) -> Vec<RequirementId> {
         let mut all = Vec::new();
-        for step in &self.steps {
+        let owed = self.given.iter().filter(|step| step.owes);
+        for step in owed.chain(&self.steps) {
             for (id, _) in step.clauses() {
                 if !all.contains(&id) {
                     all.push(id);
@@ -103,12 +104,35 @@ pub enum Section {
 }
 
 /// How far a test is trusted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Maturity {
-    /// Young: a failure wants a second look at the evidence.
-    Watchlist,
-    /// Reviewed.
-    Reviewed,
+    /// No second reader has held it against the standard yet.
+    Open,
+    /// What it holds true is disputed, for this reason: a finding of it wants a second look.
+    Watchlist(String),
+    /// A second reader has held it against the standard: when, and what was looked at.
+    Reviewed(String),
+}
+
+impl Maturity {
+    /// The word used in results.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Open => "not reviewed",
+            Self::Watchlist(_) => "watchlist",
+            Self::Reviewed(_) => "reviewed",
+        }
+    }
+
+    /// What is noted about it.
+    #[must_use]
+    pub fn note(&self) -> Option<&str> {
+        match self {
+            Self::Open => None,
+            Self::Watchlist(note) | Self::Reviewed(note) => Some(note),
+        }
+    }
 }
 
 /// What a test needs to be applicable.
@@ -141,7 +165,7 @@ pub enum Need {
 }
 
 pub use crate::course::CourseNeed;
-pub use monitor::{Monitor, Rule};
+pub use monitor::{About, Monitor, Rule};
 pub use vehicle::{VehicleStep, Which};
 
 /// One step.
@@ -155,6 +179,8 @@ pub struct Step {
     pub spec: Option<VersionRange>,
     /// The verb and its arguments.
     pub verb: Verb,
+    /// Whether its requirements stand under `owes:`: a precondition that is itself an obligation of the device.
+    pub owes: bool,
     /// The whole step.
     pub span: Span,
     /// Key and value of the verb, for carets: `expect: state`.
@@ -166,6 +192,7 @@ impl Step {
     #[must_use]
     pub fn clauses(&self) -> Vec<(RequirementId, String)> {
         let mut all = Vec::new();
+        let word = if self.owes { ".owes" } else { ".checks" };
         let mut checks = |bindings: &[Binding], suffix: &str| {
             all.extend(
                 bindings
@@ -175,27 +202,27 @@ impl Step {
         };
         match &self.verb {
             Verb::Expect(step) => {
-                checks(&step.checks, ".checks");
+                checks(&step.checks, word);
                 let asserts = step.assert.iter().chain(&step.prefer);
                 for assertion in asserts {
-                    let word = if step.prefer.iter().any(|other| std::ptr::eq(other, assertion)) {
+                    let kind = if step.prefer.iter().any(|other| std::ptr::eq(other, assertion)) {
                         "prefer"
                     } else {
                         "assert"
                     };
-                    all.push((assertion.requirement.clone(), format!("{}.{word}", self.path)));
+                    all.push((assertion.requirement.clone(), format!("{}.{kind}", self.path)));
                 }
             }
-            Verb::Never(step) => checks(&step.checks, ".checks"),
+            Verb::Never(step) => checks(&step.checks, word),
             Verb::Always(step) => {
-                checks(&step.checks, ".checks");
+                checks(&step.checks, word);
                 if let Extent::Until(until) = &step.extent {
                     checks(&until.checks, ".until");
                 }
             }
-            Verb::Action(step) => checks(&step.checks, ".checks"),
+            Verb::Action(step) => checks(&step.checks, word),
             Verb::Retained(step) => {
-                checks(&step.checks, ".checks");
+                checks(&step.checks, word);
                 for assertion in &step.assert {
                     all.push((assertion.requirement.clone(), format!("{}.assert", self.path)));
                 }

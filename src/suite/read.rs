@@ -11,19 +11,31 @@ use super::fields::{Fields, Problems, text_of};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::load::{States, parse};
-use super::model::{CourseNeed, Drawn, Maturity, Monitor, Need, Rule, Test};
+use super::model::{About, Binding, CourseNeed, Drawn, Maturity, Monitor, Need, Rule, Test};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
 use crate::diagnostic::{Diagnostic, Source, Span};
-use crate::pack::{Role, VersionRange};
+use crate::pack::{RequirementId, Role, VersionRange};
 use crate::yaml::{Kind, Node};
 
 const TEST_KEYS: &[&str] = &[
-    "test", "title", "device", "spec", "needs", "moves", "maturity", "why", "cases", "given", "steps", "finally",
+    "test",
+    "title",
+    "device",
+    "spec",
+    "needs",
+    "moves",
+    "reviewed",
+    "watchlist",
+    "why",
+    "cases",
+    "given",
+    "steps",
+    "finally",
 ];
 const MONITOR_KEYS: &[&str] = &[
-    "monitor", "title", "device", "spec", "needs", "why", "checks", "check", "with", "topic", "always", "when",
-    "never", "hides",
+    "monitor", "title", "device", "spec", "needs", "why", "checks", "about", "check", "with", "topic", "always",
+    "when", "never", "hides",
 ];
 const ROLES: [(&str, Role); 2] = [("agv", Role::Agv), ("master-control", Role::MasterControl)];
 
@@ -289,10 +301,7 @@ impl TestReader<'_> {
                 format!("the folder says `{role}`"),
             );
         }
-        let maturities = [("watchlist", Maturity::Watchlist), ("reviewed", Maturity::Reviewed)];
-        let maturity = fields
-            .word("maturity", "unknown-word", &maturities, problems)
-            .unwrap_or(Maturity::Watchlist);
+        let maturity = maturity(&fields, problems);
         let moves = fields.flag("moves", problems);
         let mut reader = StepReader {
             states: self.states,
@@ -355,6 +364,43 @@ impl TestReader<'_> {
     }
 }
 
+/// Whether a second reader has held the test against the standard, or what is disputed of it.
+fn maturity(fields: &Fields<'_>, problems: &mut Problems) -> Maturity {
+    let note = |key: &str, problems: &mut Problems| fields.text(key, problems).map(str::to_owned);
+    if let Some(key) = fields.key("watchlist").filter(|_| fields.has("reviewed")) {
+        let title = "`watchlist` beside `reviewed`";
+        problems.at(
+            "conflicting-keys",
+            &key.span,
+            title,
+            "a review settles what is disputed",
+        );
+    }
+    if let Some(why) = note("watchlist", problems) {
+        return Maturity::Watchlist(why);
+    }
+    let Some(note) = note("reviewed", problems) else {
+        return Maturity::Open;
+    };
+    let (date, looked_at) = note.split_once(',').unwrap_or((&note, ""));
+    let is_date = date.parse::<jiff::civil::Date>().is_ok() && date.len() == 10;
+    if let Some(node) = fields
+        .get("reviewed", problems)
+        .filter(|_| !is_date || looked_at.trim().is_empty())
+    {
+        problems.add(
+            Diagnostic::new(
+                "review-undated",
+                node.span.clone(),
+                "a review says when it was, and what was looked at",
+                "needs a date, a comma and a few words",
+            )
+            .hint("such as `reviewed: \"2026-11-22, section 6.6.4 and both rulings\"`"),
+        );
+    }
+    Maturity::Reviewed(note)
+}
+
 /// The monitor of a file. `name` is what its path asks for.
 pub(super) fn read_monitor(
     source: &Arc<Source>,
@@ -391,6 +437,7 @@ pub(super) fn read_monitor(
         spec: header.spec?,
         needs,
         checks: bindings,
+        about: about(&fields, problems),
         why: header.why,
         rule: rule?,
         hides: hides
@@ -414,6 +461,45 @@ pub(super) fn read_monitor(
         .map(|node| node.span.clone());
     lint::monitor(&monitor, &places, topic_place.as_ref(), vocabulary, known, problems);
     Some(monitor)
+}
+
+/// Requirement id to topic to picture.
+fn about(fields: &Fields<'_>, problems: &mut Problems) -> Vec<About> {
+    let Some(inner) = fields
+        .get("about", problems)
+        .and_then(|node| Fields::of(node, problems))
+    else {
+        return Vec::new();
+    };
+    let mut all = Vec::new();
+    for (key, value) in inner.entries() {
+        let Some(id) = text_of(key, problems) else { continue };
+        let Some(subject) = Fields::of(value, problems) else {
+            continue;
+        };
+        let [(topic, picture)] = subject.entries() else {
+            let label = "one topic, and what a message on it shows";
+            problems.at(
+                "about-one-topic",
+                &value.span,
+                format!("`{id}` is about one topic"),
+                label,
+            );
+            continue;
+        };
+        let (Some(topic), Some(pattern)) = (text_of(topic, problems), pattern(picture, problems)) else {
+            continue;
+        };
+        all.push(About {
+            requirement: Binding {
+                requirement: RequirementId::from(id),
+                span: key.span.clone(),
+            },
+            topic: topic.to_owned(),
+            pattern,
+        });
+    }
+    all
 }
 
 fn rule(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Option<Rule> {

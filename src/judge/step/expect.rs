@@ -187,6 +187,17 @@ impl Expecting {
             |miss| format!("closest: {} is {}", super::shown_path(&miss.path), miss.found),
         );
         let mut clauses = bound_clauses(&self.verb.checks, "checks", &span, &holds, None, &message);
+        // Whoever reads only that it was not reached wants to know what was in the way.
+        let reached = match &nearest {
+            Some(miss) if cut_short.is_none() => format!(
+                "{message}; closest #{}: {} is {}, expected {}",
+                miss.seq,
+                super::shown_path(&miss.path),
+                miss.found,
+                miss.expected
+            ),
+            _ => message.clone(),
+        };
         for clause in &mut clauses {
             clause.label.clone_from(&label);
             clause.nearest.clone_from(&nearest);
@@ -207,7 +218,7 @@ impl Expecting {
             }));
         }
         StepOutcome {
-            reached: Some(Err(message)),
+            reached: Some(Err(reached)),
             took: None,
             clauses,
             saves: Vec::new(),

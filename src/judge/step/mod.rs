@@ -399,7 +399,7 @@ pub(super) fn bind_pattern(pattern: Option<&Pattern>, scene: &Scene<'_>) -> Resu
         .map_err(|unbound| unbound_text(&unbound))
 }
 
-pub(super) fn unbound_text(unbound: &Unbound) -> String {
+pub(in crate::judge) fn unbound_text(unbound: &Unbound) -> String {
     format!("the variable ${{{}}} has no value here", unbound.name)
 }
 

@@ -106,7 +106,10 @@ impl Agv {
         }
         let takes_orders = match self.mode {
             super::Mode::Semiautomatic => !self.faults.has(F::SemiautomaticRefused),
-            mode => mode.takes_orders() || self.faults.has(F::ManualTakesOrders),
+            mode => {
+                let takes = self.faults.has(F::ManualTakesOrders) || self.faults.has(F::ManualDrivesOrders);
+                mode.takes_orders() || takes
+            }
         };
         if !takes_orders {
             return Err(Refusal::new(

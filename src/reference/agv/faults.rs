@@ -501,8 +501,10 @@ faults! {
     SemiautomaticEndsOrder "semiautomatic-ends-order" ["MODE-02"] "Gives its order up when it is switched from AUTOMATIC to SEMIAUTOMATIC.";
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
     ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
+    ManualDrivesOrders "manual-drives-orders" ["MODE-02"] "Takes orders over in MANUAL, and drives them there.";
+    ManualDrivesOn "manual-drives-on" ["MODE-05", "MODE-02"] "Keeps driving its order after it was switched to MANUAL, SERVICE or TEACHIN.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
-    ManualDrivesOn "manual-drives-on" ["MODE-05"] "Clears its states in MANUAL and drives its base to the end.";
+    ManualDrivesUnseen "manual-drives-unseen" ["MODE-05"] "Clears its states in MANUAL and drives its base to the end.";
     ManualKeepsActions "manual-keeps-actions" ["MODE-05", "MODE-02"] "Clears its way in MANUAL and goes on with its actions.";
     OrderTakenUpAgain "order-taken-up-again" ["MODE-05"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC.";
     ManualLocks "manual-locks" ["MODE-02"] "Refuses the first order after it was driven by hand.";

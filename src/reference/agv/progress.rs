@@ -78,7 +78,10 @@ impl Agv {
         let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
         let stuck = stuck || self.faults.has(F::StuckAfterEdgeAction) && self.blocking_edge_action_ended();
         let warned = self.faults.has(F::WarningBlocks) && !self.errors.is_empty();
-        (self.mode.takes_orders() || self.faults.has(F::ManualDrivesOn))
+        let by_hand = self.faults.has(F::ManualDrivesOrders)
+            || self.faults.has(F::ManualDrivesOn)
+            || self.faults.has(F::ManualDrivesUnseen);
+        (self.mode.takes_orders() || by_hand)
             && !self.persona.halted
             && !self.persona.lost
             && self.lingers_until.is_none()

@@ -31,6 +31,8 @@ pub struct TestView {
     pub allowances: Vec<String>,
     pub not_applicable: bool,
     pub watchlist: bool,
+    pub maturity_note: Option<String>,
+    pub reviewed: bool,
     pub seconds: String,
     /// Whether there is something to look at.
     pub finding: bool,
@@ -157,6 +159,8 @@ fn view(
         allowances: test.allowances.clone(),
         not_applicable: verdict.is_none(),
         watchlist: test.maturity == "watchlist",
+        maturity_note: test.maturity_note.clone(),
+        reviewed: test.maturity == "reviewed",
         seconds: seconds(test.seconds),
         finding,
         decisions,

@@ -18,7 +18,7 @@ use self::paths::Topic;
 use self::scope::Scope;
 use super::CheckInfo;
 use super::fields::Problems;
-use super::model::{Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
+use super::model::{About, Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
 use crate::course::is_station;
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
 use crate::pack::{RequirementId, Role, VersionRange};
@@ -129,6 +129,9 @@ pub(super) fn monitor(
     }
     let required = linter.requirements(&monitor.checks, &packs);
     let scope = Scope::of_monitor(vocabulary);
+    for about in &monitor.about {
+        linter.about(about, monitor, &scope, &packs);
+    }
     let (name, patterns) = match &monitor.rule {
         Rule::Check(check) => {
             check.visit_terms(&mut |term| scope.check(term, &packs, linter.problems));
@@ -347,6 +350,23 @@ impl Linter<'_> {
             );
         }
         having
+    }
+
+    /// Checks what a requirement of a monitor is about.
+    fn about(&mut self, about: &About, monitor: &Monitor, scope: &Scope<'_>, packs: &[usize]) {
+        let Binding { requirement, span } = &about.requirement;
+        if !monitor.checks.iter().any(|binding| binding.requirement == *requirement) {
+            let title = format!("the monitor does not decide `{requirement}`");
+            self.problems.at("about-undecided", span, title, "not under `checks:`");
+            return;
+        }
+        let having = self.requirement(requirement, span, packs);
+        if self.observed_topic(&about.topic, packs, span) {
+            about
+                .pattern
+                .visit_terms(&mut |term| scope.check(term, packs, self.problems));
+            self.pattern(&about.pattern, &about.topic, packs, Some(&having));
+        }
     }
 
     /// Checks a selection and its requirements.

@@ -129,6 +129,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             seconds: f64::MAX,
             reason: Some(evil()),
             maturity: "watchlist".to_owned(),
+            maturity_note: Some(evil()),
             journal: Some((first, last)),
             decisions: verdict.map(decide).into_iter().collect(),
             steps: vec![StepResult {
@@ -179,12 +180,14 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
                 id: evil(),
                 verdict: Some(Verdict::Fail),
                 decided_by: vec![evil()],
+                verdicts: Vec::new(),
                 not_decided: None,
             },
             RequirementResult {
                 id: "X Y".to_owned(),
                 verdict: None,
                 decided_by: Vec::new(),
+                verdicts: Vec::new(),
                 not_decided: Some(evil()),
             },
         ],

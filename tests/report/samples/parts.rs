@@ -56,6 +56,7 @@ pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Ve
         seconds,
         reason: None,
         maturity: "reviewed".to_owned(),
+        maturity_note: Some("2026-11-22, section 6.6.4".to_owned()),
         journal: None,
         decisions,
         steps: Vec::new(),
@@ -108,6 +109,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
                     (None, Some(_)) => vec!["header/id-rises".to_owned()],
                     (None, None) => Vec::new(),
                 },
+                verdicts: Vec::new(),
                 not_decided: match (found, passive, *how) {
                     (Some(_), _, _) | (_, Some(_), _) => None,
                     (_, _, "none") => {

@@ -143,9 +143,9 @@ impl Agv {
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
 
-    /// `manual-drives-on`: drives a way it does not show.
+    /// `manual-drives-unseen`: drives a way it does not show.
     fn hides_route(&self) -> bool {
-        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesOn)
+        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen)
     }
 
     fn node_states(&self, complete: bool) -> Value {
