@@ -21,6 +21,8 @@ pub(super) struct Hidden {
     pub decides: Vec<String>,
     /// The entry that showed it first in this test.
     pub seq: u64,
+    /// It is known from before this test: where the member shows nothing, it shows nothing in any message.
+    pub lasting: bool,
 }
 
 impl Hidden {
@@ -31,7 +33,8 @@ impl Hidden {
             return false;
         };
         let member = nearest.path.split(['.', '[']).next();
-        let in_vain = decision.witness.is_none() || step.verb.starts_with("action");
+        let shows_nothing = self.lasting && matches!(nearest.found.as_str(), "\"\"" | "0" | "nothing");
+        let in_vain = decision.witness.is_none() || step.verb.starts_with("action") || shows_nothing;
         matches!(decision.verdict, Verdict::Fail | Verdict::Warning)
             && in_vain
             && member == Some(self.member.as_str())
@@ -119,6 +122,7 @@ mod tests {
             requirement: "STATE-MSG-02".to_owned(),
             decides: vec!["STATE-MSG-02".to_owned()],
             seq: found,
+            lasting: false,
         }];
         take_back(decisions, &steps, &hidden);
         decisions[0].verdict
