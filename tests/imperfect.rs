@@ -68,7 +68,7 @@ fn is_about(result: &RunResult, test: &str, breaks: &[&str]) -> bool {
         let mut bad = found
             .decisions
             .iter()
-            .filter(|decision| decision.verdict > Verdict::Inconclusive);
+            .filter(|decision| decision.verdict() > Verdict::Inconclusive);
         let first = bad.next();
         first.is_some()
             && first

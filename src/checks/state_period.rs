@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::traffic::{Traffic, broken, outside_influence, remark, text};
+use super::topic::looks_like;
+use super::traffic::{Traffic, broken, device_publish, outside_influence, remark, text};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -95,6 +96,13 @@ impl Running for Period {
             Event::Lag { micros, .. } => self.lag += Duration::from_micros(*micros),
             _ if outside_influence(entry) => self.since = None,
             _ => {}
+        }
+        if let Some((_, topic, ..)) = device_publish(entry)
+            && context.topic_name(topic).is_none()
+            && entry.json().and_then(looks_like) == Some("state")
+        {
+            // States do come. That they come elsewhere is one mistake, which `topic/names` names.
+            self.since = None;
         }
         let Some(message) = self.traffic.delivered(entry, context) else {
             return false;

@@ -214,7 +214,7 @@ impl RunJudge {
     fn ended(&mut self, mut result: TestResult) {
         let decided = |result: &TestResult| {
             let mut decisions = result.decisions.iter();
-            decisions.any(|decision| decision.verdict != Verdict::Inconclusive)
+            decisions.any(|decision| decision.verdict() != Verdict::Inconclusive)
         };
         let before = self.done.iter().position(|done| done.id == result.id && !decided(done));
         if let Some(before) = before {
@@ -438,7 +438,7 @@ impl RunJudge {
         for test in tests {
             for decision in &test.decisions {
                 let (verdict, by) = decided.entry(decision.requirement.as_str()).or_default();
-                verdict.add(decision.verdict);
+                verdict.add(decision.verdict());
                 if !by.contains(&test.id) {
                     by.push(test.id.clone());
                 }
@@ -518,19 +518,7 @@ fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
 }
 
 fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
-    Decision {
-        requirement: requirement.to_owned(),
-        verdict: Verdict::Inconclusive,
-        clause,
-        place,
-        witness: None,
-        message: why.to_owned(),
-        expected: None,
-        nearest: None,
-        waited: None,
-        explanation: None,
-        interpretation: None,
-    }
+    Decision::new(requirement, Verdict::Inconclusive, clause, place, why.to_owned())
 }
 
 /// Judges a whole journal.

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 
 use super::decide::decide;
 use super::departure::Departure;
-use super::hidden::{Hidden, take_back};
+use super::hidden::{Hidden, Open, hide};
 use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use super::window::Scene;
@@ -20,7 +20,7 @@ use crate::journal::Entry;
 use crate::journal::event::{Event, StepEnd, Waiver};
 use crate::pack::{Catalogue, Pack, Role};
 use crate::pattern::Bindings;
-use crate::report::result::{StepResult, TestResult, Waited};
+use crate::report::result::{Decision, StepResult, TestResult, Waited};
 use crate::suite::model::{Maturity, Section, Step, Test, Verb};
 use crate::verdict::{Accumulated, Verdict};
 
@@ -59,8 +59,9 @@ pub struct TestJudge {
     result: TestResult,
     departure: Departure,
     hidden: Vec<Hidden>,
-    /// Decisions about time, by their number.
-    timings: Vec<(usize, Timing)>,
+    /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
+    /// decided before.
+    open: Vec<Open>,
     ended: bool,
 }
 
@@ -112,7 +113,7 @@ impl TestJudge {
             },
             departure: Departure::default(),
             hidden: Vec::new(),
-            timings: Vec::new(),
+            open: Vec::new(),
             ended: false,
         }
     }
@@ -301,11 +302,14 @@ impl TestJudge {
                     _ => None,
                 };
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
-                let before = self.result.decisions.len();
-                self.push(decide(clause, &step.path, waited, &ground.catalogue, &ground.pack));
-                if let Some(timing) = of_time.filter(|_| self.result.decisions.len() > before) {
-                    self.timings.push((before, timing));
-                }
+                self.open.push(Open {
+                    clause,
+                    path: step.path.clone(),
+                    walks: matches!(step.verb, Verb::Action(_)),
+                    ended: entry.seq(),
+                    waited,
+                    of_time,
+                });
             }
         }
     }
@@ -335,9 +339,9 @@ impl TestJudge {
         });
     }
 
-    fn push(&mut self, decision: Option<crate::report::result::Decision>) {
+    fn push(&mut self, decision: Option<Decision>) {
         if let Some(decision) = decision {
-            self.verdict.add(decision.verdict);
+            self.verdict.add(decision.verdict());
             self.result.decisions.push(decision);
         }
     }
@@ -349,19 +353,16 @@ impl TestJudge {
 
     /// What the harness's own lag can explain is not held against the device.
     fn allow_for_lag(&mut self, timeline: &Timeline) {
-        for (at, timing) in &self.timings {
-            let Some(lag) = timing.explained(timeline) else {
+        for open in &mut self.open {
+            let Some(lag) = open.of_time.and_then(|timing| timing.explained(timeline)) else {
                 continue;
             };
-            let Some(decision) = self.result.decisions.get_mut(*at) else {
-                continue;
-            };
-            decision.verdict = Verdict::Inconclusive;
-            decision.message = format!(
-                "cannot be told, since the harness itself was held up for {:.1} s meanwhile; {}",
-                lag.as_secs_f64(),
-                decision.message
+            let why = format!(
+                "the harness itself was held up for {:.1} s meanwhile",
+                lag.as_secs_f64()
             );
+            open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+            open.clause.holds = Holds::Unseen(why);
         }
     }
 
@@ -371,9 +372,12 @@ impl TestJudge {
             return;
         }
         self.result.seconds = at.since(self.begun.1).as_secs_f64();
-        let hidden = take_back(&mut self.result.decisions, &self.result.steps, &self.hidden);
-        let decided = self.result.decisions.iter();
-        self.verdict = decided.map(|decision| decision.verdict).collect();
+        let mut open = std::mem::take(&mut self.open);
+        let hidden = hide(&mut open, &self.hidden);
+        for open in open {
+            let decision = decide(open.clause, &open.path, open.waited, &ground.catalogue, &ground.pack);
+            self.push(decision);
+        }
         let why = match (&self.trouble, &self.preamble, &self.body) {
             (Some(trouble), _, _) => trouble.clone(),
             (None, Ok(()), _) if hidden.is_some() => hidden.unwrap_or_default(),
@@ -405,19 +409,8 @@ impl TestJudge {
                 if super::decide::mood(&ground.catalogue, &ground.pack, requirement.as_str()).is_none() {
                     continue;
                 }
-                let decision = crate::report::result::Decision {
-                    requirement: requirement.as_str().to_owned(),
-                    verdict: Verdict::Inconclusive,
-                    clause,
-                    place: step.verb_span.place(),
-                    witness: None,
-                    message: why.clone(),
-                    expected: None,
-                    nearest: None,
-                    waited: None,
-                    explanation: None,
-                    interpretation: None,
-                };
+                let place = step.verb_span.place();
+                let decision = Decision::new(requirement.as_str(), Verdict::Inconclusive, clause, place, why.clone());
                 self.push(Some(decision));
             }
         }
@@ -440,7 +433,7 @@ impl TestJudge {
             .result
             .decisions
             .iter()
-            .find(|decision| decision.verdict == verdict);
+            .find(|decision| decision.verdict() == verdict);
         Some(match decisive {
             Some(decision) if verdict != Verdict::Inconclusive => {
                 format!("{}: {}", decision.requirement, decision.message)

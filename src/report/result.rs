@@ -202,8 +202,8 @@ pub struct StepResult {
 pub struct Decision {
     /// Requirement id.
     pub requirement: String,
-    /// What was decided.
-    pub verdict: Verdict,
+    /// What was decided. It is given once, and nothing changes it afterwards.
+    verdict: Verdict,
     /// Path of the clause, such as `steps[6].assert`.
     pub clause: String,
     /// File and line of the clause.
@@ -231,6 +231,30 @@ pub struct Decision {
 }
 
 impl Decision {
+    /// A decision with nothing to show but its message.
+    #[must_use]
+    pub fn new(requirement: &str, verdict: Verdict, clause: String, place: String, message: String) -> Self {
+        Self {
+            requirement: requirement.to_owned(),
+            verdict,
+            clause,
+            place,
+            witness: None,
+            message,
+            expected: None,
+            nearest: None,
+            waited: None,
+            explanation: None,
+            interpretation: None,
+        }
+    }
+
+    /// What was decided.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
     /// Whether it wants to be shown in full: something was seen that should not be, or a search can show what
     /// came closest. What merely could not be decided is listed.
     #[must_use]

@@ -252,6 +252,7 @@ mod tests {
             finally: Vec::new(),
             source: Arc::clone(source),
             course: CourseNeed::default(),
+            drawn: None,
         }
     }
 

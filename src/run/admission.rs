@@ -94,6 +94,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
                 value: sheet.clone(),
             })?;
             self.setup.capabilities.factsheet = Some(sheet);
+            let contradictions = self.setup.capabilities.contradictions();
+            self.setup.limits.extend(contradictions);
         }
         Ok(())
     }
@@ -118,11 +120,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             })?;
             Some(json!({ "mapId": id, "mapVersion": active.get("mapVersion")? }))
         });
-        self.setup
-            .capabilities
-            .statements
-            .insert("active-map".to_owned(), found.is_some());
         if let Some(value) = found {
+            let statements = &mut self.setup.capabilities.statements;
+            statements.insert("active-map".to_owned(), true);
             self.engine.note(Event::Bound {
                 name: "device.activeMap".to_owned(),
                 value,

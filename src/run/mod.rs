@@ -12,6 +12,7 @@ pub mod capabilities;
 pub mod device_driver;
 pub mod device_peer;
 mod dispatching;
+mod draw;
 mod estimate;
 mod fleet;
 mod header;

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use super::between::{Presence, revive, settle_link};
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
+use super::draw::draw;
 use super::estimate::{self, Estimate};
 use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
@@ -27,6 +28,8 @@ pub struct Setup {
     pub tests: Vec<Arc<Test>>,
     /// Whether that is every test there is for this role and version.
     pub complete: bool,
+    /// Of the cases that come from a schema, those are run that this seed draws; all of them without one.
+    pub draw: Option<u64>,
     /// What is known before the device is there.
     pub capabilities: Capabilities,
     /// Where the vehicle may drive.
@@ -139,7 +142,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     }
 
     async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
-        if let Err(why) = self.admit().await? {
+        let admitted = self.admit().await?;
+        self.draw();
+        if let Err(why) = admitted {
             let end = self.stopped().unwrap_or_else(|| End::NoDevice(why.clone()));
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
@@ -207,6 +212,21 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         }
         self.record_plan(&plan)?;
         Ok(self.stopped().unwrap_or(End::Completed))
+    }
+
+    /// Leaves out cases that come from a schema, where the run need not be thorough.
+    fn draw(&mut self) {
+        let Some(seed) = self.setup.draw else { return };
+        let runs = |test: &Test| self.setup.capabilities.gate(test) == Gate::Runs;
+        let drawing = draw(&self.setup.tests, seed, runs);
+        if drawing.taken < drawing.of {
+            self.setup.limits.push(format!(
+                "Of {} messages broken after the schemas, {} were to be sent, drawn by the seed {seed}; `--thorough` \
+                 sends all of them.",
+                drawing.of, drawing.taken
+            ));
+        }
+        self.setup.tests = drawing.tests;
     }
 
     /// How the run ended before its time, if it did.

@@ -253,6 +253,7 @@ fn lint_state(
         finally: Vec::new(),
         source: Arc::clone(source),
         course: CourseNeed::default(),
+        drawn: None,
     };
     if problems.len() == before {
         // A state is meant for one side or for both.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::diagnostic::{Source, Span};
-use crate::pack::{RequirementId, Role, VersionRange};
+use crate::pack::{RequirementId, Role, VersionRange, Way};
 use crate::pattern::{Pattern, Term};
 
 /// One scripted exchange; one row of `cases:` is one test.
@@ -42,9 +42,31 @@ pub struct Test {
     pub source: Arc<Source>,
     /// The names of course nodes it uses, in order of appearance, and the pairs it drives.
     pub course: CourseNeed,
+    /// What it breaks, when it is one of many cases that come from a schema.
+    pub drawn: Option<Drawn>,
+}
+
+/// One of many cases that come from a schema, of which a run takes some.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    /// The topic whose schema it is.
+    pub topic: String,
+    /// How a member is broken.
+    pub way: Way,
+    /// How many cases of the table a run takes.
+    pub draw: usize,
 }
 
 impl Test {
+    /// What it is known by where the cases of a schema count as one: its table, else its id.
+    #[must_use]
+    pub fn table(&self) -> &str {
+        match self.drawn {
+            Some(_) => self.id.split('[').next().unwrap_or(&self.id),
+            None => &self.id,
+        }
+    }
+
     /// Every step with its section, in the order they run.
     pub fn sections(&self) -> [(Section, &[Step]); 3] {
         [

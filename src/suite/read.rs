@@ -1,16 +1,17 @@
 //! One file into tests or a monitor: header keys, the rows of a table, the rule.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::CheckInfo;
 use super::course::course_need;
+use super::drawn;
 use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::load::{States, parse};
-use super::model::{CourseNeed, Maturity, Monitor, Need, Rule, Test};
+use super::model::{CourseNeed, Drawn, Maturity, Monitor, Need, Rule, Test};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
 use crate::diagnostic::{Diagnostic, Source, Span};
@@ -116,24 +117,17 @@ pub(super) fn read_test(
     let Some(cases) = fields.get("cases", problems) else {
         let root = Fill::new("case", nothing).apply_to(&root, problems);
         let root = Fill::new("with", nothing).apply_to(&root, problems);
-        return reader.read(&root, None, problems).into_iter().collect();
+        return reader.read(&root, Case::Whole, problems).into_iter().collect();
     };
+    if cases.get(drawn::FROM_SCHEMA).is_some() {
+        return reader.draw(&fields, &root, cases, problems);
+    }
     let before_rows = problems.len();
     let rows = rows(cases, problems);
     if problems.len() > before_rows {
         return Vec::new();
     }
-    let without_cases = Node {
-        kind: Kind::Map(
-            fields
-                .entries()
-                .iter()
-                .filter(|(key, _)| key.text() != Some("cases"))
-                .cloned()
-                .collect(),
-        ),
-        span: root.span.clone(),
-    };
+    let without_cases = without_cases(&fields, &root);
     let mut used: BTreeMap<&str, (bool, &Span)> = BTreeMap::new();
     let mut tests = Vec::new();
     for (name, values) in &rows {
@@ -145,7 +139,7 @@ pub(super) fn read_test(
                 .or_insert((false, &key.span))
                 .0 |= is_used;
         }
-        tests.extend(reader.read(&filled, Some(name), problems));
+        tests.extend(reader.read(&filled, Case::Row(name), problems));
     }
     for (name, (is_used, span)) in used {
         if !is_used {
@@ -158,6 +152,15 @@ pub(super) fn read_test(
         }
     }
     tests
+}
+
+/// A test without its table.
+fn without_cases(fields: &Fields<'_>, root: &Node) -> Node {
+    let others = fields.entries().iter().filter(|(key, _)| key.text() != Some("cases"));
+    Node {
+        kind: Kind::Map(others.cloned().collect()),
+        span: root.span.clone(),
+    }
 }
 
 /// The rows of a table of cases, each with the same names.
@@ -225,8 +228,53 @@ struct TestReader<'a> {
     before: usize,
 }
 
+/// Which test of a file is read.
+enum Case<'a> {
+    /// The only one.
+    Whole,
+    /// A row of its table.
+    Row(&'a str),
+    /// A row that came from a schema, and whether it is linted.
+    Drawn(&'a drawn::Row, bool),
+}
+
 impl TestReader<'_> {
-    fn read(&self, root: &Node, case: Option<&str>, problems: &mut Problems) -> Option<Test> {
+    /// The tests of a table that comes from a schema.
+    fn draw(&self, fields: &Fields<'_>, root: &Node, cases: &Node, problems: &mut Problems) -> Vec<Test> {
+        let spec = fields.get("spec", &mut Problems::default());
+        let rows = drawn::rows(cases, spec, self.vocabulary, problems);
+        if !fields
+            .entries()
+            .iter()
+            .any(|(_, value)| value.span.text().contains("${case.patch}"))
+            && !rows.is_empty()
+        {
+            problems.at(
+                "unused-value",
+                &cases.span,
+                "the cases of the schema are not used",
+                "no `${case.patch}` in this test",
+            );
+        }
+        let without_cases = without_cases(fields, root);
+        let mut tests = Vec::new();
+        let mut linted = BTreeSet::new();
+        for row in &rows {
+            let filled = Fill::new("case", &row.values).apply(&without_cases, problems);
+            let filled = Fill::new("with", &[]).apply_to(&filled, problems);
+            // The rows differ in what they break, which only the first of each way and length can do wrong.
+            let length = row
+                .values
+                .first()
+                .and_then(|(_, patch)| patch.list())
+                .map_or(0, <[Node]>::len);
+            let lint = linted.insert((row.drawn.way, length, row.spec.is_some()));
+            tests.extend(self.read(&filled, Case::Drawn(row, lint), problems));
+        }
+        tests
+    }
+
+    fn read(&self, root: &Node, case: Case<'_>, problems: &mut Problems) -> Option<Test> {
         let fields = Fields::of(root, problems)?;
         let at = start(root);
         let header = header(&fields, &at, problems);
@@ -264,12 +312,20 @@ impl TestReader<'_> {
         let id = fields.text("test", &mut Problems::default())?.to_owned();
         let group = id.split('/').next().unwrap_or_default().to_owned();
         let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
+        let (name, drawn, lint): (_, Option<Drawn>, _) = match case {
+            Case::Whole => (None, None, true),
+            Case::Row(name) => (Some(name), None, true),
+            Case::Drawn(row, lint) => (Some(row.name.as_str()), Some(row.drawn.clone()), lint),
+        };
         let mut test = Test {
-            id: case.map_or_else(|| id.clone(), |case| format!("{id}[{case}]")),
+            id: name.map_or_else(|| id.clone(), |name| format!("{id}[{name}]")),
             group,
             title: header.title,
             device: header.device.or(self.role)?,
-            spec: header.spec?,
+            spec: match case {
+                Case::Drawn(row, _) => row.spec.clone().or(header.spec)?,
+                _ => header.spec?,
+            },
             needs,
             moves,
             maturity,
@@ -279,8 +335,12 @@ impl TestReader<'_> {
             finally,
             source: Arc::clone(self.source),
             course: CourseNeed::default(),
+            drawn,
         };
         test.course = course_need(&test);
+        if !lint {
+            return Some(test);
+        }
         let value_place = |key: &str| fields.get(key, &mut Problems::default()).map(|node| node.span.clone());
         let places = HeaderPlaces {
             hides: Vec::new(),

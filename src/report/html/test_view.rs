@@ -194,8 +194,8 @@ fn marked(test: &TestResult) -> BTreeMap<u64, String> {
             marked.insert(nearest.seq, "nearest miss".to_owned());
         }
         if let Some(witness) = decision.witness {
-            let entry = worst.entry(witness).or_insert(decision.verdict);
-            *entry = entry.join(decision.verdict);
+            let entry = worst.entry(witness).or_insert(decision.verdict());
+            *entry = entry.join(decision.verdict());
         }
     }
     marked.extend(worst.into_iter().map(|(seq, verdict)| (seq, verdict.word().to_owned())));
@@ -206,7 +206,7 @@ fn marked(test: &TestResult) -> BTreeMap<u64, String> {
 pub fn findings(test: &TestResult) -> impl Iterator<Item = &Decision> {
     test.decisions
         .iter()
-        .filter(|decision| decision.verdict != Verdict::Pass)
+        .filter(|decision| decision.verdict() != Verdict::Pass)
 }
 
 /// Asks for the messages of a test: those that decided, the nearest misses, the stimuli around them. Says what
@@ -297,7 +297,7 @@ fn decision_view(
     let known = sources.requirement(&decision.requirement);
     let see = |seq: u64| reference(gallery.entry(seq), seq);
     DecisionView {
-        badge: Badge::of(Some(decision.verdict)),
+        badge: Badge::of(Some(decision.verdict())),
         full: decision.is_finding(),
         requirement: decision.requirement.clone(),
         link: anchors.requirement(&decision.requirement),

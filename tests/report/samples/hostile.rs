@@ -98,27 +98,24 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
     });
     let last = record.end(HOSTILE, StepEnd::Broken(evil()));
 
-    let decide = |verdict| Decision {
-        requirement: evil(),
-        verdict,
-        clause: evil(),
-        place: format!("{HOSTILE}:3"),
-        witness: Some(witness),
-        message: evil(),
-        expected: Some(evil()),
-        nearest: Some(NearestMiss {
+    let decide = |verdict| {
+        let mut decision = Decision::new(&evil(), verdict, evil(), format!("{HOSTILE}:3"), evil());
+        decision.witness = Some(witness);
+        decision.expected = Some(evil());
+        decision.nearest = Some(NearestMiss {
             seq: witness,
             path: evil(),
             found: evil(),
             expected: evil(),
-        }),
-        waited: Some(Waited {
+        });
+        decision.waited = Some(Waited {
             seconds: 1.0,
             since: first,
             messages: 1,
-        }),
-        explanation: Some(format!("{HOSTILE}\n | {HOSTILE}\n | ^^^ {HOSTILE}")),
-        interpretation: Some(evil()),
+        });
+        decision.explanation = Some(format!("{HOSTILE}\n | {HOSTILE}\n | ^^^ {HOSTILE}"));
+        decision.interpretation = Some(evil());
+        decision
     };
     let tests = Verdict::ALL
         .into_iter()

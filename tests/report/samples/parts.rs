@@ -20,19 +20,10 @@ pub fn decision(
     witness: Option<u64>,
     message: &str,
 ) -> Decision {
-    Decision {
-        requirement: requirement.to_owned(),
-        verdict,
-        clause: clause.to_owned(),
-        place: format!("{TEST_FILE}:{line}"),
-        witness,
-        message: message.to_owned(),
-        expected: None,
-        nearest: None,
-        waited: None,
-        explanation: None,
-        interpretation: None,
-    }
+    let (clause, place) = (clause.to_owned(), format!("{TEST_FILE}:{line}"));
+    let mut decision = Decision::new(requirement, verdict, clause, place, message.to_owned());
+    decision.witness = witness;
+    decision
 }
 
 pub fn step(
@@ -93,7 +84,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
     for test in &tests {
         for decision in &test.decisions {
             let entry = decided.entry(&decision.requirement).or_default();
-            entry.0.add(decision.verdict);
+            entry.0.add(decision.verdict());
             entry.1.push(test.id.clone());
         }
     }

@@ -39,6 +39,12 @@ impl Agv {
         if self.config.line_guided() {
             set("distanceSinceLastNode", json!(self.distance_made()));
         }
+        if let Some((x, y)) = self.book.begun_at.filter(|_| has(F::DistanceNotReset)) {
+            set(
+                "distanceSinceLastNode",
+                json!(self.motion.pose(self.moment()).distance(x, y)),
+            );
+        }
         if has(F::DistanceNegative) {
             set("distanceSinceLastNode", json!(-1.0));
         }
@@ -63,9 +69,10 @@ impl Agv {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             set("paused", json!(self.holds.pause || button || self.holds.emergency));
         }
+        let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
         set(
             "newBaseRequest",
-            json!(self.book.base_runs_low() || self.persona.wants_base || has(F::NewBaseRequestAlways)),
+            json!(self.book.base_runs_low() || self.persona.wants_base || always),
         );
         set(
             "actionStates",
@@ -127,13 +134,24 @@ impl Agv {
 
     fn shows_driving(&self) -> bool {
         let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
-        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported))
+        let turning = self.motion.is_turning() && self.faults.has(F::TurnsWithoutDriving);
+        let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
+        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning)
+            || idle
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
             || (self.book.has_order() && self.faults.has(F::DrivingKept))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
 
+    /// `manual-drives-on`: drives a way it does not show.
+    fn hides_route(&self) -> bool {
+        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesOn)
+    }
+
     fn node_states(&self, complete: bool) -> Value {
+        if self.hides_route() {
+            return json!([]);
+        }
         let left = self.book.left.0.as_ref().filter(|_| {
             (!complete && self.faults.has(F::TraversedNodesListed))
                 || (complete && self.book.has_order() && self.keeps_last_node())
@@ -178,6 +196,9 @@ impl Agv {
     }
 
     fn edge_states(&self, complete: bool) -> Value {
+        if self.hides_route() {
+            return json!([]);
+        }
         let kept = self.faults.has(F::LastEdgeListed) || self.faults.has(F::LastRouteListed);
         let stays = (self.faults.has(F::EdgeStatesStay) && !complete) || (kept && complete && self.book.has_order());
         let left = self.book.left.1.as_ref().filter(|_| stays);
@@ -244,7 +265,14 @@ impl Agv {
 
     /// agvPosition, also for the visualization (STATE-MSG-05).
     pub(super) fn position_picture(&self) -> Value {
-        let pose = self.motion.pose(self.moment());
+        let mut pose = self.motion.pose(self.moment());
+        if let Some(start) = self
+            .config
+            .node(&self.config.start_node)
+            .filter(|_| self.faults.has(F::PositionFrozen))
+        {
+            (pose.x, pose.y) = (start.x, start.y);
+        }
         let theta = if self.faults.has(F::DegreesReported) {
             pose.theta.to_degrees() + 180.0
         } else {
