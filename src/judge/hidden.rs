@@ -38,6 +38,8 @@ pub(super) struct Hidden {
     pub decides: Vec<String>,
     /// The entry that showed it first in this test.
     pub seq: u64,
+    /// It is known from before this test: where the member shows nothing, it shows nothing in any message.
+    pub lasting: bool,
 }
 
 impl Hidden {
@@ -48,8 +50,9 @@ impl Hidden {
             return false;
         };
         let member = nearest.path.split(['.', '[']).next();
+        let shows_nothing = self.lasting && matches!(nearest.found.as_str(), "\"\"" | "0" | "nothing");
         matches!(open.clause.holds, Holds::No | Holds::Softly | Holds::Late)
-            && (open.clause.witness.is_none() || open.walks)
+            && (open.clause.witness.is_none() || open.walks || shows_nothing)
             && member == Some(self.member.as_str())
             && !self.decides.iter().any(|id| about.contains(id))
             && self.seq <= open.ended
@@ -118,6 +121,7 @@ mod tests {
             walks: false,
             ended: 30,
             waited: None,
+            timing: None,
             of_time: None,
         }
     }
@@ -133,6 +137,7 @@ mod tests {
             requirement: "STATE-MSG-02".to_owned(),
             decides: vec!["STATE-MSG-02".to_owned()],
             seq: found,
+            lasting: false,
         }];
         hide(all, &hidden);
         matches!(all[0].clause.holds, Holds::Unseen(_))

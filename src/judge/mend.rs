@@ -5,24 +5,27 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 
 use super::timeline::Timeline;
 use super::window::Scene;
 use crate::journal::Entry;
-use crate::journal::event::{Event, Reading, Waiver};
+use crate::journal::event::{Event, Payload, Reading, Waiver};
 use crate::pack::RequirementId;
 
 /// The topic that is mended.
 const TOPIC: &str = "state";
+/// A state with more bytes is shown to a check as it is.
+const LARGEST: usize = 64 << 10;
 /// So many earlier states are asked what was shown last.
 const LOOK_BACK: usize = 100;
 /// Two places no farther apart, in metres, are one.
 const SAME_PLACE: f64 = 0.01;
 
 /// The waivers that count for one clause, and which of them were needed.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Mends {
     waivers: Vec<Waiver>,
     /// Nothing is decided, so that it does not matter whether an order of one node was taken or not.
@@ -91,6 +94,24 @@ impl Mends {
             }
         }
         true
+    }
+
+    /// A state as it is meant, for a check that looks at whole messages.
+    pub(super) fn read(&self, entry: &Entry, scene: &Scene<'_>) -> Option<Arc<Entry>> {
+        let Event::Message { topic, payload, .. } = entry.event() else {
+            return None;
+        };
+        if self.waivers.is_empty() || scene.topics.get(TOPIC) != Some(topic) || payload.bytes().len() > LARGEST {
+            return None;
+        }
+        let (state, used) = mended(entry.json()?, entry.seq(), scene.timeline, &self.waivers)?;
+        let told = used.into_iter().map(|waiver| waiver.why.clone());
+        self.used.borrow_mut().extend(told);
+        let mut record = entry.record.clone();
+        if let Event::Message { payload, .. } = &mut record.event {
+            *payload = Payload::keep(state.to_string().into_bytes().into());
+        }
+        Some(Entry::new(record))
     }
 
     /// The waivers alone.
@@ -229,12 +250,11 @@ pub(super) fn stays(one: &Value, other: &Value) -> bool {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::sync::Arc;
 
     use super::*;
     use crate::clock::{Moment, Stamp};
     use crate::journal::Journal;
-    use crate::journal::event::{Occurrence, Payload, Source};
+    use crate::journal::event::{Occurrence, Source};
 
     fn waiver(member: &str, reading: Reading) -> Waiver {
         Waiver {

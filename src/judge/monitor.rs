@@ -284,6 +284,7 @@ impl MonitorJudge {
                 requirement: requirement.clone(),
                 decides: decides.clone(),
                 seq: *seq,
+                lasting: false,
             })
             .collect()
     }

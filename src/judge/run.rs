@@ -11,6 +11,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::decide::mood;
+use super::hidden::Hidden;
 use super::mend::mended;
 use super::reactions::Reactions;
 use super::test::{Ground, TestJudge};
@@ -18,7 +19,7 @@ use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
 use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
-use crate::journal::event::{Event, Gate, Plan, RunHeader};
+use crate::journal::event::{Event, Gate, Plan, Reading, RunHeader, Waiver};
 use crate::pack::{Catalogue, Decided, Packs, Role};
 use crate::report::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
 use crate::suite::Suites;
@@ -179,7 +180,7 @@ impl RunJudge {
         }
         if let Some(current) = &mut self.current {
             if matches!(entry.event(), Event::TestEnded { .. }) {
-                current.hide(self.watches.hidden());
+                current.hide(hidden(&self.watches, &self.ground.waivers));
             }
             current.observe(entry, subject.as_deref(), &self.timeline, &self.ground);
         }
@@ -262,7 +263,7 @@ impl RunJudge {
 
     fn break_off(&mut self, why: &str) {
         if let Some(mut current) = self.current.take() {
-            current.hide(self.watches.hidden());
+            current.hide(hidden(&self.watches, &self.ground.waivers));
             self.done.push(current.break_off(self.last.moment, why, &self.ground));
         }
     }
@@ -538,6 +539,21 @@ impl Opinions {
         });
         given.collect()
     }
+}
+
+/// What shows nothing in a test: what was found in it, and what is known from before.
+fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
+    let mut all = watches.hidden();
+    let kept = waivers.iter().filter(|waiver| waiver.reading == Reading::Kept);
+    all.extend(kept.map(|waiver| Hidden {
+        member: waiver.member.clone(),
+        monitor: "a monitor, earlier in this run".to_owned(),
+        requirement: waiver.about.first().cloned().unwrap_or_default(),
+        decides: waiver.about.clone(),
+        seq: 0,
+        lasting: true,
+    }));
+    all
 }
 
 fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {

@@ -250,3 +250,131 @@ fn places(topics: &BTreeMap<String, String>, vehicle: usize) -> impl Iterator<It
         (full.clone(), Place { vehicle, name })
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::journal::Journal;
+    use crate::journal::event::{Occurrence, Payload, Source};
+    use crate::judge::step::Timing;
+
+    fn at(millis: u64) -> Moment {
+        Moment::from_micros(millis * 1_000)
+    }
+
+    /// A timeline in which the harness was held up so long until then, in milliseconds.
+    fn held_up(all: &[(u64, u64)]) -> Timeline {
+        let mut journal = Journal::new();
+        let mut timeline = Timeline::new(&BTreeMap::new());
+        for (until, long) in all {
+            let occurrence = Occurrence {
+                at: Stamp {
+                    moment: at(*until),
+                    utc: jiff::Timestamp::UNIX_EPOCH,
+                },
+                source: Source::Harness,
+                direction: None,
+                event: Event::Lag {
+                    micros: long * 1_000,
+                    of: "timer".to_owned(),
+                },
+            };
+            timeline.add(&journal.append(occurrence));
+        }
+        timeline
+    }
+
+    #[test]
+    fn lags_that_overlap_count_once() {
+        let timeline = held_up(&[(2_000, 1_000), (2_100, 500), (9_000, 300)]);
+        assert_eq!(timeline.lag(at(0), at(10_000)), Duration::from_millis(1_400));
+        assert_eq!(timeline.lag(at(1_500), at(1_800)), Duration::from_millis(300));
+        assert_eq!(timeline.longest_lag(), Duration::from_secs(1));
+    }
+
+    #[test]
+    fn what_the_lag_can_explain_is_explained_and_nothing_more() {
+        let timeline = held_up(&[(5_500, 1_000)]);
+        let late = |came: u64| Timing::Late {
+            since: at(0),
+            at: at(came),
+            limit: Duration::from_secs(5),
+        };
+        assert!(late(5_900).explained(&timeline).is_some());
+        assert!(late(6_100).explained(&timeline).is_none());
+        assert!(Timing::Missed(at(5_000)).explained(&timeline).is_some());
+        assert!(Timing::Missed(at(6_000)).explained(&timeline).is_none());
+        assert!(late(5_900).explained(&held_up(&[])).is_none());
+    }
+
+    fn of_device(event: Event) -> Occurrence {
+        Occurrence {
+            at: Stamp {
+                moment: at(0),
+                utc: jiff::Timestamp::UNIX_EPOCH,
+            },
+            source: Source::Tap,
+            direction: Some(Direction::FromDevice),
+            event,
+        }
+    }
+
+    fn connect(connection: u64, client_id: &str) -> Occurrence {
+        of_device(Event::Packet {
+            connection,
+            packet: Packet::Connect {
+                level: 4,
+                client_id: client_id.to_owned(),
+                keep_alive: 15,
+                clean_session: true,
+                username: None,
+                has_password: false,
+                will: None,
+            },
+        })
+    }
+
+    fn state(connection: u64) -> [Occurrence; 2] {
+        let payload = || Payload::keep(bytes::Bytes::from_static(b"{}"));
+        let packet = Packet::Publish {
+            topic: "state".to_owned(),
+            qos: 0,
+            retain: false,
+            dup: false,
+            packet_id: None,
+            payload: payload(),
+        };
+        let message = Event::Message {
+            topic: "state".to_owned(),
+            qos: 0,
+            retain: false,
+            dup: false,
+            payload: payload(),
+        };
+        [of_device(Event::Packet { connection, packet }), of_device(message)]
+    }
+
+    #[test]
+    fn a_state_counts_from_the_present_connection_of_the_client_that_publishes() {
+        let mut journal = Journal::new();
+        let mut timeline = Timeline::new(&BTreeMap::from([("state".to_owned(), "state".to_owned())]));
+        let mut show = |timeline: &mut Timeline, all: &[Occurrence]| {
+            for occurrence in all {
+                timeline.add(&journal.append(occurrence.clone()));
+            }
+        };
+        show(&mut timeline, &[connect(1, "vehicle"), connect(2, "panel")]);
+        show(&mut timeline, &state(1));
+        assert_eq!(timeline.publishing(), Some(1));
+        assert!(timeline.present("state").is_some());
+        show(&mut timeline, &[connect(3, "panel")]);
+        assert!(timeline.present("state").is_some(), "another client has come back");
+        show(&mut timeline, &[connect(4, "vehicle")]);
+        assert!(
+            timeline.present("state").is_none(),
+            "it has said nothing since it came back"
+        );
+        show(&mut timeline, &state(4));
+        assert!(timeline.present("state").is_some());
+    }
+}

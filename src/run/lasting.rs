@@ -160,7 +160,7 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
         ));
     }
     if (obstacles.contains(&Obstacle::Driving) && stays(judge, idle)) || stood_driving(judge, idle.test) {
-        let about = ["STATE-MSG-08", "STATE-08", "ORD-UPD-01", "BLOCK-03", "BLOCK-04"];
+        let about = ["STATE-MSG-08", "STATE-08", "ORD-UPD-01"];
         let why = "it says that it drives while it stands";
         all.push(waiver("driving", Reading::Standing, &about, why));
     }

@@ -53,11 +53,7 @@ impl Holding {
             &ids(&verb.checks),
             scene,
         );
-        let check = selector
-            .check
-            .take()
-            .map(|check| CheckWindow::start(&check, scene))
-            .transpose()?;
+        let check = selector.take_check(scene)?;
         let (until, ends) = match &verb.extent {
             Extent::During(time) => (None, position.begun + limit(time, scene)?.hard),
             Extent::Until(until) => {

@@ -311,6 +311,15 @@ impl Selector {
         self
     }
 
+    /// Its named check, to be shown every message.
+    pub(super) fn take_check(&mut self, scene: &Scene<'_>) -> Result<Option<CheckWindow>, String> {
+        let Some(check) = self.check.take() else {
+            return Ok(None);
+        };
+        let window = CheckWindow::start(&check, scene)?;
+        Ok(Some(window.lenient(self.mends.clone())))
+    }
+
     /// The mistakes of the vehicle that would have stood in the way.
     pub(super) fn allowances(&self) -> Vec<String> {
         self.mends.used()
@@ -340,7 +349,7 @@ impl Selector {
         let Some(check) = &self.check else { return Said::Right };
         match CheckWindow::start(check, scene) {
             Err(why) => Said::Wrong(Holds::Unseen(why.clone()), why),
-            Ok(mut window) => window.observe(entry, scene),
+            Ok(window) => window.lenient(self.mends.clone()).observe(entry, scene),
         }
     }
 

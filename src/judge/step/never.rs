@@ -37,11 +37,7 @@ impl Forbidding {
             &ids(&verb.checks),
             scene,
         );
-        let check = selector
-            .check
-            .take()
-            .map(|check| CheckWindow::start(&check, scene))
-            .transpose()?;
+        let check = selector.take_check(scene)?;
         let mut this = Self {
             verb: verb.clone(),
             position,

@@ -142,6 +142,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
                 took: Some(witness),
                 seconds: -1.0,
             }],
+            allowances: vec![evil()],
         })
         .collect::<Vec<_>>();
     let monitors = vec![MonitorResult {
