@@ -121,7 +121,6 @@ mod tests {
             walks: false,
             ended: 30,
             waited: None,
-            timing: None,
             of_time: None,
         }
     }
