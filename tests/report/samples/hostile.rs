@@ -122,6 +122,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         .map(Some)
         .chain([None])
         .map(|verdict| TestResult {
+            allowances: Vec::new(),
             id: format!("{HOSTILE}/{}", verdict.map_or("none", Verdict::word)),
             title: evil(),
             verdict,

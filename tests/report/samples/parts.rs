@@ -49,6 +49,7 @@ pub fn step(
 
 pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Vec<Decision>) -> TestResult {
     TestResult {
+        allowances: Vec::new(),
         id: id.to_owned(),
         title: title.to_owned(),
         verdict: Some(verdict),
