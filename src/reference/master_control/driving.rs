@@ -115,6 +115,9 @@ impl Site {
         if !running.accepted {
             return Fate::Runs;
         }
+        if running.cleared && !self.faults.has(F::ClearedOrderUpdated) {
+            return Fate::Again;
+        }
         let alien = self.faults.has(F::OrderIdPerUpdate) || self.faults.has(F::OrderIdReused);
         if !shown && !alien {
             return Fate::Again;

@@ -124,7 +124,9 @@ impl Site {
         if let Some((index, _)) = near.next_back() {
             let sequence = u32::try_from(2 * index).unwrap_or(u32::MAX);
             state.last_node_sequence_id = state.last_node_sequence_id.max(sequence);
-            state.node_states.retain(|node| node.sequence_id.is_some_and(|id| id > sequence));
+            state
+                .node_states
+                .retain(|node| node.sequence_id.is_some_and(|id| id > sequence));
         }
     }
 
@@ -132,6 +134,11 @@ impl Site {
         let back = vehicle.state.as_ref().is_some_and(|before| !before.takes_orders()) && state.takes_orders();
         if vehicle.running.is_none() {
             believe(vehicle.shown_at.as_ref(), &mut state);
+        }
+        if let Some(running) = vehicle.running.as_mut().filter(|running| running.accepted)
+            && state.operating_mode == "MANUAL"
+        {
+            running.cleared = true;
         }
         vehicle.absolved &= !state.is_fit(self.config.low_battery);
         vehicle.state = Some(state);

@@ -89,6 +89,8 @@ pub(super) struct Running {
     pub(super) accepted: bool,
     /// The vehicle does not take updates of this order.
     pub(super) refused: bool,
+    /// The vehicle has given it up: it was in MANUAL with it.
+    pub(super) cleared: bool,
     /// The way behind the base has changed and is not sent yet.
     pub(super) changed: bool,
     /// actionId of the running waitForTrigger, and since when.

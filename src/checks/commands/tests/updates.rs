@@ -176,7 +176,8 @@ fn an_order_that_is_called_off_is_not_extended_unless_that_has_failed() {
             "instantActions",
             &json!({ "actions": [action("cancelOrder", "c1", &json!([]))] }),
         );
-        let cancel = json!({ "actionStates": [{ "actionId": "c1", "actionType": "cancelOrder", "actionStatus": status }] });
+        let cancel =
+            json!({ "actionStates": [{ "actionId": "c1", "actionType": "cancelOrder", "actionStatus": status }] });
         trace
             .wait(later)
             .shows(&merged(under_way("o1", 0, 2), &cancel))
