@@ -66,7 +66,7 @@ impl Errors {
         if faults.has(F::RefusalLevelCorrected) {
             wrong.fatal = !right.fatal;
         } else if faults.has(F::RefusalTypeCorrected) {
-            wrong.error_type = "internalError".to_owned();
+            "internalError".clone_into(&mut wrong.error_type);
         } else if faults.has(F::RefusalReferencesCorrected) {
             wrong.references.clear();
         } else {
