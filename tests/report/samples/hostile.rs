@@ -122,7 +122,6 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         .map(Some)
         .chain([None])
         .map(|verdict| TestResult {
-            allowances: Vec::new(),
             id: format!("{HOSTILE}/{}", verdict.map_or("none", Verdict::word)),
             title: evil(),
             verdict,

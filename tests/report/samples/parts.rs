@@ -61,7 +61,6 @@ pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Ve
         journal: None,
         decisions,
         steps: Vec::new(),
-        allowances: Vec::new(),
     }
 }
 
