@@ -50,17 +50,27 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 };
             }
         }
+        let within = match (&operator.within, self.recorder.judge().current()) {
+            (Some(within), Some(test)) => match within.bind(test.bindings()) {
+                Ok(within) => Some(within),
+                Err(unbound) => return Ok(StepEnd::Broken(unbound.to_string())),
+            },
+            _ => None,
+        };
         let judge = self.recorder.judge();
         if judge.role() == Role::MasterControl {
             let meant = each.clone().unwrap_or_else(|| judge.ground().identity.1.clone());
             parameters.entry("vehicle").or_insert_with(|| meant.into());
         }
         if let Some(patience) = self.operator.natural_traffic(&operator.hook) {
+            let patience = within.map_or(patience, |within| within.min(patience));
             return self.await_traffic(&operator.hook, patience, section).await;
         }
         // What a postamble undoes is undone even when the user has asked to stop.
         let abandons = section != Section::Finally;
-        let outcome = self.hook_for(&operator.hook, parameters, abandons, each).await?;
+        let outcome = self
+            .hook_for(&operator.hook, parameters, (abandons, within), each)
+            .await?;
         if section != Section::Finally && self.interrupted() {
             return Ok(StepEnd::Interrupted);
         }
@@ -182,18 +192,19 @@ impl<L: Link, O: Operator> Engine<L, O> {
         parameters: Map<String, Value>,
         abandons: bool,
     ) -> Result<HookOutcome, EngineError> {
-        self.hook_for(name, parameters, abandons, None).await
+        self.hook_for(name, parameters, (abandons, None), None).await
     }
 
-    /// The same for one of all mock AGVs.
+    /// The same for one of all mock AGVs, given up after a time if one is named.
     async fn hook_for(
         &mut self,
         name: &str,
         parameters: Map<String, Value>,
-        abandons: bool,
+        (abandons, within): (bool, Option<Duration>),
         each: Option<String>,
     ) -> Result<HookOutcome, EngineError> {
-        let far = Moment::from_micros(u64::MAX);
+        let begun = self.link.now().moment;
+        let until = within.map_or(Moment::from_micros(u64::MAX), |within| begun + within);
         let outcome = if self.operator.runs_on_the_link() {
             operator::on_link(&mut self.link, name, &parameters)
         } else {
@@ -205,11 +216,13 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     _ = self.interrupt.wait_for(|interrupted| *interrupted), if abandons => {
                         break HookOutcome::Failed("given up: the user has interrupted the run".to_owned());
                     }
-                    happened = self.link.next(far) => {
-                        if let Some(occurrence) = happened? {
-                            self.recorder.record(occurrence)?;
+                    happened = self.link.next(until) => match (happened?, within) {
+                        (Some(occurrence), _) => drop(self.recorder.record(occurrence)?),
+                        (None, Some(within)) if self.link.now().moment >= until => {
+                            break HookOutcome::Failed(format!("not done within {}", show_duration(within)));
                         }
-                    }
+                        (None, _) => {}
+                    },
                 }
             }
         };
