@@ -186,8 +186,7 @@ impl Agv {
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
         let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
         let drives = self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen);
-        let keeps =
-            leaves || drives || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
+        let keeps = leaves || drives || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             let given_up = self.book.clone();
             if self.faults.has(F::ManualKeepsActions) {
