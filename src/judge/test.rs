@@ -383,9 +383,8 @@ impl TestJudge {
     fn record_step(&mut self, step: &Step, outcome: &StepOutcome, end: &StepEnd, begun: (u64, Moment), entry: &Entry) {
         let word = match (end, &outcome.reached) {
             (StepEnd::Broken(_), _) => "broken",
-            (StepEnd::Refused(_), _) => "failed",
             (StepEnd::Interrupted, _) => "interrupted",
-            (_, Some(Err(_))) => "failed",
+            (StepEnd::Refused(_), _) | (_, Some(Err(_))) => "failed",
             _ => "done",
         };
         self.result.steps.push(StepResult {

@@ -85,7 +85,7 @@ struct Enabled {
     /// Maps to be enabled, by the id of the action.
     asked: BTreeMap<String, String>,
     /// Maps that are enabled on the way, or were by an action that has ended well.
-    enabled: BTreeSet<String>,
+    usable: BTreeSet<String>,
 }
 
 impl Running for Enabled {
@@ -110,7 +110,7 @@ impl Running for Enabled {
             let all = elements(state, "actionStates").take(ELEMENTS);
             for action in all.filter(|action| text(action, "actionStatus") == "FINISHED") {
                 let map = self.asked.remove(text(action, "actionId"));
-                self.enabled.extend(map.filter(|_| self.enabled.len() < KEPT));
+                self.usable.extend(map.filter(|_| self.usable.len() < KEPT));
             }
         }
         let Some(command) = Command::read(self.traffic, entry, context) else {
@@ -120,8 +120,8 @@ impl Running for Enabled {
             let (Some((map, _)), "enableMap") = (pair(action), text(action, "actionType")) else {
                 continue;
             };
-            if scope != "INSTANT" && self.enabled.len() < KEPT {
-                self.enabled.insert(map);
+            if scope != "INSTANT" && self.usable.len() < KEPT {
+                self.usable.insert(map);
             } else if let Some(id) = short(action, "actionId").filter(|_| self.asked.len() < KEPT) {
                 self.asked.insert(id, map);
             }
@@ -142,7 +142,7 @@ impl Running for Enabled {
                 continue;
             };
             judged = true;
-            let known = recent.iter().flatten().any(|enabled| enabled.contains(map)) || self.enabled.contains(map);
+            let known = recent.iter().flatten().any(|enabled| enabled.contains(map)) || self.usable.contains(map);
             if !known && said.insert(map) {
                 found.broken(
                     "MAP-09",
