@@ -222,11 +222,13 @@ impl Composer {
             for (key, term) in &action.with {
                 parameters.push(json!({ "key": key, "value": term.bind(bindings)? }));
             }
+            let action_type = action.action.bind(bindings)?;
             let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
+            let blocking = blocking.unwrap_or_else(|| usual_blocking(&action_type, bindings));
             all.push(json!({
-                "actionType": action.action.bind(bindings)?,
+                "actionType": action_type,
                 "actionId": id,
-                "blockingType": blocking.unwrap_or_else(|| json!("HARD")),
+                "blockingType": blocking,
                 "actionParameters": parameters,
             }));
             if let (Some(name), true) = (&action.name, fresh) {
@@ -275,6 +277,24 @@ fn operate(message: &mut Value, operation: Value) -> Result<(), ComposeError> {
 /// ISO 8601 in UTC with two fraction digits (HDR-03).
 fn timestamp(now: Stamp) -> String {
     format!("{:.2}", now.utc)
+}
+
+/// How an action blocks where a test does not care: HARD, or the first type its factsheet lists when HARD is not among
+/// them (FACT-15).
+fn usual_blocking(action_type: &Value, bindings: &Bindings) -> Value {
+    let usual = json!("HARD");
+    let listed = bindings
+        .get("device.factsheet.protocolFeatures.agvActions")
+        .and_then(Value::as_array);
+    let own = listed
+        .into_iter()
+        .flatten()
+        .find(|action| action.get("actionType") == Some(action_type))
+        .and_then(|action| action.get("blockingTypes")?.as_array());
+    match own {
+        Some(types) if !types.contains(&usual) => types.first().cloned().unwrap_or(usual),
+        _ => usual,
+    }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ mod route;
 pub mod vehicle;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
@@ -26,6 +27,9 @@ use crate::journal::event::{Event, Occurrence, Payload, StepEnd};
 use crate::judge::{JudgeError, Progress, TestJudge};
 use crate::link::{Link, LinkError, Offer, Outgoing};
 use crate::suite::model::{Section, Step, Test, Verb};
+
+/// More time than this is not left between two orders.
+const LONGEST_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Why a run cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -63,6 +67,8 @@ pub struct Engine<L, O> {
     /// Whether the postamble of a test tries to cancel what the test has left. Set to false once the device
     /// is known not to obey and there is another way to get it back.
     pub cancels: bool,
+    /// When the last order was sent.
+    last_order: Option<Moment>,
     interrupt: tokio::sync::watch::Receiver<bool>,
 }
 
@@ -81,6 +87,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             recorder,
             composer,
             cancels: true,
+            last_order: None,
             interrupt,
         }
     }
@@ -257,6 +264,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
     async fn perform(&mut self, step: &Step, section: Section) -> Result<StepEnd, EngineError> {
         match &step.verb {
             Verb::Send(send) => {
+                if send.topic == "order" {
+                    self.space_orders().await?;
+                }
                 let version = self.recorder.judge().ground();
                 let composed = match self.recorder.judge().current() {
                     Some(test) => self.composer.compose(send, test.bindings(), version, self.link.now()),
@@ -313,8 +323,31 @@ impl<L: Link, O: Operator> Engine<L, O> {
         Ok(())
     }
 
+    /// Waits until the vehicle may be sent another order: its factsheet says how much time it needs between two
+    /// (`minOrderInterval`, FACT-13). One that asks for more than [`LONGEST_INTERVAL`] is not given more.
+    async fn space_orders(&mut self) -> Result<(), EngineError> {
+        let bindings = &self.recorder.judge().ground().bindings;
+        let stated = bindings.get("device").and_then(|device| {
+            let seconds = device.pointer("/factsheet/protocolLimits/timing/minOrderInterval")?;
+            Duration::try_from_secs_f64(seconds.as_f64()?).ok()
+        });
+        let (Some(interval), Some(last)) = (stated, self.last_order) else {
+            return Ok(());
+        };
+        let until = last + interval.min(LONGEST_INTERVAL);
+        if until > self.link.now().moment {
+            self.watch(until, |_| false).await?;
+        }
+        Ok(())
+    }
+
     /// Publishes a message of the harness, journal first.
     pub async fn publish(&mut self, message: Outgoing) -> Result<(), EngineError> {
+        let is_order = self.recorder.judge().ground().topics.get("order") == Some(&message.topic);
+        if is_order {
+            self.space_orders().await?;
+            self.last_order = Some(self.link.now().moment);
+        }
         self.note(Event::Sent {
             topic: message.topic.clone(),
             qos: message.qos,

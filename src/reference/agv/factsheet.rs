@@ -9,6 +9,7 @@ use super::faults::FaultName as F;
 use super::instant::MAX_INSTANT_ACTIONS;
 use super::path::{HALF_LENGTH, HALF_WIDTH};
 use super::read::MAX_STRING;
+use super::tolerances::ToleranceName as T;
 use super::{Agv, AgvConfig};
 
 /// Optional parameters the vehicle acts on.
@@ -149,7 +150,7 @@ impl Agv {
                 "state.errors": MAX_ERRORS,
             },
             "timing": {
-                "minOrderInterval": 0.0,
+                "minOrderInterval": if self.takes(T::OrdersSpaced) { 0.5 } else { 0.0 },
                 "minStateInterval": min_state_interval,
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },

@@ -61,6 +61,7 @@ use maps::Maps;
 use motion::{Motion, Pose};
 use personas::Persona;
 use report::Report;
+use tolerances::ToleranceName as T;
 
 /// A fault that is not in [`FAULTS`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -137,6 +138,8 @@ pub struct Agv {
     obstacles: BTreeSet<String>,
     /// It refuses the next order (`order-error-locks`, `manual-locks` only).
     locked: bool,
+    /// When the last order came (`orders-spaced` only).
+    ordered: Option<Moment>,
     /// `malformed-instant-deafens`: no instant action is heard any more.
     deaf: bool,
     /// It has left its corridor and was not put back yet.
@@ -234,6 +237,7 @@ impl Agv {
             remembered: None,
             lost: false,
             claimed_map: None,
+            ordered: None,
             connection: Connection::new(),
             report: Report::default(),
             inbox: VecDeque::new(),
@@ -363,10 +367,20 @@ impl Agv {
 
     fn message(&mut self, topic: &str, payload: &[u8]) {
         if self.config.topic("order") == Some(topic) {
-            self.order_received(payload);
+            if !self.overlooks_order() {
+                self.order_received(payload);
+            }
         } else if self.config.topic("instantActions") == Some(topic) {
             self.instant_actions_received(payload);
         }
+    }
+
+    /// `orders-spaced`: an order that comes earlier than its factsheet allows, and not just by the way of a message.
+    fn overlooks_order(&mut self) -> bool {
+        let now = self.moment();
+        let before = self.ordered.replace(now);
+        let early = before.is_some_and(|before| now.since(before) < Duration::from_millis(400));
+        early && self.takes(T::OrdersSpaced)
     }
 
     /// How long an action runs.
