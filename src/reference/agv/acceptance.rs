@@ -12,6 +12,7 @@ use super::faults::FaultName as F;
 use super::order_message::{ActionRequest, Edge, Node, Order};
 use super::read::Defect;
 use super::rejection::{Refusal, Rule};
+use super::tolerances::ToleranceName as T;
 
 /// What to do with an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +38,9 @@ impl Agv {
             serde_json::from_slice::<Value>(payload)
                 .map_err(|_| Refusal::new(Rule::Malformed, "the message is not JSON"))
         };
+        if message.is_err() && self.faults.has(F::R1UnreadableOrderDropped) {
+            return;
+        }
         let result = match &message {
             Err(refusal) => Err(refusal.clone()),
             Ok(message) => self.order_decided(message),
@@ -47,11 +51,15 @@ impl Agv {
     }
 
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
-        let mut order = Order::read(message)?;
+        let mended = self.mended(message);
+        let mut order = Order::read(mended.as_ref().unwrap_or(message))?;
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
-        let tolerated = |_: &Defect| self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty();
+        let tolerated = |defect: &Defect| {
+            (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
+                || (self.faults.has(F::R1SplitBaseTaken) && defect.reason == "is true behind the horizon's begin")
+        };
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
         }
@@ -62,12 +70,75 @@ impl Agv {
         match self.decide(&mut order)? {
             Decision::Begin => self.begin(order),
             Decision::Continue => self.continue_with(order),
-            Decision::Discard => return Ok(()),
+            Decision::Discard => {
+                self.seen_again();
+                return Ok(());
+            }
         }
         if self.faults.has(F::EchoesOrder) {
             self.echo_order(message);
         }
         Ok(())
+    }
+
+    /// A malformed order as a faulty vehicle reads it all the same.
+    fn mended(&self, message: &Value) -> Option<Value> {
+        let (numbers, blocking) = (
+            self.faults.has(F::R1NumbersReadFromText),
+            self.faults.has(F::R1BlockingTypeAssumed),
+        );
+        if !numbers && !blocking {
+            return None;
+        }
+        let mut message = message.clone();
+        if numbers {
+            number_from_text(&mut message, "orderUpdateId");
+        }
+        for list in ["nodes", "edges"] {
+            for element in message
+                .get_mut(list)
+                .and_then(Value::as_array_mut)
+                .into_iter()
+                .flatten()
+            {
+                if numbers {
+                    number_from_text(element, "sequenceId");
+                }
+                let actions = element.get_mut("actions").and_then(Value::as_array_mut);
+                for action in actions.into_iter().flatten().filter_map(Value::as_object_mut) {
+                    if blocking {
+                        action.entry("blockingType").or_insert_with(|| Value::from("NONE"));
+                    }
+                }
+            }
+        }
+        Some(message)
+    }
+
+    /// What a faulty vehicle does with an order it knows already.
+    fn seen_again(&mut self) {
+        if self.faults.has(F::R1DuplicateClearsErrors) {
+            self.errors.new_order();
+        }
+        if self.is_busy() && self.faults.has(F::R1DuplicateRepeatsActions) {
+            self.repeat_actions(self.book.last_sequence);
+        }
+    }
+
+    /// Does the ended actions of a node once more.
+    fn repeat_actions(&mut self, sequence_id: u32) {
+        let origin = Origin::Node(sequence_id);
+        let mut repeated = false;
+        for action in self.actions.iter_mut().filter(|action| action.origin == origin) {
+            if action.status == super::actions::Status::Finished {
+                action.status = super::actions::Status::Waiting;
+                action.result = None;
+                repeated = true;
+            }
+        }
+        if repeated {
+            self.actions.trigger(origin, self.faults);
+        }
     }
 
     /// The decision table of figure 8, with the gates it leaves out.
@@ -80,7 +151,8 @@ impl Agv {
             let again = self.faults.has(F::DuplicateExecuted) && !self.is_busy();
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
-        if !new && order.update_id < self.book.update_id && !self.faults.has(F::OutdatedUpdateTakenOver) {
+        let late = self.faults.has(F::R1OutdatedContinuesCompleted) && !self.is_busy();
+        if !new && order.update_id < self.book.update_id && !late && !self.faults.has(F::OutdatedUpdateTakenOver) {
             return Err(Refusal::new(
                 Rule::Outdated,
                 "the order update is older than the current one",
@@ -112,7 +184,8 @@ impl Agv {
     }
 
     fn check_new(&self, order: &mut Order) -> Result<(), Refusal> {
-        if self.is_busy() {
+        let replaced = self.holds.pause && self.faults.has(F::R1NewOrderTakenInPause);
+        if self.is_busy() && !replaced {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
         if self.faults.has(F::DeadAfterCancel) && self.book.cancelled {
@@ -134,7 +207,8 @@ impl Agv {
             return Err(Refusal::new(Rule::Unable, "the order is too short"));
         }
         self.check_ability(order, 0)?;
-        if self.near(&order.nodes[0]) || self.faults.has(F::FarOrderAccepted) {
+        let stranded = self.book.cancelled && self.faults.has(F::R1FarOrderTakenAfterCancel);
+        if self.near(&order.nodes[0]) || stranded || self.faults.has(F::FarOrderAccepted) {
             return Ok(());
         }
         Err(Refusal::new(Rule::StartOutOfRange, "the first node is out of reach").naming("nodeId", &order.nodes[0].id))
@@ -152,14 +226,25 @@ impl Agv {
         let joins = if busy {
             (&first.id, first.sequence_id) == (&self.book.base_end.0, self.book.base_end.1)
                 || self.faults.has(F::RunningUpdateGapAccepted)
+                || (first.id == self.book.base_end.0 && self.faults.has(F::R1JointSequenceUnchecked))
                 || self.faults.has(F::OutdatedUpdateTakenOver)
         } else {
             (&first.id, first.sequence_id) == (&self.book.last_node, self.book.last_sequence)
                 || self.faults.has(F::CompletedUpdateGapAccepted)
+                || (first.sequence_id == self.book.last_sequence && self.faults.has(F::R1JointNodeUnchecked))
         };
         if !joins {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
             return Err(refusal.naming("nodeId", &first.id));
+        }
+        let altered = first
+            .actions
+            .iter()
+            .find(|action| self.actions.get(&action.id).is_none());
+        if let Some(altered) = altered.filter(|_| self.takes(T::R1AlteredJointRejected)) {
+            let reason = "the stitching node has another action than before";
+            let refusal = Refusal::at_field(Rule::Unable, reason, &altered.path);
+            return Err(refusal.naming("actionId", &altered.id));
         }
         self.check_ability(order, 1)
     }
@@ -192,6 +277,8 @@ impl Agv {
             .unwrap_or(0.0);
         let allowed = if self.faults.has(F::DeviationIgnored) {
             0.0
+        } else if self.faults.has(F::R1DeviationAsDiameter) {
+            allowed / 2.0
         } else {
             allowed
         };
@@ -202,17 +289,23 @@ impl Agv {
 
     /// Row 4: takes over a new order.
     fn begin(&mut self, order: Order) {
-        if !self.faults.has(F::ValidationErrorLingers) {
+        if self.faults.has(F::R1OwnErrorGoneByOrder) {
+            self.errors.clear();
+        } else if !self.faults.has(F::ValidationErrorLingers) {
             self.errors.new_order();
         }
+        self.latched = false;
         self.actions.drop_lists();
         if self.faults.has(F::OldActionStatesKept) {
             let ids: Vec<&str> = order.actions().map(|action| action.id.as_str()).collect();
             self.actions.retain(|action| !ids.contains(&action.request.id.as_str()));
         } else {
             let dropped = self.faults.has(F::RunningInstantDropped);
-            self.actions
-                .retain(|action| !action.of_order() && !action.status.is_terminal() && !dropped);
+            let cancel_stays = self.faults.has(F::R1CancelOutlivesOrder);
+            self.actions.retain(|action| {
+                let stays = cancel_stays && action.request.action_type == "cancelOrder";
+                !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
+            });
         }
         let moment = self.moment();
         self.motion.halt(moment);
@@ -228,10 +321,17 @@ impl Agv {
         self.book = super::book::Book::empty(last.0);
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
-        self.book.update_id = order.update_id;
+        self.book.update_id = if self.faults.has(F::R1FirstUpdateIdZeroed) {
+            0
+        } else {
+            order.update_id
+        };
         self.book.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
         self.linger_on_first_node();
+        if self.takes(T::R1SetsOutLate) {
+            self.lingers_until = Some(self.moment() + std::time::Duration::from_millis(700));
+        }
     }
 
     /// Rows 8 and 10: takes over an update.
@@ -242,9 +342,39 @@ impl Agv {
         } else {
             self.faults.has(F::HorizonKept)
         };
+        if self.is_busy() && self.motion.is_moving() && self.faults.has(F::R1StopsAtStitch) {
+            self.book.stuck_at = Some(self.book.base_end.1);
+        }
+        self.book.heedless |= self.holds.pause && self.faults.has(F::R1UpdateDrivesInPause);
+        let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);
+        self.book.unbound |= plans_only && self.faults.has(F::R1HorizonUpdateDriven);
+        let faults = self.faults;
+        self.actions.retain(|action| {
+            let forgotten = action.status.is_terminal()
+                && if action.of_order() {
+                    faults.has(F::R1UpdateForgetsEndedActions)
+                } else {
+                    faults.has(F::R1UpdateForgetsInstantActions)
+                };
+            !forgotten
+        });
         if !keep {
+            let edges = self.book.edges.clone();
             let gone = self.book.drop_horizon();
-            if !self.faults.has(F::HorizonActionsStay) {
+            if self.faults.has(F::R1HorizonEdgesStay) {
+                self.book.edges.extend(edges.into_iter().filter(|edge| !edge.released));
+            }
+            if self.takes(T::R1HorizonActionsFail) {
+                for action in self.actions.iter_mut() {
+                    let of_horizon = match action.origin {
+                        Origin::Node(sequence_id) | Origin::Edge(sequence_id) => gone.contains(&sequence_id),
+                        Origin::Instant => false,
+                    };
+                    if of_horizon && !action.status.is_terminal() {
+                        action.end(super::actions::Status::Failed);
+                    }
+                }
+            } else if !self.faults.has(F::HorizonActionsStay) {
                 self.actions.retain(|action| match action.origin {
                     Origin::Node(sequence_id) | Origin::Edge(sequence_id) => !gone.contains(&sequence_id),
                     Origin::Instant => true,
@@ -262,10 +392,46 @@ impl Agv {
         }
         let mut nodes = order.nodes.into_iter();
         let joint = nodes.next();
+        if let Some(joint) = &joint {
+            self.join_badly(joint);
+        }
         if let Some(joint) = joint.filter(|_| self.faults.has(F::StitchingNodeOverwritten)) {
             self.overwrite_joint(joint);
         }
         self.append(nodes.collect(), order.edges);
+    }
+
+    /// What a faulty vehicle does with the stitching node of an update.
+    fn join_badly(&mut self, joint: &Node) {
+        let open = self
+            .book
+            .nodes
+            .iter()
+            .any(|stop| stop.node.sequence_id == joint.sequence_id);
+        if !open && self.faults.has(F::R1JointActionsRepeated) && !joint.actions.is_empty() {
+            self.repeat_actions(joint.sequence_id);
+        }
+        if self.faults.has(F::R1JointPositionReplaced) {
+            let place = self.place(joint);
+            for stop in &mut self.book.nodes {
+                if stop.node.sequence_id == joint.sequence_id {
+                    stop.node.position.clone_from(&joint.position);
+                    stop.node.sent_position.clone_from(&joint.sent_position);
+                    if let Some(place) = &place {
+                        stop.place.clone_from(place);
+                    }
+                }
+            }
+        }
+        if self.faults.has(F::R1JointListedTwice) {
+            let again = self
+                .book
+                .nodes
+                .iter()
+                .find(|stop| stop.node.sequence_id == joint.sequence_id)
+                .cloned();
+            self.book.nodes.extend(again);
+        }
     }
 
     /// `stitching-node-overwritten`: what the first transmission said is forgotten.
@@ -317,5 +483,16 @@ impl Agv {
             self.actions.retain(|action| action.request.id != request.id);
             self.actions.push(Action::waiting(request, kind, origin));
         }
+    }
+}
+
+/// Makes a number of a text that is one.
+fn number_from_text(object: &mut Value, key: &str) {
+    let number = object
+        .get(key)
+        .and_then(Value::as_str)
+        .and_then(|text| text.parse::<u32>().ok());
+    if let Some(number) = number {
+        object[key] = Value::from(number);
     }
 }
