@@ -202,7 +202,8 @@ impl Agv {
                 return unable("the action is not possible here", &request.path);
             }
             let found = action_kinds::refusal(kind, request, true)
-                .filter(|(_, reason)| !(reason.ends_with("missing") && self.faults.has(F::R1MissingParameterTaken)));
+                .filter(|(_, reason)| !(reason.ends_with("missing") && self.faults.has(F::R1MissingParameterTaken)))
+                .filter(|_| !self.faults.has(F::ParametersUnchecked));
             if let Some((key, reason)) = found {
                 let refusal = Refusal::at_field(Rule::Unable, reason, &request.path).naming("actionParameter", key);
                 return Err(refusal.naming("actionId", &request.id));

@@ -151,6 +151,7 @@ impl Agv {
         self.holds = super::Holds::default();
         self.strayed = false;
         self.locked = false;
+        self.deaf = false;
         self.mode = Mode::Automatic;
         self.charging = false;
         self.report = super::Report::default();
@@ -190,7 +191,8 @@ impl Agv {
         };
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
         let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
-        let keeps = leaves || self.faults.has(F::ManualKeepsOrder);
+        let drives = self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen);
+        let keeps = leaves || drives || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             let given_up = self.book.clone();
             if self.faults.has(F::R1ManualFinishesActions) {
@@ -200,7 +202,13 @@ impl Agv {
                     }
                 }
             }
-            self.give_up_order();
+            if self.faults.has(F::ManualKeepsActions) {
+                self.motion.halt(self.now.moment);
+                self.book.drop_route();
+                self.book.cancelled = true;
+            } else {
+                self.give_up_order();
+            }
             if self.faults.has(F::R1ManualKeepsHorizon) {
                 let planned = given_up.nodes.iter().filter(|stop| !stop.node.released);
                 self.book.nodes.extend(planned.cloned());
@@ -208,6 +216,9 @@ impl Agv {
                 self.book.edges.extend(planned.cloned());
             }
             self.remembered = Some(given_up).filter(|_| self.faults.has(F::OrderTakenUpAgain));
+        }
+        if mode == Mode::Semiautomatic && self.faults.has(F::SemiautomaticEndsOrder) {
+            self.give_up_order();
         }
         self.mode = mode;
         if let Some(order) = self.remembered.take_if(|_| mode.takes_orders()) {

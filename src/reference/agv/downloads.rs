@@ -124,6 +124,9 @@ impl Agv {
             }
             self.maps
                 .store(action.text("mapId"), action.text("mapVersion"), self.faults);
+            if self.faults.has(F::DownloadNeverEnds) {
+                return;
+            }
             self.finish(action_id, None);
         }
     }

@@ -34,7 +34,12 @@ enum Fate {
 impl Site {
     /// Looks after the running order.
     pub(super) fn watch_order(&mut self, vehicle: &mut Vehicle) {
-        if vehicle.cancel.is_some() || !self.commandable(vehicle) {
+        if vehicle.cancel.is_some() && self.faults.has(F::UpdatedWhileCancelled) {
+            self.extend_all_the_same(vehicle);
+            return;
+        }
+        let stubborn = self.faults.has(F::UpdatesInService) && self.reachable(vehicle);
+        if vehicle.cancel.is_some() || !(self.commandable(vehicle) || stubborn) {
             return;
         }
         let Some(mut running) = vehicle.running.take() else {
@@ -73,6 +78,16 @@ impl Site {
         }
     }
 
+    /// `updated-while-cancelled`: as if nobody had called the order off.
+    fn extend_all_the_same(&mut self, vehicle: &mut Vehicle) {
+        if let Some(mut running) = vehicle.running.take() {
+            if running.confirmed {
+                self.extend_base(vehicle, &mut running);
+            }
+            vehicle.running = Some(running);
+        }
+    }
+
     fn fate(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
         let shown = state.order_id == running.id;
         if shown {
@@ -100,11 +115,27 @@ impl Site {
         if !running.accepted {
             return Fate::Runs;
         }
+        if running.cleared && !self.faults.has(F::ClearedOrderUpdated) {
+            return Fate::Again;
+        }
         let alien = self.faults.has(F::OrderIdPerUpdate) || self.faults.has(F::OrderIdReused);
         if !shown && !alien {
             return Fate::Again;
         }
-        progress(running, state)
+        let fate = progress(running, state);
+        let driven = state.route_empty() && running.is_whole() && running.confirmed;
+        match fate {
+            Fate::Runs if driven && self.faults.has(F::ActionNotAwaited) => Fate::Over,
+            Fate::CalledOff if running.refused && self.faults.has(F::RefusedUpdateExtended) => {
+                (running.refused, running.confirmed) = (false, true);
+                Fate::Runs
+            }
+            Fate::Again if running.confirmed && self.faults.has(F::ClearedOrderUpdated) => {
+                running.changed = true;
+                Fate::Runs
+            }
+            fate => fate,
+        }
     }
 
     /// Sends the unchanged message again when it was not seen in time; false when that was done often enough.
@@ -212,13 +243,15 @@ impl Site {
             released: target.max(running.released),
             end: free.min(target.max(running.released).saturating_add(self.config.horizon_length)),
         };
-        running.update_id += 1;
+        let stuck = running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats);
+        let before = running.update_id;
+        running.update_id += u32::from(!stuck);
         match self.order_message(vehicle, running, window) {
             Some((message, window)) if window.released > running.released || running.changed => {
                 running.released = window.released;
                 self.send_order(vehicle, running, message);
             }
-            _ => running.update_id -= 1,
+            _ => running.update_id = before,
         }
     }
 

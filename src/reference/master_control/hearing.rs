@@ -19,6 +19,11 @@ impl MasterControl {
         if payload.len() > MAX_MESSAGE {
             return;
         }
+        self.site.take_odd(vehicle, name, payload);
+        if self.site.dead {
+            self.shut_down();
+            return;
+        }
         let Ok(message) = serde_json::from_slice::<Value>(payload) else {
             return;
         };
@@ -91,6 +96,7 @@ impl Site {
         }
         if presence == Presence::Online && vehicle.presence != Presence::Online {
             vehicle.give_time(self.now.moment);
+            vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
         }
         vehicle.presence = presence;
     }
@@ -118,6 +124,9 @@ impl Site {
         if let Some((index, _)) = near.next_back() {
             let sequence = u32::try_from(2 * index).unwrap_or(u32::MAX);
             state.last_node_sequence_id = state.last_node_sequence_id.max(sequence);
+            state
+                .node_states
+                .retain(|node| node.sequence_id.is_some_and(|id| id > sequence));
         }
     }
 
@@ -126,6 +135,12 @@ impl Site {
         if vehicle.running.is_none() {
             believe(vehicle.shown_at.as_ref(), &mut state);
         }
+        if let Some(running) = vehicle.running.as_mut().filter(|running| running.accepted)
+            && state.operating_mode == "MANUAL"
+        {
+            running.cleared = true;
+        }
+        vehicle.absolved &= !state.is_fit(self.config.low_battery);
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
         if back {

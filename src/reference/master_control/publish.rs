@@ -61,7 +61,8 @@ impl MasterControl {
                 } else {
                     topic.to_owned()
                 };
-                let qos = u8::from(*name == "connection" || site.takes(T::SubscribesWithQosOne));
+                let reliably = *name == "connection" && !site.faults.has(F::ConnectionQosZero);
+                let qos = u8::from(reliably || site.takes(T::SubscribesWithQosOne));
                 if !subscriptions.iter().any(|(known, _)| *known == topic) {
                     subscriptions.push((topic, qos));
                 }
@@ -189,7 +190,10 @@ impl Site {
             topic: self.misdirected(vehicle, name, topic),
             payload: wording::written(self.faults, self.config.tolerances, &message),
             qos,
-            retain: false,
+            retain: match name {
+                "order" => self.faults.has(F::OrdersRetained),
+                _ => self.faults.has(F::InstantActionsRetained),
+            },
         }));
     }
 

@@ -44,6 +44,12 @@ impl Agv {
         if self.config.line_guided() {
             set("distanceSinceLastNode", json!(self.distance_made()));
         }
+        if let Some((x, y)) = self.book.begun_at.filter(|_| has(F::DistanceNotReset)) {
+            set(
+                "distanceSinceLastNode",
+                json!(self.motion.pose(self.moment()).distance(x, y)),
+            );
+        }
         if has(F::DistanceNegative) {
             set("distanceSinceLastNode", json!(-1.0));
         }
@@ -72,16 +78,24 @@ impl Agv {
         if !(has(F::R1LoadsOmittedWhenEmpty) && self.loads.is_empty()) {
             set("loads", self.loads_picture());
         }
-        set("driving", json!(self.shows_driving()));
+        set(
+            "driving",
+            if has(F::DrivingAsText) {
+                json!(self.shows_driving().to_string())
+            } else {
+                json!(self.shows_driving())
+            },
+        );
         if !has(F::PauseFlagMissing) {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             let idle = complete && self.faults.has(F::R1PauseUnreportedWhenIdle);
             let pause = self.holds.pause && !idle;
             set("paused", json!(pause || button || self.holds.emergency));
         }
+        let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
         set(
             "newBaseRequest",
-            json!(self.book.base_runs_low() || self.persona.wants_base || has(F::NewBaseRequestAlways)),
+            json!(self.book.base_runs_low() || self.persona.wants_base || always),
         );
         set(
             "actionStates",
@@ -100,7 +114,11 @@ impl Agv {
         } else {
             "operatingMode"
         };
-        set(key, json!(self.mode_literal()));
+        if has(F::ModeNumeric) {
+            set(key, json!(self.mode as u8));
+        } else if !has(F::ModeMissing) {
+            set(key, json!(self.mode_literal()));
+        }
         if !(has(F::ErrorsOmitted) && self.errors.is_empty()) {
             set("errors", self.errors.picture(self.faults));
         }
@@ -124,6 +142,13 @@ impl Agv {
         if !has(F::SafetyStateMissing) {
             set("safetyState", self.safety());
         }
+        if has(F::EmptyListsNull) {
+            let lists = ["nodeStates", "edgeStates", "actionStates"];
+            let empty = |state: &Map<String, Value>, list: &str| state.get(list) == Some(&json!([]));
+            for list in lists.into_iter().filter(|list| empty(&state, list)).collect::<Vec<_>>() {
+                state.insert(list.to_owned(), Value::Null);
+            }
+        }
         state
     }
 
@@ -136,20 +161,30 @@ impl Agv {
 
     fn shows_driving(&self) -> bool {
         let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
+        let turning = self.motion.is_turning() && self.faults.has(F::TurnsWithoutDriving);
         let velocity = self.motion.velocity();
         let turns = velocity.vx == 0.0 && velocity.omega != 0.0 && self.faults.has(F::R1TurningNotDriving);
-        (self.motion.is_moving() && !turns && !self.faults.has(F::DrivingUnreported))
+        let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
+        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning && !turns)
+            || idle
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
+            || (self.book.has_order() && self.faults.has(F::DrivingKept))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
 
+    /// `manual-drives-unseen`: drives a way it does not show.
+    fn hides_route(&self) -> bool {
+        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen)
+    }
+
     fn node_states(&self, complete: bool) -> Value {
-        if self.faults.has(F::R1CancelHidesNextNode) && self.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node) {
+        let ends_on_next = self.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node);
+        if self.hides_route() || (ends_on_next && self.faults.has(F::R1CancelHidesNextNode)) {
             return json!([]);
         }
         let left = self.book.left.0.as_ref().filter(|_| {
             (!complete && self.faults.has(F::TraversedNodesListed))
-                || (complete && self.book.has_order() && self.faults.has(F::FinishedOrderListed))
+                || (complete && self.book.has_order() && self.keeps_last_node())
         });
         let shown = self
             .book
@@ -168,6 +203,10 @@ impl Agv {
             .chain(shown)
             .map(|stop| self.node_state(stop))
             .collect()
+    }
+
+    fn keeps_last_node(&self) -> bool {
+        self.faults.has(F::FinishedOrderListed) || self.faults.has(F::LastRouteListed)
     }
 
     /// The node traversed last, as if it were still ahead (`route-repeated-on-request`).
@@ -195,7 +234,11 @@ impl Agv {
     }
 
     fn edge_states(&self, complete: bool) -> Value {
-        let stays = self.faults.has(F::EdgeStatesStay) && !complete;
+        if self.hides_route() {
+            return json!([]);
+        }
+        let kept = self.faults.has(F::LastEdgeListed) || self.faults.has(F::LastRouteListed);
+        let stays = (self.faults.has(F::EdgeStatesStay) && !complete) || (kept && complete && self.book.has_order());
         let left = self.book.left.1.as_ref().filter(|_| stays);
         let shown = self
             .book
@@ -256,6 +299,12 @@ impl Agv {
             }
             status => status.literal(),
         };
+        let lower = self.faults.has(F::StatusLowerCase);
+        let status = if lower {
+            status.to_ascii_lowercase()
+        } else {
+            status.to_owned()
+        };
         let mut picture = json!({
             "actionId": action.request.id,
             "actionType": action.request.action_type,
@@ -269,7 +318,14 @@ impl Agv {
 
     /// agvPosition, also for the visualization (STATE-MSG-05).
     pub(super) fn position_picture(&self) -> Value {
-        let pose = self.motion.pose(self.moment());
+        let mut pose = self.motion.pose(self.moment());
+        if let Some(start) = self
+            .config
+            .node(&self.config.start_node)
+            .filter(|_| self.faults.has(F::PositionFrozen))
+        {
+            (pose.x, pose.y) = (start.x, start.y);
+        }
         let trembling = if self.takes(T::R1PositionTrembles) {
             [0.0, 0.003, -0.002, 0.001, -0.003][usize::try_from(self.states_sent % 5).unwrap_or_default()]
         } else {
@@ -422,6 +478,9 @@ impl Agv {
             () if self.holds.field && self.faults.has(F::R1AutoAckMixedCase) => "AutoAck",
             () if self.holds.field => "AUTOACK",
             () if self.faults.has(F::EmergencyStopSpelled) => "Off",
+            () if self.faults.has(F::EmergencyStopNull) => {
+                return json!({ "eStop": null, "fieldViolation": self.holds.field });
+            }
             () => "NONE",
         };
         let violation = if self.holds.field && self.faults.has(F::R1FieldViolationCounted) {
