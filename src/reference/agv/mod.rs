@@ -175,6 +175,10 @@ pub struct Agv {
     states_sent: u64,
     /// Counts logs.
     logs: u32,
+    /// A load that was picked is not shown before (`r1-pick-reported-late` only).
+    hidden_load: Option<Moment>,
+    /// The e-stop is shown until the next order (`r1-e-stop-latched` only).
+    latched: bool,
     /// What was decided and is still to be handed to the driver.
     pending: Vec<Output>,
     /// How a test told it to behave.
@@ -245,6 +249,8 @@ impl Agv {
             resumes_at: None,
             states_sent: 0,
             logs: 0,
+            hidden_load: None,
+            latched: false,
             pending: Vec::new(),
             persona: Persona::default(),
             config,
@@ -281,6 +287,7 @@ impl Agv {
             self.resumes_at,
             self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
+            self.hidden_load,
             self.persona.next_end(),
             self.next_report(),
         ];
@@ -320,6 +327,7 @@ impl Agv {
             }
         }
         self.shadow.take_if(|(end, _)| *end <= moment);
+        self.hidden_load = self.hidden_load.filter(|end| *end > moment);
         self.a_moment_later();
         self.resume_if_due();
         self.attempt_connection();
