@@ -18,8 +18,9 @@ pub(super) const ONLINE_AFTER_CONNECT: Check = Check {
     name: "connection/online-after-connect",
     decides: &["CONN-05", "CONN-11"],
     doc: "A connection on which states are published is announced with ONLINE, within time.react of the first state; \
-          later than the first state is a warning. While states arrive, CONNECTIONBROKEN or OFFLINE does not stay the \
-          last word for longer than time.react.",
+          later than the first state is a warning. ONLINE may be sent before the broker has accepted the connection. \
+          While states arrive, CONNECTIONBROKEN or OFFLINE does not stay the last word for longer than time.react: of \
+          a state and an ONLINE sent before it, either may arrive first, so the time counts from the first state.",
     arguments: &[],
     start: |_| Box::new(OnlineAfterConnect::default()),
 };
@@ -42,7 +43,7 @@ struct OnlineAfterConnect {
     stale: Option<Stale>,
 }
 
-/// One accepted connection at the tap.
+/// One connection at the tap. A client may publish as soon as it has asked for it.
 struct Session {
     connection: u64,
     accepted: bool,
@@ -53,7 +54,8 @@ struct Session {
 
 /// The last connection message says that the device is gone.
 struct Stale {
-    since: Moment,
+    /// The first state that came all the same.
+    since: Option<Moment>,
     said: &'static str,
     reported: bool,
 }
@@ -63,22 +65,39 @@ impl OnlineAfterConnect {
         context.time("react").unwrap_or(Duration::from_secs(31))
     }
 
+    /// The session of a connection, begun if it is new.
+    fn session(&mut self, connection: u64) -> &mut Session {
+        let known = self.open.iter().position(|session| session.connection == connection);
+        let at = known.unwrap_or_else(|| {
+            if self.open.len() == CONNECTIONS {
+                self.open.pop_front();
+            }
+            self.open.push_back(Session {
+                connection,
+                accepted: false,
+                online: false,
+                first_state: None,
+                late: false,
+            });
+            self.open.len() - 1
+        });
+        &mut self.open[at]
+    }
+
     fn packets(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         match entry.event() {
             Event::Packet {
                 connection,
+                packet: Packet::Connect { .. },
+            } => {
+                self.session(*connection);
+                return false;
+            }
+            Event::Packet {
+                connection,
                 packet: Packet::Connack { code: 0, .. },
             } => {
-                if self.open.len() == CONNECTIONS {
-                    self.open.pop_front();
-                }
-                self.open.push_back(Session {
-                    connection: *connection,
-                    accepted: true,
-                    online: false,
-                    first_state: None,
-                    late: false,
-                });
+                self.session(*connection).accepted = true;
                 return false;
             }
             Event::Closed { connection, .. }
@@ -144,7 +163,7 @@ impl OnlineAfterConnect {
         if self.traffic.disturbed || matches!(entry.event(), Event::Fault { .. }) {
             // What the harness did to the link is not the device's fault; its time counts from the repair.
             if let Some(stale) = &mut self.stale {
-                stale.since = entry.at().moment;
+                stale.since = None;
             }
         }
         let Some(message) = self.traffic.delivered(entry, context) else {
@@ -159,7 +178,7 @@ impl OnlineAfterConnect {
                     _ => None,
                 };
                 self.stale = said.map(|said| Stale {
-                    since: entry.at().moment,
+                    since: None,
                     said,
                     reported: false,
                 });
@@ -169,7 +188,8 @@ impl OnlineAfterConnect {
                 let Some(stale) = self.stale.as_mut().filter(|stale| !stale.reported) else {
                     return;
                 };
-                if entry.at().moment.since(stale.since) > limit {
+                let now = entry.at().moment;
+                if now.since(*stale.since.get_or_insert(now)) > limit {
                     stale.reported = true;
                     let words = format!("states arrive, but the last word on connection is still {}", stale.said);
                     findings.push(broken("CONN-11", entry.seq(), words));
@@ -301,6 +321,30 @@ mod tests {
         assert!(trace.judge(CHECK).findings.is_empty());
         trace.wait(27.0).state(&json!({})).wait(27.0).state(&json!({}));
         assert_eq!(trace.judge(CHECK).summary(), ["CONN-11"]);
+    }
+
+    #[test]
+    fn online_may_be_sent_before_the_broker_has_accepted() {
+        let mut trace = Trace::tap();
+        let will = trace.will();
+        trace
+            .asks(1, Some(will), 15, 4)
+            .publish(1, "connection", 1, true, &online())
+            .accepted(1)
+            .publish(1, "state", 0, false, &json!({}))
+            .wait(60.0)
+            .publish(1, "state", 0, false, &json!({}));
+        let outcome = trace.judge(CHECK);
+        assert!(outcome.findings.is_empty());
+        assert_eq!(outcome.judged, 1);
+    }
+
+    #[test]
+    fn a_state_that_overtakes_the_online_sent_before_it_proves_nothing() {
+        let mut trace = Trace::subscriber();
+        trace.connection("CONNECTIONBROKEN").wait(90.0).state(&json!({}));
+        trace.connection("ONLINE").wait(60.0).state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
     }
 
     #[test]

@@ -2,25 +2,35 @@
 //!
 //! That they are present and of the right type is left to `message/schema`, counting to `header/id-rises`.
 
+use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use std::time::Duration;
 
 use regex::Regex;
 
-use super::traffic::{Traffic, broken, quote, remark, says_broken};
+use super::traffic::{Traffic, broken, quote, remark, says_broken, show};
 use super::{Check, CheckContext, CheckFinding, Running};
+use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::pack::Role;
 
 /// How far the clock of a device may be off before it is remarked on.
 const CLOCK_TOLERANCE: Duration = Duration::from_secs(300);
 
+/// So long a time may be the same in all messages of a topic.
+const STANDING: Duration = Duration::from_secs(5);
+/// Time zones are whole half hours apart, but for a few; a clock is right to so many seconds.
+const HALF_HOUR: u64 = 1800;
+const ROUGHLY: u64 = 20;
+
 /// `header/timestamp`.
 pub(super) const TIMESTAMP: Check = Check {
     name: "header/timestamp",
     decides: &["HDR-03"],
     doc: "timestamp is a point in time in UTC, written with T and Z. Another number of fraction digits than two is a \
-          warning, as is a clock more than five minutes away from the harness's; the will is not held to the clock.",
+          warning, as is a clock more than five minutes away from the harness's; the will is not held to the clock. \
+          Message after message at whole half hours from the clock of the harness is local time, and a time that does \
+          not change from message to message of a topic is none.",
     arguments: &[],
     start: |_| Box::new(Timestamp::default()),
 };
@@ -52,6 +62,53 @@ static TIMESTAMP_FORM: LazyLock<Option<Regex>> =
 #[derive(Default)]
 struct Timestamp {
     traffic: Traffic,
+    /// By topic: the last time written, since when, in how many messages, and the last headerId.
+    written: BTreeMap<String, Stood>,
+    /// How many messages in a row were whole half hours off.
+    local: u32,
+}
+
+/// A time that is written again and again.
+struct Stood {
+    text: String,
+    since: Moment,
+    messages: u32,
+    id: Option<u64>,
+}
+
+impl Timestamp {
+    /// Whether the time of this topic stands still: three messages of different number over more than five seconds.
+    fn stands_still(&mut self, topic: &str, written: &str, id: Option<u64>, now: Moment) -> bool {
+        let fresh = || Stood {
+            text: written.chars().take(64).collect(),
+            since: now,
+            messages: 1,
+            id,
+        };
+        let stood = self.written.entry(topic.to_owned()).or_insert_with(fresh);
+        if stood.text != written {
+            *stood = fresh();
+            return false;
+        }
+        if id.is_none() || id != stood.id {
+            stood.messages += 1;
+            stood.id = id;
+        }
+        stood.messages == 3 && {
+            let still = now.since(stood.since) > STANDING;
+            // Not yet long enough: the next message will tell.
+            stood.messages -= u32::from(!still);
+            still
+        }
+    }
+
+    /// Whether this is the third message in a row that is whole half hours off.
+    fn is_local(&mut self, apart: Duration) -> bool {
+        let off = apart.as_secs() % HALF_HOUR;
+        let whole = apart > CLOCK_TOLERANCE && (off <= ROUGHLY || off >= HALF_HOUR - ROUGHLY);
+        self.local = if whole { self.local + 1 } else { 0 };
+        self.local == 3
+    }
 }
 
 impl Running for Timestamp {
@@ -61,8 +118,13 @@ impl Running for Timestamp {
             return false;
         };
         let Some(value) = entry.json() else { return false };
-        let Some(written) = value.get("timestamp").and_then(|written| written.as_str()) else {
+        let Some(written) = value.get("timestamp") else {
             return false;
+        };
+        let Some(written) = written.as_str() else {
+            let text = format!("timestamp {} on {} is no time in UTC", show(written), message.name);
+            findings.push(broken("HDR-03", entry.seq(), text));
+            return true;
         };
         let form = TIMESTAMP_FORM.as_ref().and_then(|form| form.captures(written));
         let (Some(form), Ok(time)) = (form, written.parse::<jiff::Timestamp>()) else {
@@ -78,7 +140,21 @@ impl Running for Timestamp {
         let apart = time.duration_since(entry.at().utc).unsigned_abs();
         // The broker sends the will long after it was written.
         let will = message.name == "connection" && says_broken(value);
-        if apart > CLOCK_TOLERANCE && !will {
+        if will {
+            return true;
+        }
+        let id = value.get("headerId").and_then(serde_json::Value::as_u64);
+        if self.stands_still(message.name, written, id, entry.at().moment) {
+            let text = format!("timestamp {} stands still on {}", quote(written), message.name);
+            findings.push(broken("HDR-03", entry.seq(), text));
+        }
+        if self.is_local(apart) {
+            let text = format!(
+                "timestamp {} and those before it are whole half hours away from UTC: local time with a Z",
+                quote(written)
+            );
+            findings.push(broken("HDR-03", entry.seq(), text));
+        } else if apart > CLOCK_TOLERANCE {
             let text = format!(
                 "timestamp {} is {} s away from the clock of the harness",
                 quote(written),
@@ -253,6 +329,26 @@ mod tests {
         assert_eq!(timestamps(&["2026-01-01T12:00:00.000Z"]), ["HDR-03 warning"]);
         assert_eq!(timestamps(&["2026-01-01T12:00:00Z"]), ["HDR-03 warning"]);
         assert_eq!(timestamps(&["2026-01-01T13:00:00.00Z"]), ["HDR-03 warning"]);
+    }
+
+    #[test]
+    fn a_time_that_stands_still_and_local_time_with_a_z_are_found() {
+        let mut trace = Trace::subscriber();
+        for _ in 0..4 {
+            trace
+                .state(&json!({ "timestamp": "2026-01-01T12:00:00.00Z" }))
+                .wait(4.0);
+        }
+        assert_eq!(trace.judge("header/timestamp").summary(), ["HDR-03"]);
+        let mut trace = Trace::subscriber();
+        for second in 0..3 {
+            let local = format!("2026-01-01T13:00:0{second}.00Z");
+            trace.state(&json!({ "timestamp": local })).wait(1.0);
+        }
+        assert_eq!(
+            trace.judge("header/timestamp").summary(),
+            ["HDR-03 warning", "HDR-03 warning", "HDR-03"]
+        );
     }
 
     #[test]

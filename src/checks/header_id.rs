@@ -17,7 +17,8 @@ pub(super) const ID_RISES: Check = Check {
     name: "header/id-rises",
     decides: &["HDR-02"],
     doc: "headerId is a whole number from 0 to 4294967295 that rises by one with each message of a topic. Any start \
-          value and a restart of the count after a new connection are accepted; the last will is exempt. At the tap \
+          value and a restart of the count after a new connection are accepted, but one after a link that only the \
+          harness has broken is a warning; the last will is exempt. At the tap \
           the PUBLISH packets count; a subscriber cannot tell a gap from a lost message, which is inconclusive.",
     arguments: &[],
     start: |_| Box::new(IdRises::default()),
@@ -31,6 +32,8 @@ struct IdRises {
     traffic: Traffic,
     /// The last id per topic name; there are only a handful of names.
     last: BTreeMap<String, u32>,
+    /// The last ids before a link that only the harness has broken.
+    before_cut: BTreeMap<String, u32>,
 }
 
 impl Running for IdRises {
@@ -42,11 +45,14 @@ impl Running for IdRises {
                 packet: Packet::Connect { .. },
                 ..
             } => self.last.clear(),
+            // The process goes on when the harness breaks its link, and so may its count.
+            Event::Fault { .. } => self.before_cut.append(&mut self.last),
             // What makes a master control act does not restart it.
             Event::Hook { hook, .. } if context.role == Role::MasterControl && !RESTARTS.contains(&hook.as_str()) => {}
             // Messages may be lost on the way while the harness plays with the link or somebody with the device.
-            Event::Fault { .. } | Event::Hook { .. } | Event::Answer { .. } | Event::Undecodable { .. } => {
+            Event::Hook { .. } | Event::Answer { .. } | Event::Undecodable { .. } => {
                 self.last.clear();
+                self.before_cut.clear();
             }
             _ => {}
         }
@@ -71,6 +77,13 @@ impl Running for IdRises {
             self.last.remove(message.name);
             return true;
         };
+        if let Some(before) = self.before_cut.remove(message.name).filter(|before| id < *before) {
+            let text = format!(
+                "headerId {id} on {} follows {before}: a link that was only broken lets the count begin anew",
+                message.name
+            );
+            findings.push(remark("HDR-02", entry.seq(), text));
+        }
         let before = self.last.insert(message.name.to_owned(), id);
         let Some(before) = before else { return true };
         let expected = before.wrapping_add(1);

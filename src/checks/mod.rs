@@ -10,7 +10,9 @@
 mod blocking;
 mod commands;
 mod connection;
+mod connection_crash;
 mod errors;
+mod errors_event;
 mod errors_ready;
 mod factsheet;
 mod factsheet_actions;
@@ -24,20 +26,24 @@ mod orders;
 mod state_actions;
 mod state_battery;
 mod state_bursts;
+mod state_driving;
 mod state_maps;
 mod state_order;
 mod state_paused;
 mod state_period;
+mod state_place;
 mod state_predefined;
 mod state_route;
 mod state_triggers;
 mod state_values;
 mod topic;
+mod topic_heard;
 #[cfg(test)]
 mod trace;
 mod traffic;
 mod trajectory;
 mod visualization;
+mod visualization_pose;
 
 use std::cell::RefCell;
 use std::time::Duration;
@@ -159,10 +165,12 @@ static REGISTRY: &[Check] = &[
     topic::NAMES,
     topic::STRUCTURE,
     topic::OWN_SIDE,
+    topic_heard::HEARD,
     mqtt::QUALITY,
     mqtt::CONNECT,
     connection::ONLINE_AFTER_CONNECT,
     connection::VALUES,
+    connection_crash::STAYS,
     state_period::PERIOD,
     state_period::OWN_LIMITS,
     state_bursts::BURSTS,
@@ -176,19 +184,23 @@ static REGISTRY: &[Check] = &[
     state_triggers::TRIGGERS,
     blocking::BLOCKING,
     state_paused::PAUSED,
+    state_place::LAST_NODE_PLACE,
     state_values::IDLE_EMPTY,
     state_maps::MAPS,
     state_values::POSITION_RANGE,
     state_values::IDENTIFIERS,
-    state_values::DRIVING,
+    state_driving::DRIVING,
+    state_driving::POSITION_MOVES,
     trajectory::TRAJECTORY,
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
     state_battery::LEVELS,
     visualization::RATE,
     visualization::PUBLISHED,
+    visualization_pose::POSITION,
     errors::PERSIST,
     errors_ready::READY,
+    errors_event::ON_EVENT,
     factsheet::CONSISTENCY,
     factsheet_actions::PREDEFINED,
     motion::EDGE_SPEED,
@@ -243,6 +255,10 @@ static REGISTRY: &[Check] = &[
     commands::DUPLICATES,
     commands::MODES,
     commands::NOT_ASKED,
+    commands::FIRST_PLACE,
+    commands::HEALTH,
+    commands::ALIVE,
+    commands::LISTENS,
 ];
 
 #[cfg(test)]

@@ -19,7 +19,8 @@ pub(super) const QUALITY: Check = Check {
     name: "mqtt/quality",
     decides: &["MQTT-06", "MQTT-07", "MQTT-08", "CONN-06", "FACT-01"],
     doc: "order, instantActions, state, visualization and factsheet are published with QoS 0 (higher is harmless, a warning), connection \
-          with QoS 1 (2 is a warning); connection and factsheet with RETAIN, which only the tap can see here.",
+          with QoS 1 (2 is a warning); connection and factsheet with RETAIN, which only the tap can see here, order and \
+          instantActions without it (with it is a warning).",
     arguments: &[],
     start: |_| Box::new(Quality::default()),
 };
@@ -59,6 +60,10 @@ impl Running for Quality {
             }
             ("connection", 2..) => findings.push(remark("MQTT-08", seq, text)),
             _ => {}
+        }
+        if message.retain == Some(true) && matches!(name, "order" | "instantActions") {
+            let text = format!("{name} is published with RETAIN: whoever subscribes later gets it, too");
+            findings.push(remark("MQTT-06", seq, text));
         }
         if message.retain == Some(false) {
             let id = match name {

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use serde_json::Value;
 
 use super::CheckContext;
-use super::traffic::{elements, text, to_vehicle};
+use super::traffic::{elements, is_to_vehicle, text, to_vehicle};
 use crate::journal::Entry;
 
 /// How many order messages are kept, and how many elements each may have.
@@ -205,6 +205,72 @@ impl Orders {
     }
 }
 
+/// The malformed orders of the harness, which no vehicle should take over.
+///
+/// One that does so breaks the refusal alone: what its states show from then on is what we told it.
+#[derive(Debug, Default)]
+pub(super) struct Malformed {
+    /// orderId, empty where it cannot be read, and orderUpdateId, where it can be.
+    malformed: VecDeque<(String, Option<u64>)>,
+    /// The same of the other orders.
+    good: VecDeque<(String, u64)>,
+    /// No good order has been shown since one that does not even have a name.
+    nameless: bool,
+}
+
+impl Malformed {
+    /// Learns from an entry.
+    pub fn note(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        let Some(message) = to_vehicle("order", entry, context) else {
+            return;
+        };
+        let good = !Self::is_malformed(entry, context);
+        match SentOrder::read(message).filter(|_| good) {
+            Some(sent) => {
+                self.good.push_back((sent.order, sent.update));
+                let excess = self.good.len().saturating_sub(MESSAGES);
+                self.good.drain(..excess);
+            }
+            None => {
+                let name: String = text(message, "orderId").chars().take(512).collect();
+                self.nameless |= name.is_empty();
+                self.malformed.push_back((name, number(message, "orderUpdateId")));
+                let excess = self.malformed.len().saturating_sub(MESSAGES);
+                self.malformed.drain(..excess);
+            }
+        }
+    }
+
+    /// Whether a message on its way to the vehicle is an order that no vehicle should take over.
+    pub fn is_malformed(entry: &Entry, context: &CheckContext<'_>) -> bool {
+        let Some(message) = to_vehicle("order", entry, context) else {
+            return is_to_vehicle("order", entry, context);
+        };
+        let schema = context.pack.schema("order");
+        let obeys = schema.is_none_or(|schema| schema.findings(message).is_empty());
+        !obeys || SentOrder::read(message).is_none_or(|sent| !sent.sound || sent.order.is_empty())
+    }
+
+    /// Whether a state shows a malformed order, taken over as if it were none.
+    pub fn is_shown_in(&mut self, state: &Value) -> bool {
+        if self.malformed.is_empty() {
+            return false;
+        }
+        let (order, update) = (text(state, "orderId"), number(state, "orderUpdateId"));
+        let good = self.good.iter();
+        if !order.is_empty() && good.clone().any(|(id, number)| id == order && Some(*number) == update) {
+            // The one that came last is what the vehicle holds, unless it goes by no name at all.
+            self.nameless &= self
+                .good
+                .back()
+                .is_none_or(|(id, number)| id != order || Some(*number) != update);
+            return false;
+        }
+        let same = |(id, number): &(String, Option<u64>)| id == order && (number.is_none() || *number == update);
+        self.nameless && order.is_empty() || self.malformed.iter().any(same)
+    }
+}
+
 /// Where a state says the vehicle was last: node and sequenceId.
 pub(super) fn last_node(state: &Value) -> Option<(String, u64)> {
     let node = state.get("lastNodeId")?.as_str()?;
@@ -212,13 +278,13 @@ pub(super) fn last_node(state: &Value) -> Option<(String, u64)> {
 }
 
 /// Whether a state reports something that may end an order without a word: another operating mode than the
-/// automatic ones, an emergency stop, a fatal error, or a failed action.
+/// automatic ones, an emergency stop (a word that is none of the standard is neither, and a finding of its own), a fatal error, or a failed action.
 pub(super) fn may_abandon(state: &Value) -> bool {
-    let automatic = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
+    let manual = matches!(text(state, "operatingMode"), "MANUAL" | "SERVICE" | "TEACHIN");
     let stopped = state
         .pointer("/safetyState/eStop")
-        .is_some_and(|stop| stop.as_str() != Some("NONE"));
+        .is_some_and(|stop| matches!(stop.as_str(), Some("AUTOACK" | "MANUAL" | "REMOTE")));
     let fatal = elements(state, "errors").any(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"));
     let failed = elements(state, "actionStates").any(|action| text(action, "actionStatus") == "FAILED");
-    !automatic || stopped || fatal || failed
+    manual || stopped || fatal || failed
 }

@@ -1,24 +1,27 @@
 //! `state/paused-actions`: an action is PAUSED only while something holds the vehicle.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use serde_json::Value;
 
 use super::traffic::{Traffic, broken, elements, outside_influence, quote, state, text};
 use super::{Check, CheckContext, CheckFinding, Running};
+use crate::clock::Moment;
 use crate::journal::Entry;
 
 /// How many actions are looked at.
 const ACTIONS: usize = 256;
+/// So long what was held may take to go on.
+const GOING_ON: Duration = Duration::from_secs(2);
 
 /// See the module.
 pub(super) const PAUSED: Check = Check {
     name: "state/paused-actions",
     decides: &["ASTATE-04"],
     doc: "An action is PAUSED only while the state says why: paused, a field violation, an emergency stop, a mode in \
-          which master control is not in command, or a fatal error. Judged when two states in a row show it without \
-          any of these, since a button and a flag may be read at slightly different times, and only on vehicles that \
-          report `paused`.",
+          which master control is not in command, or a fatal error. Judged when states show it without any of these for \
+          longer than two seconds: what was held goes on in its own time. Only on vehicles that report `paused`.",
     arguments: &[],
     start: |_| Box::new(PausedActions::default()),
 };
@@ -26,8 +29,8 @@ pub(super) const PAUSED: Check = Check {
 #[derive(Default)]
 struct PausedActions {
     traffic: Traffic,
-    /// Actions the last state showed PAUSED without a reason.
-    before: BTreeSet<String>,
+    /// Actions the last state showed PAUSED without a reason, and since when.
+    before: BTreeMap<String, Moment>,
     accused: BTreeSet<String>,
 }
 
@@ -59,12 +62,14 @@ impl Running for PausedActions {
         if is_held(state) {
             return !paused.is_empty() && state.get("paused").is_some();
         }
+        let now = entry.at().moment;
         for id in paused {
-            if before.contains(id) && self.accused.len() < ACTIONS && self.accused.insert(id.to_owned()) {
+            let since = before.get(id).copied().unwrap_or(now);
+            if now.since(since) > GOING_ON && self.accused.len() < ACTIONS && self.accused.insert(id.to_owned()) {
                 let text = format!("action {} stays PAUSED, and nothing holds the vehicle", quote(id));
                 findings.push(broken("ASTATE-04", entry.seq(), text));
             }
-            self.before.insert(id.chars().take(512).collect());
+            self.before.insert(id.chars().take(512).collect(), since);
         }
         !self.before.is_empty()
     }
@@ -80,7 +85,7 @@ mod tests {
         let mut trace = Trace::subscriber();
         for state in states {
             let with = json!({ "paused": false, "actionStates": [{ "actionId": "a", "actionStatus": "PAUSED" }] });
-            trace.state(&merged(with, state));
+            trace.state(&merged(with, state)).wait(3.0);
         }
         trace.judge("state/paused-actions").summary()
     }
@@ -103,6 +108,17 @@ mod tests {
     fn a_flag_may_come_one_state_late() {
         assert!(judge(&[json!({}), json!({ "paused": true })]).is_empty());
         assert!(judge(&[json!({ "paused": true }), json!({}), json!({ "actionStates": [] })]).is_empty());
+    }
+
+    #[test]
+    fn what_was_held_may_take_a_moment_to_go_on() {
+        let mut trace = Trace::subscriber();
+        let held = json!({ "paused": false, "actionStates": [{ "actionId": "a", "actionStatus": "PAUSED" }] });
+        for _ in 0..3 {
+            trace.state(&held).wait(0.2);
+        }
+        trace.state(&json!({ "paused": false, "actionStates": [{ "actionId": "a", "actionStatus": "RUNNING" }] }));
+        assert!(trace.judge("state/paused-actions").findings.is_empty());
     }
 
     #[test]

@@ -6,11 +6,13 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::traffic::{Traffic, broken, outside_influence, remark, text};
+use super::topic::looks_like;
+use super::traffic::{Traffic, broken, device_publish, outside_influence, remark, text};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
+use crate::verdict::Verdict;
 
 /// What the transport may add to an interval of the device.
 const MARGIN: Duration = Duration::from_secs(1);
@@ -42,6 +44,8 @@ struct Period {
     /// Last state, or the moment from which one was due: time and entry.
     since: Option<(Moment, u64)>,
     remarked: Option<u64>,
+    /// How long the harness was held up since then.
+    lag: Duration,
     /// `defaultStateInterval`, once a factsheet came.
     own: Option<Duration>,
 }
@@ -52,9 +56,18 @@ impl Period {
         let gap = now.since(since);
         let limit = context.time("statePeriod").unwrap_or(Duration::from_secs(31));
         let seconds = gap.as_secs_f64();
-        if gap > limit {
+        let net = gap.saturating_sub(self.lag);
+        if gap > limit && net <= limit {
+            let mut finding = remark(
+                "STATE-02",
+                seq,
+                format!("no state for {seconds:.1} s, but the harness itself was held up"),
+            );
+            finding.verdict = Some(Verdict::Inconclusive);
+            findings.push(finding);
+        } else if gap > limit {
             findings.push(broken("STATE-02", seq, format!("no state for {seconds:.1} s")));
-        } else if let Some(own) = self.own.filter(|own| gap > *own + MARGIN) {
+        } else if let Some(own) = self.own.filter(|own| net > *own + MARGIN) {
             let text = format!(
                 "no state for {seconds:.1} s, although the factsheet says every {:.1} s",
                 own.as_secs_f64()
@@ -80,8 +93,16 @@ impl Running for Period {
                 packet: Packet::Connack { code: 0, .. },
                 ..
             } if !self.traffic.disturbed => self.since = Some(now),
+            Event::Lag { micros, .. } => self.lag += Duration::from_micros(*micros),
             _ if outside_influence(entry) => self.since = None,
             _ => {}
+        }
+        if let Some((_, topic, ..)) = device_publish(entry)
+            && context.topic_name(topic).is_none()
+            && entry.json().and_then(looks_like) == Some("state")
+        {
+            // States do come. That they come elsewhere is one mistake, which `topic/names` names.
+            self.since = None;
         }
         let Some(message) = self.traffic.delivered(entry, context) else {
             return false;
@@ -90,6 +111,7 @@ impl Running for Period {
             "state" => {
                 let judged = !self.traffic.disturbed && self.judge(now.0, now.1, context, findings);
                 self.since = (!self.traffic.disturbed).then_some(now);
+                self.lag = Duration::ZERO;
                 judged
             }
             "connection" => {

@@ -1,5 +1,4 @@
-//! `state/idle-empty`, `state/position-range`, `state/identifiers`, `state/driving`: values of a single state,
-//! and of a state and the next one.
+//! `state/idle-empty`, `state/position-range`, `state/identifiers`: values of a single state.
 //!
 //! Types and enumerations are left to `message/schema`.
 
@@ -8,7 +7,8 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, quote, remark, show, state, text};
+use super::orders::Malformed;
+use super::traffic::{Traffic, broken, elements, quote, remark, state, text};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -16,8 +16,6 @@ use crate::journal::Entry;
 const FAR: f64 = 1.0e6;
 /// What rounding may add to pi.
 const ROUNDING: f64 = 1.0e-3;
-/// Faster than this in a state without `driving` is no measuring noise, in metres and radians per second.
-const MOVING: f64 = 0.2;
 /// How many odd identifiers are remembered.
 const IDENTIFIERS_KEPT: usize = 256;
 
@@ -26,7 +24,7 @@ pub(super) const IDLE_EMPTY: Check = Check {
     name: "state/idle-empty",
     decides: &["STATE-13", "STATE-MSG-02"],
     doc: "While there never was an order, nodeStates and edgeStates are empty and orderUpdateId is 0; without \
-          nodeStates there are no edgeStates.",
+          nodeStates there are no edgeStates. What a malformed order of the harness left in a vehicle is not judged.",
     arguments: &[],
     start: |_| Box::new(IdleEmpty::default()),
 };
@@ -49,25 +47,17 @@ pub(super) const IDENTIFIERS: Check = Check {
     start: |_| Box::new(Identifiers::default()),
 };
 
-/// `state/driving`.
-pub(super) const DRIVING: Check = Check {
-    name: "state/driving",
-    decides: &["STATE-MSG-08"],
-    doc: "A state that reports a velocity well above zero reports driving true. Judged only when two states in a row \
-          say the same, since velocity and flag may be taken at slightly different times.",
-    arguments: &[],
-    start: |_| Box::new(Driving::default()),
-};
-
 #[derive(Default)]
 struct IdleEmpty {
     traffic: Traffic,
+    malformed: Malformed,
 }
 
 impl Running for IdleEmpty {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
-        let Some(state) = state(self.traffic, entry, context) else {
+        self.malformed.note(entry, context);
+        let Some(state) = state(self.traffic, entry, context).filter(|state| !self.malformed.is_shown_in(state)) else {
             return false;
         };
         let count = |name| elements(state, name).count();
@@ -168,33 +158,6 @@ impl Running for Identifiers {
     }
 }
 
-#[derive(Default)]
-struct Driving {
-    traffic: Traffic,
-    suspicious: bool,
-}
-
-impl Running for Driving {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(state) = state(self.traffic, entry, context) else {
-            return false;
-        };
-        let Some(velocity) = state.get("velocity") else {
-            return false;
-        };
-        let speed = |name| velocity.get(name).and_then(Value::as_f64).unwrap_or_default().abs();
-        let moving = ["vx", "vy", "omega"].into_iter().any(|name| speed(name) > MOVING);
-        let suspicious = moving && state.get("driving") == Some(&Value::Bool(false));
-        if suspicious && self.suspicious {
-            let text = format!("driving is false at velocity {}", show(velocity));
-            findings.push(broken("STATE-MSG-08", entry.seq(), text));
-        }
-        self.suspicious = suspicious;
-        true
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use serde_json::{Value, json};
@@ -232,6 +195,23 @@ mod tests {
     }
 
     #[test]
+    fn what_a_malformed_order_left_is_not_judged() {
+        let mut trace = Trace::subscriber();
+        let left = json!({ "nodeStates": [{}], "orderUpdateId": 3 });
+        trace
+            .state(&json!({}))
+            .sent("order", &json!({ "orderUpdateId": 3, "nodes": [{}], "edges": [] }));
+        trace.state(&left);
+        assert!(trace.judge("state/idle-empty").findings.is_empty());
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&json!({}))
+            .sent("order", &json!({ "orderId": "bad", "orderUpdateId": 0, "nodes": [] }));
+        trace.state(&left);
+        assert_eq!(trace.judge("state/idle-empty").summary(), ["STATE-13", "STATE-MSG-02"]);
+    }
+
+    #[test]
     fn radians_and_metres_are_told_from_degrees_and_millimetres() {
         let position = |x: f64, theta: f64| json!({ "agvPosition": { "x": x, "theta": theta } });
         assert!(judged("state/position-range", &[position(-350.0, -std::f64::consts::PI)]).is_empty());
@@ -247,14 +227,5 @@ mod tests {
         let odd = json!({ "lastNodeId": "knoten 1", "maps": [{ "mapId": "hall-1.b:2_x" }] });
         assert_eq!(judged("state/identifiers", &[odd.clone(), odd]), ["JSON-04 warning"]);
         assert!(judged("state/identifiers", &[json!({})]).is_empty());
-    }
-
-    #[test]
-    fn moving_without_driving_is_found_when_it_lasts() {
-        let moving = json!({ "velocity": { "vx": 0.8, "vy": 0.0, "omega": 0.0 } });
-        let driving = json!({ "driving": true, "velocity": { "vx": 0.8, "vy": 0.0, "omega": 0.0 } });
-        let creeping = json!({ "velocity": { "vx": 0.01, "vy": 0.0, "omega": 0.0 } });
-        assert!(judged("state/driving", &[moving.clone(), driving, moving.clone(), creeping]).is_empty());
-        assert_eq!(judged("state/driving", &[moving.clone(), moving]), ["STATE-MSG-08"]);
     }
 }

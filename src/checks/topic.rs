@@ -2,11 +2,15 @@
 //!
 //! QoS and RETAIN are left to `mqtt`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use serde_json::Value;
 
 use super::header::serial_character;
 use super::traffic::{Traffic, broken, device_publish, quote, remark};
 use super::{Check, CheckContext, CheckFinding, Running};
+use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
 use crate::pack::Role;
@@ -17,9 +21,10 @@ const TOPICS: usize = 64;
 /// `topic/names`.
 pub(super) const NAMES: Check = Check {
     name: "topic/names",
-    decides: &["TOPIC-01"],
+    decides: &["TOPIC-01", "TOPIC-02", "TOPIC-03"],
     doc: "The last level of a protocol topic is spelled exactly as defined. Topics whose last level is no variant of \
-          a defined name are the vendor's own and not judged.",
+          a defined name are the vendor's own and not judged, unless what belongs on a defined one is published there \
+          and, for thirty seconds, never where it belongs. Where only the levels before the name differ, that is a warning.",
     arguments: &[],
     start: |_| Box::new(Names::default()),
 };
@@ -58,11 +63,86 @@ impl Seen {
 struct Names {
     traffic: Traffic,
     seen: Seen,
+    /// Names of topics the device has published on as it must.
+    proper: BTreeSet<String>,
+    /// What looks like a message of ours on a topic of another name: by name, where, entry, time, and how often.
+    astray: BTreeMap<&'static str, (String, u64, Moment, u32)>,
+}
+
+/// Members that tell a message of a vehicle wherever it is published.
+const LOOKS: [(&str, [&str; 2]); 3] = [
+    ("state", ["actionStates", "operatingMode"]),
+    ("factsheet", ["typeSpecification", "protocolLimits"]),
+    ("connection", ["connectionState", "headerId"]),
+];
+/// So long a device may publish elsewhere before it does on the topic of the name.
+const ELSEWHERE: Duration = Duration::from_secs(30);
+
+/// The name of the topic on which such a message belongs.
+pub(super) fn looks_like(message: &Value) -> Option<&'static str> {
+    let mut looks = LOOKS.into_iter();
+    looks
+        .find(|(_, members)| members.iter().all(|member| message.get(member).is_some()))
+        .map(|(name, _)| name)
+}
+
+impl Names {
+    /// Notes where the device publishes what.
+    fn note(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
+        if context.role != Role::Agv || topic.len() > 1024 {
+            return;
+        }
+        if let Some(name) = context.topic_name(topic) {
+            self.proper.insert(name.to_owned());
+            return;
+        }
+        let Some(name) = entry.json().and_then(looks_like) else {
+            return;
+        };
+        let first = || (topic.to_owned(), entry.seq(), entry.at().moment, 0);
+        self.astray.entry(name).or_insert_with(first).3 += 1;
+    }
+
+    /// Messages that come on another topic, and never on their own.
+    fn astray(&mut self, now: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        let due: Vec<&'static str> = self
+            .astray
+            .iter()
+            .filter(|(name, (_, _, since, _))| !self.proper.contains(**name) && now.since(*since) > ELSEWHERE)
+            .map(|(name, _)| *name)
+            .collect();
+        for name in due {
+            let Some((topic, seq, _, times)) = self.astray.remove(name) else {
+                continue;
+            };
+            let Some(usual) = context
+                .topics
+                .get(name)
+                .filter(|_| times > 0 && self.seen.first(&topic))
+            else {
+                continue;
+            };
+            let text = format!("{name} is published on {} and never on {}", quote(&topic), quote(usual));
+            let level = |of: &str, at: usize| of.split('/').nth(at).map(str::to_owned);
+            findings.push(if topic.rsplit('/').next() != Some(name) {
+                broken("TOPIC-01", seq, text)
+            } else if level(&topic, 1) != level(usual, 1) {
+                remark("TOPIC-03", seq, text)
+            } else {
+                remark("TOPIC-02", seq, text)
+            });
+        }
+    }
 }
 
 impl Running for Names {
+    fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        self.astray(end, context, findings);
+    }
+
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
+        self.astray(entry.at().moment, context, findings);
         let topic = match entry.event() {
             Event::Message {
                 topic, retain: false, ..
@@ -72,6 +152,7 @@ impl Running for Names {
                 None => return false,
             },
         };
+        self.note(topic, entry, context);
         if context.topic_name(topic).is_some() {
             return true;
         }
@@ -284,6 +365,47 @@ mod tests {
         assert!(trace.judge("topic/names").findings.is_empty());
         let own = at_tap("acme/diagnostics").judge("topic/names");
         assert!(own.findings.is_empty() && own.judged == 0);
+    }
+
+    #[test]
+    fn messages_on_another_topic_are_found_when_they_never_come_on_their_own() {
+        let state = json!({ "actionStates": [], "operatingMode": "AUTOMATIC" });
+        let mut trace = Trace::tap();
+        trace
+            .publish(1, "states", 0, false, &state)
+            .wait(40.0)
+            .publish(1, "states", 0, false, &state);
+        assert_eq!(trace.judge("topic/names").summary(), ["TOPIC-01"]);
+        assert!(trace.judge("state/period").findings.is_empty(), "states do come");
+        trace.publish(1, "state", 0, false, &state);
+        let mut copied = Trace::tap();
+        copied
+            .publish(1, "state", 0, false, &state)
+            .publish(1, "states", 0, false, &state)
+            .wait(40.0);
+        assert!(copied.judge("topic/names").findings.is_empty(), "a copy for others");
+        let mut other = Trace::tap();
+        let (own, minor) = (other.prefix.clone(), other.prefix.replacen("/v", "/v1.", 1));
+        other.prefix = minor;
+        let topic = other.topic("state");
+        other.prefix = own;
+        let payload = crate::journal::Payload::keep(bytes::Bytes::from(state.to_string().into_bytes()));
+        let packet = Packet::Publish {
+            topic,
+            qos: 0,
+            retain: false,
+            dup: false,
+            packet_id: None,
+            payload,
+        };
+        other
+            .add(
+                Source::Tap,
+                Some(Direction::FromDevice),
+                Event::Packet { connection: 1, packet },
+            )
+            .wait(40.0);
+        assert_eq!(other.judge("topic/names").summary(), ["TOPIC-03 warning"]);
     }
 
     #[test]

@@ -215,6 +215,11 @@ impl Trace {
 
     /// The device opens connection `number` and is accepted.
     pub fn connect(&mut self, number: u64, will: Option<Will>, keep_alive: u16, level: u8) -> &mut Self {
+        self.asks(number, will, keep_alive, level).accepted(number)
+    }
+
+    /// The device opens connection `number`, and has not been answered yet.
+    pub fn asks(&mut self, number: u64, will: Option<Will>, keep_alive: u16, level: u8) -> &mut Self {
         let event = Event::Opened {
             connection: number,
             peer: "peer".into(),
@@ -229,7 +234,11 @@ impl Trace {
             has_password: false,
             will,
         };
-        self.packet(number, Direction::FromDevice, connect);
+        self.packet(number, Direction::FromDevice, connect)
+    }
+
+    /// The broker accepts connection `number`.
+    pub fn accepted(&mut self, number: u64) -> &mut Self {
         let accepted = Packet::Connack {
             code: 0,
             session_present: false,
@@ -309,7 +318,8 @@ impl Trace {
         .into_iter()
         .map(|name| (name.to_owned(), self.topic(name)))
         .collect();
-        let Value::Object(bindings) = json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000 } })
+        let Value::Object(bindings) =
+            json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000, "notice": 1_000 } })
         else {
             unreachable!()
         };

@@ -74,8 +74,11 @@ pub(super) fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
         // As most of them do; what is not seen then is inconclusive.
         all.entry("extends-base".to_owned()).or_insert(true);
     }
+    // A sample action that is not named is not one that the device does not have.
     for kind in SAMPLE_ACTIONS.iter().filter(|kind| kind.place == Place::Anywhere) {
-        all.insert(kind.name.to_owned(), device.sample_actions.0.contains_key(kind.name));
+        if device.sample_actions.0.contains_key(kind.name) {
+            all.insert(kind.name.to_owned(), true);
+        }
     }
     all
 }
@@ -94,6 +97,7 @@ pub(super) fn claims(device: &profile::Device) -> BTreeMap<String, bool> {
         Claim::Limit { name, value } => (format!("limit {name}"), *value > 0),
         Claim::Statement(name) => (name.clone(), true),
         Claim::NoStatement(name) => (name.clone(), false),
+        Claim::NoHook(name) => (format!("hook {name}"), false),
     };
     device.claims.iter().map(one).collect()
 }

@@ -111,7 +111,13 @@ fn tests(library: &Library, pack: &Pack, role: Role) -> String {
     let all = library.tests(role, &pack.id);
     let mut text = String::new();
     let mut group = "";
+    let mut table = "";
     for test in &all {
+        // The cases that come from a schema are listed as one.
+        if test.drawn.is_some() && test.table() == table {
+            continue;
+        }
+        table = test.table();
         if test.group != group {
             group = &test.group;
             let _ = writeln!(text, "{}{role}: {group}", if text.is_empty() { "" } else { "\n" });
@@ -133,14 +139,28 @@ fn tests(library: &Library, pack: &Pack, role: Role) -> String {
         } else {
             format!("  ({})", notes.join(", "))
         };
-        let _ = writeln!(text, "  {}\n      {}{notes}", test.id, test.title);
+        let _ = writeln!(text, "  {table}\n      {}{notes}", test.title);
+        if let Some(drawn) = &test.drawn {
+            let cases = all.iter().filter(|other| other.table() == table).count();
+            let _ = writeln!(
+                text,
+                "      {cases} cases [member-way] from the schema of {}; a run takes {}, all with --thorough",
+                drawn.topic,
+                drawn.draw.min(cases)
+            );
+        }
     }
-    let moving = all.iter().filter(|test| test.moves).count();
+    let (cases, written): (Vec<_>, Vec<_>) = all.iter().partition(|test| test.drawn.is_some());
+    let moving = written.iter().filter(|test| test.moves).count();
     if !all.is_empty() {
+        let more = match cases.len() {
+            0 => String::new(),
+            cases => format!(", and {cases} cases from schemas"),
+        };
         let _ = writeln!(
             text,
-            "\n{} tests for role {role}, {moving} of them move the vehicle\n",
-            all.len()
+            "\n{} tests for role {role}, {moving} of them move the vehicle{more}\n",
+            written.len()
         );
     }
     text
@@ -292,13 +312,18 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
     let _ = writeln!(text, "decided        {}", requirement.decided.word());
     let id = requirement.id.as_str();
     let mut deciders = Vec::new();
+    let mut table = "";
     for test in &library.rules.suites.tests {
+        if test.drawn.is_some() && test.table() == table {
+            continue;
+        }
+        table = test.table();
         for step in &test.steps {
             deciders.extend(
                 step.clauses()
                     .into_iter()
                     .filter(|(other, _)| other.as_str() == id)
-                    .map(|(_, clause)| format!("{} {clause}", test.id)),
+                    .map(|(_, clause)| format!("{table} {clause}")),
             );
         }
     }
@@ -338,8 +363,19 @@ fn about_test(test: &Test, cases: usize) -> String {
         "vehicle        {}",
         if test.moves { "drives" } else { "stays where it is" }
     );
-    if cases > 1 {
-        let _ = writeln!(text, "cases          {cases}");
+    match &test.drawn {
+        Some(drawn) => {
+            let _ = writeln!(
+                text,
+                "cases          {cases}, from the schema of {}; a run takes {}, all with --thorough",
+                drawn.topic,
+                drawn.draw.min(cases)
+            );
+        }
+        None if cases > 1 => {
+            let _ = writeln!(text, "cases          {cases}");
+        }
+        None => {}
     }
     for step in &test.steps {
         for (requirement, clause) in step.clauses() {

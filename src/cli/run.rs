@@ -38,10 +38,13 @@ struct Job {
     effective: Effective,
     tests: Vec<Arc<Test>>,
     complete: bool,
+    /// Which cases that come from a schema are run.
+    draw: Option<u64>,
     output: args::OutputArgs,
     command: Vec<String>,
     run: String,
     no_motion: bool,
+    certifies: bool,
     /// How many mock AGVs there are when a master control is tested.
     vehicles: usize,
 }
@@ -69,9 +72,18 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     if tests.is_empty() {
         return Err(Problem::NothingToDo("no test was selected".to_owned()));
     }
+    let random = uuid::Uuid::new_v4();
     let run = match arguments.seed {
         Some(seed) => format!("seed{seed}"),
-        None => uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
+        None => random.simple().to_string()[..8].to_owned(),
+    };
+    // Whoever names a single case means it; the parts of one run have to draw the same.
+    let whole = arguments.thorough || arguments.tests.iter().any(|pattern| pattern.contains('['));
+    let draw = match arguments.seed {
+        _ if whole => None,
+        Some(seed) => Some(seed),
+        None if arguments.shard.is_some() || arguments.certificate => Some(1),
+        None => Some(u64::from(random.as_fields().0)),
     };
     let device = &effective.profile.device;
     let built_in =
@@ -97,6 +109,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     check_faults(role, &arguments.fault)?;
     let job = Job {
         complete: tests.len() == all.len(),
+        draw,
         library,
         pack,
         effective,
@@ -105,6 +118,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         command: std::env::args().collect(),
         run,
         no_motion: arguments.device.no_motion,
+        certifies: arguments.certifies,
         vehicles: arguments.vehicles.map_or(USUAL_FLEET, |count| count as usize),
     };
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -141,12 +155,25 @@ pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
             .hint("take it out of the section [time] of the profile, or wherever `run -v` says it comes from, or use `run`")
             .into());
     }
+    let device = &effective.profile.device;
+    let is_foreign = arguments.profile.is_some() || device.manufacturer.is_some() || device.serial_number.is_some();
+    if is_foreign && device.role == Role::Agv && !effective.profile.motion.allowed {
+        let title = "a certificate is about driving, too, and the profile does not allow motion";
+        return Err(Diagnostic::whole("certify", title)
+            .hint(
+                "set `allowed = true` in the section [motion] of the profile where the vehicle may drive, or use `run`",
+            )
+            .into());
+    }
     run_command(&args::Run {
+        certifies: true,
         device: args::DeviceArgs {
             profile: arguments.profile.clone(),
             ..args::DeviceArgs::default()
         },
         output: arguments.output.clone(),
+        thorough: arguments.thorough,
+        certificate: true,
         ..args::Run::default()
     })
 }
@@ -195,10 +222,12 @@ impl Job {
         request.faults.clone_from(&arguments.fault);
         request.tests.clone_from(&self.tests);
         request.complete = self.complete;
+        request.draw = self.draw;
         request.seed = arguments.seed.unwrap_or(1);
         request.begun = utc;
         request.run.clone_from(&self.run);
         request.command.clone_from(&self.command);
+        request.motion = self.motion();
         let mut terminal = self.screen(&device_name);
         let mut saved = |judge: &RunJudge| drop(write_result(&bundle, &judge.result()));
         let finished = run_virtually(
@@ -252,11 +281,8 @@ impl Job {
             vantage: Vantage::Tap,
             hooks: operator.hooks(),
             maps: true,
-            motion: if self.no_motion {
-                Err(NO_MOTION.to_owned())
-            } else {
-                Ok(())
-            },
+            motion: self.motion(),
+            claims_add: true,
         };
         let session = SessionParts {
             subject: device.subject().clone(),
@@ -327,10 +353,7 @@ impl Job {
             (false, false) => Err("the profile does not allow motion ([motion] allowed = true)".to_owned()),
             (false, true) => Ok(()),
         };
-        let mut limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
-        if let Err(why) = &motion {
-            limits.push(format!("No test that moves the vehicle was run: {why}."));
-        }
+        let limits: Vec<String> = profile.time.contract().iter().map(ToString::to_string).collect();
         let capabilities = Capabilities {
             factsheet: None,
             statements: statements(&profile.device),
@@ -339,6 +362,7 @@ impl Job {
             hooks: operator.hooks(),
             maps: true,
             motion,
+            claims_add: !self.certifies,
         };
         let session = SessionParts {
             subject,
@@ -373,6 +397,14 @@ impl Job {
             vehicle.config.start_node.clone_from(node);
         }
         fleet
+    }
+
+    fn motion(&self) -> Result<(), String> {
+        if self.no_motion {
+            Err(NO_MOTION.to_owned())
+        } else {
+            Ok(())
+        }
     }
 
     fn screen(&self, device: &str) -> Screen {
@@ -453,6 +485,7 @@ impl Job {
         let setup = Setup {
             tests: self.tests.clone(),
             complete: self.complete,
+            draw: self.draw,
             capabilities: session.capabilities,
             layout: session.layout,
             vehicles,

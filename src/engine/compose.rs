@@ -184,9 +184,12 @@ impl Composer {
             None => {}
             Some(Patch::Merge(term)) => json_patch::merge(&mut message, &term.bind(bindings)?),
             Some(Patch::Operations(term)) => {
-                let operations: json_patch::Patch = serde_json::from_value(term.bind(bindings)?)
-                    .map_err(|error| ComposeError::Patch(error.to_string()))?;
-                json_patch::patch(&mut message, &operations).map_err(|error| ComposeError::Patch(error.to_string()))?;
+                let Value::Array(operations) = term.bind(bindings)? else {
+                    return Err(ComposeError::Patch("it is no list of operations".to_owned()));
+                };
+                for operation in operations {
+                    operate(&mut message, operation)?;
+                }
             }
         }
         Ok(message)
@@ -250,6 +253,25 @@ impl Composer {
     }
 }
 
+/// One operation of JSON Patch, or `as-text`: the value that stands there is put in quotes.
+fn operate(message: &mut Value, operation: Value) -> Result<(), ComposeError> {
+    if operation.get("op").and_then(Value::as_str) == Some("as-text") {
+        let path = operation.get("path").and_then(Value::as_str).unwrap_or_default();
+        let place = message
+            .pointer_mut(path)
+            .ok_or_else(|| ComposeError::Patch(format!("there is nothing at {path}")))?;
+        let text = match place.take() {
+            Value::String(text) => text,
+            other => other.to_string(),
+        };
+        *place = Value::String(text);
+        return Ok(());
+    }
+    let operations = serde_json::from_value(Value::Array(vec![operation]));
+    let operations: json_patch::Patch = operations.map_err(|error| ComposeError::Patch(error.to_string()))?;
+    json_patch::patch(message, &operations).map_err(|error| ComposeError::Patch(error.to_string()))
+}
+
 /// ISO 8601 in UTC with two fraction digits (HDR-03).
 fn timestamp(now: Stamp) -> String {
     format!("{:.2}", now.utc)
@@ -259,6 +281,18 @@ fn timestamp(now: Stamp) -> String {
 mod tests {
     use super::*;
     use crate::clock::Moment;
+
+    #[test]
+    fn a_value_is_put_in_quotes_where_it_stands() {
+        let mut message = json!({ "list": [{ "a": 5, "b": true }] });
+        for path in ["/list/0/a", "/list/0/b"] {
+            operate(&mut message, json!({ "op": "as-text", "path": path })).expect("there");
+        }
+        operate(&mut message, json!({ "op": "add", "path": "/list/0/c", "value": null })).expect("there");
+        assert_eq!(message, json!({ "list": [{ "a": "5", "b": "true", "c": null }] }));
+        let nowhere = operate(&mut message, json!({ "op": "as-text", "path": "/list/1" }));
+        assert!(nowhere.is_err());
+    }
 
     #[test]
     fn the_timestamp_has_two_fraction_digits_and_a_z() {

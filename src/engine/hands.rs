@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use super::vehicle::has_any_open_connection;
 use super::{Engine, EngineError, HookOutcome, Operator, operator};
 use crate::clock::Moment;
 use crate::journal::event::{Event, Occurrence, Source, StepEnd};
@@ -49,25 +50,50 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 };
             }
         }
+        let within = match (&operator.within, self.recorder.judge().current()) {
+            (Some(within), Some(test)) => match within.bind(test.bindings()) {
+                Ok(within) => Some(within),
+                Err(unbound) => return Ok(StepEnd::Broken(unbound.to_string())),
+            },
+            _ => None,
+        };
         let judge = self.recorder.judge();
         if judge.role() == Role::MasterControl {
             let meant = each.clone().unwrap_or_else(|| judge.ground().identity.1.clone());
             parameters.entry("vehicle").or_insert_with(|| meant.into());
         }
         if let Some(patience) = self.operator.natural_traffic(&operator.hook) {
+            let patience = within.map_or(patience, |within| within.min(patience));
             return self.await_traffic(&operator.hook, patience, section).await;
         }
         // What a postamble undoes is undone even when the user has asked to stop.
         let abandons = section != Section::Finally;
-        let outcome = self.hook_for(&operator.hook, parameters, abandons, each).await?;
+        let outcome = self
+            .hook_for(&operator.hook, parameters, (abandons, within), each)
+            .await?;
         if section != Section::Finally && self.interrupted() {
             return Ok(StepEnd::Interrupted);
         }
         Ok(match outcome {
             HookOutcome::Done(_) => StepEnd::Decided,
+            HookOutcome::Failed(why) if self.master_control_is_gone() => StepEnd::Refused(format!(
+                "hook `{}` failed, and the master control has no connection any more: {why}",
+                operator.hook
+            )),
             HookOutcome::Failed(why) => StepEnd::Broken(format!("hook `{}` failed: {why}", operator.hook)),
-            HookOutcome::Missing => StepEnd::Broken(format!("the profile has no hook `{}`", operator.hook)),
+            HookOutcome::Refused(why) => StepEnd::Refused(format!(
+                "the device refuses what hook `{}` asks for: {why}",
+                operator.hook
+            )),
+            HookOutcome::Missing => StepEnd::Refused(format!("there is nobody for hook `{}`", operator.hook)),
         })
+    }
+
+    /// Whether a master control has had connections, and now has none, though nobody keeps it away.
+    fn master_control_is_gone(&self) -> bool {
+        let judge = self.recorder.judge();
+        let connected = !judge.timeline().of("mqtt/connect").is_empty();
+        judge.role() == Role::MasterControl && connected && !has_any_open_connection(judge)
     }
 
     pub(super) async fn vehicle_step(&mut self, vehicle: &VehicleStep, step: &Step) -> Result<StepEnd, EngineError> {
@@ -166,18 +192,19 @@ impl<L: Link, O: Operator> Engine<L, O> {
         parameters: Map<String, Value>,
         abandons: bool,
     ) -> Result<HookOutcome, EngineError> {
-        self.hook_for(name, parameters, abandons, None).await
+        self.hook_for(name, parameters, (abandons, None), None).await
     }
 
-    /// The same for one of all mock AGVs.
+    /// The same for one of all mock AGVs, given up after a time if one is named.
     async fn hook_for(
         &mut self,
         name: &str,
         parameters: Map<String, Value>,
-        abandons: bool,
+        (abandons, within): (bool, Option<Duration>),
         each: Option<String>,
     ) -> Result<HookOutcome, EngineError> {
-        let far = Moment::from_micros(u64::MAX);
+        let begun = self.link.now().moment;
+        let until = within.map_or(Moment::from_micros(u64::MAX), |within| begun + within);
         let outcome = if self.operator.runs_on_the_link() {
             operator::on_link(&mut self.link, name, &parameters)
         } else {
@@ -189,17 +216,19 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     _ = self.interrupt.wait_for(|interrupted| *interrupted), if abandons => {
                         break HookOutcome::Failed("given up: the user has interrupted the run".to_owned());
                     }
-                    happened = self.link.next(far) => {
-                        if let Some(occurrence) = happened? {
-                            self.recorder.record(occurrence)?;
+                    happened = self.link.next(until) => match (happened?, within) {
+                        (Some(occurrence), _) => drop(self.recorder.record(occurrence)?),
+                        (None, Some(within)) if self.link.now().moment >= until => {
+                            break HookOutcome::Failed(format!("not done within {}", show_duration(within)));
                         }
-                    }
+                        (None, _) => {}
+                    },
                 }
             }
         };
         let (ok, detail) = match &outcome {
             HookOutcome::Done(detail) => (true, detail.clone()),
-            HookOutcome::Failed(detail) => (false, detail.clone()),
+            HookOutcome::Failed(detail) | HookOutcome::Refused(detail) => (false, detail.clone()),
             HookOutcome::Missing => (false, "no such hook".to_owned()),
         };
         let occurrence = Occurrence {

@@ -13,6 +13,8 @@ pub enum HookOutcome {
     Done(String),
     /// It was tried and did not work.
     Failed(String),
+    /// The device has understood what is wanted of it, and does not do it.
+    Refused(String),
     /// There is no such hook, and nobody to ask.
     Missing,
 }

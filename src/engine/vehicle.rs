@@ -5,30 +5,31 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::journal::Entry;
-use crate::journal::event::Event;
-use crate::judge::RunJudge;
+use crate::judge::{RunJudge, client_of, number_of};
 
-/// Whether the last state shows no order and no motion.
+/// Whether the last state of the present connection shows no order and no motion. A device that never sent a state has
+/// shown no order either.
 #[must_use]
 pub fn is_idle(judge: &RunJudge) -> bool {
-    last_state(judge)
-        .and_then(|entry| entry.json())
-        .is_none_or(is_without_order)
+    match judge.state() {
+        Some(state) => is_without_order(&state),
+        None => last_state(judge).is_none_or(|entry| entry.json().is_none()),
+    }
 }
 
 /// Whether a state that came after this journal number shows no order, no motion, and no action under way.
 #[must_use]
 pub fn is_idle_since(judge: &RunJudge, seq: u64) -> bool {
-    let Some(entry) = last_state(judge).filter(|entry| entry.seq() > seq) else {
+    if last_state(judge).is_none_or(|entry| entry.seq() <= seq) {
         return false;
-    };
-    let Some(state) = entry.json() else { return false };
+    }
+    let Some(state) = judge.state() else { return false };
     let actions = state.get("actionStates").and_then(Value::as_array);
     let is_over = |action: &Value| {
         let status = action.get("actionStatus").and_then(Value::as_str);
         matches!(status, Some("FINISHED" | "FAILED"))
     };
-    is_without_order(state) && actions.is_some_and(|actions| actions.iter().all(is_over))
+    is_without_order(&state) && actions.is_some_and(|actions| actions.iter().all(is_over))
 }
 
 /// Whether a mock AGV has done everything it was sent: it is idle, no action is under way, and its last state is about
@@ -48,31 +49,35 @@ pub fn has_nothing_to_do(judge: &RunJudge) -> bool {
 #[must_use]
 pub fn has_any_open_connection(judge: &RunJudge) -> bool {
     let timeline = judge.timeline();
-    let closed: std::collections::BTreeSet<u64> = timeline.of("mqtt/closed").iter().filter_map(number).collect();
-    let mut opened = timeline.of("mqtt/connect").iter().filter_map(number);
+    let closed: std::collections::BTreeSet<u64> = timeline
+        .of("mqtt/closed")
+        .iter()
+        .filter_map(|entry| number_of(entry))
+        .collect();
+    let mut opened = timeline.of("mqtt/connect").iter().filter_map(|entry| number_of(entry));
     opened.any(|connection| !closed.contains(&connection))
 }
 
-/// Whether the newest connection of the device that the tap has seen is open.
+/// Whether the client that publishes the states is connected, as the tap has seen it. A second client of the device that
+/// stays connected is not the device; one that connects after the first has gone may be it.
 #[must_use]
 pub fn has_open_connection(judge: &RunJudge) -> bool {
     let timeline = judge.timeline();
-    let last = timeline.of("mqtt/connect").last().and_then(number);
-    let is_closed = |connection| {
-        timeline
-            .of("mqtt/closed")
-            .iter()
-            .any(|entry| number(entry) == Some(connection))
+    let closed = |connection: u64| {
+        let mut all = timeline.of("mqtt/closed").iter();
+        all.find(|entry| number_of(entry) == Some(connection))
+            .map(|entry| entry.seq())
     };
-    last.is_some_and(|connection| !is_closed(connection))
-}
-
-/// The number of the connection an entry is about.
-fn number(entry: &Arc<Entry>) -> Option<u64> {
-    match entry.event() {
-        Event::Packet { connection, .. } | Event::Closed { connection, .. } => Some(*connection),
-        _ => None,
-    }
+    let connects = timeline.of("mqtt/connect");
+    let is_open = |entry: &&Arc<Entry>| number_of(entry).is_some_and(|connection| closed(connection).is_none());
+    let Some(publishing) = timeline.publishing() else {
+        return connects.last().as_ref().is_some_and(is_open);
+    };
+    let Some(gone) = closed(publishing) else { return true };
+    let client = connects.iter().find(|entry| number_of(entry) == Some(publishing));
+    let client = client.and_then(|entry| client_of(entry));
+    let mut open = connects.iter().rev().filter(is_open);
+    open.any(|entry| entry.seq() > gone || client.is_some_and(|client| client_of(entry) == Some(client)))
 }
 
 fn last_state(judge: &RunJudge) -> Option<&Arc<Entry>> {

@@ -10,6 +10,7 @@ pub use super::fault::LinkFault;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
 pub use super::plan::{Capability, Gate, MockVehicle, Plan, PlannedTest, RunHeader, Setting};
+pub use super::waiver::{Reading, Waiver};
 use crate::clock::Stamp;
 
 /// Who saw or caused an event.
@@ -50,6 +51,8 @@ pub enum StepEnd {
     Interrupted,
     /// The harness could not do it; the text says why.
     Broken(String),
+    /// The device does not do what a hook asks of it, or cannot be asked any more; the text says why.
+    Refused(String),
 }
 
 /// One thing that happened.
@@ -247,6 +250,18 @@ pub enum Event {
         answer: String,
         /// Whether it counts as done.
         ok: bool,
+    },
+    /// A lasting mistake of the vehicle does not stand in the way of further tests.
+    Waived {
+        /// See [`Waiver`].
+        waiver: Waiver,
+    },
+    /// The harness was late itself: what came in this time may have come earlier.
+    Lag {
+        /// By how many microseconds.
+        micros: u64,
+        /// What was late: `timer` or `tap`.
+        of: String,
     },
     /// Something worth knowing that decides nothing.
     Note {

@@ -10,6 +10,7 @@ pub mod json;
 mod packet;
 mod payload;
 mod plan;
+mod waiver;
 
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};

@@ -35,23 +35,15 @@ pub(super) fn decide(
     };
     let broken = matches!(clause.holds, Holds::No | Holds::Softly | Holds::Late);
     let explanation = broken.then(|| explain(&clause));
-    Some(Decision {
-        requirement: clause.requirement.as_str().to_owned(),
-        verdict,
-        clause: format!("{path}.{}", clause.word),
-        place: clause.span.place(),
-        witness: clause.witness,
-        message: clause.message,
-        expected: clause.expected,
-        nearest: clause.nearest,
-        waited: waited.filter(|_| broken),
-        explanation,
-        interpretation: if broken {
-            requirement.interpretation.clone()
-        } else {
-            None
-        },
-    })
+    let (word, place) = (format!("{path}.{}", clause.word), clause.span.place());
+    let mut decision = Decision::new(clause.requirement.as_str(), verdict, word, place, clause.message);
+    decision.witness = clause.witness;
+    decision.expected = clause.expected;
+    decision.nearest = clause.nearest;
+    decision.waited = waited.filter(|_| broken);
+    decision.explanation = explanation;
+    decision.interpretation = requirement.interpretation.clone().filter(|_| broken);
+    Some(decision)
 }
 
 /// The clause with a caret. What was awaited, the nearest miss and the next command stand in the decision itself;

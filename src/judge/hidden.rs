@@ -5,8 +5,25 @@
 //! the members it speaks for under `hides:`, and what was missed there is inconclusive in the tests it found something
 //! in. Which monitors do so is data.
 
-use crate::report::result::{Decision, StepResult};
-use crate::verdict::Verdict;
+use crate::report::result::Waited;
+
+use super::step::{Clause, Holds, Timing};
+
+/// A clause of a step that has ended, not decided yet.
+pub(super) struct Open {
+    /// How it came out.
+    pub clause: Clause,
+    /// The step.
+    pub path: String,
+    /// Whether the step follows an action.
+    pub walks: bool,
+    /// The last entry of the step.
+    pub ended: u64,
+    /// What was waited for.
+    pub waited: Option<Waited>,
+    /// What it says about time, if it is a finding about time.
+    pub of_time: Option<Timing>,
+}
 
 /// A member of the state that shows nothing in a test.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,52 +38,54 @@ pub(super) struct Hidden {
     pub decides: Vec<String>,
     /// The entry that showed it first in this test.
     pub seq: u64,
+    /// It is known from before this test: where the member shows nothing, it shows nothing in any message.
+    pub lasting: bool,
 }
 
 impl Hidden {
     /// Whether this was waited for in vain where nothing is shown. A step that is about the member is decided all the
     /// same, and so is what a message shows that did come.
-    fn hides(&self, decision: &Decision, about: &[&str], steps: &[StepResult]) -> bool {
-        let (Some(nearest), Some(step)) = (&decision.nearest, step_of(decision, steps)) else {
+    fn hides(&self, open: &Open, about: &[String]) -> bool {
+        let Some(nearest) = &open.clause.nearest else {
             return false;
         };
         let member = nearest.path.split(['.', '[']).next();
-        let in_vain = decision.witness.is_none() || step.verb.starts_with("action");
-        matches!(decision.verdict, Verdict::Fail | Verdict::Warning)
-            && in_vain
+        let shows_nothing = self.lasting && matches!(nearest.found.as_str(), "\"\"" | "0" | "nothing");
+        matches!(open.clause.holds, Holds::No | Holds::Softly | Holds::Late)
+            && (open.clause.witness.is_none() || open.walks || shows_nothing)
             && member == Some(self.member.as_str())
-            && !self.decides.iter().any(|id| about.contains(&id.as_str()))
-            && step.journal.is_some_and(|(_, end)| self.seq <= end)
+            && !self.decides.iter().any(|id| about.contains(id))
+            && self.seq <= open.ended
     }
 }
 
-fn step_of<'s>(decision: &Decision, steps: &'s [StepResult]) -> Option<&'s StepResult> {
-    let path = decision.clause.split('.').next()?;
-    steps.iter().find(|step| step.path == path)
-}
-
-/// Takes back what was decided on members that show nothing; says so in one line if there is any.
-pub(super) fn take_back(decisions: &mut [Decision], steps: &[StepResult], hidden: &[Hidden]) -> Option<String> {
+/// Marks as unseen what rests on members that show nothing; says so in one line if there is any.
+pub(super) fn hide(all: &mut [Open], hidden: &[Hidden]) -> Option<String> {
     if hidden.is_empty() {
         return None;
     }
     let mut told = None;
-    let ids: Vec<(String, String)> = decisions
+    let ids: Vec<(String, &'static str, String)> = all
         .iter()
-        .map(|decision| (decision.clause.clone(), decision.requirement.clone()))
+        .map(|open| {
+            let requirement = open.clause.requirement.as_str().to_owned();
+            (open.path.clone(), open.clause.word, requirement)
+        })
         .collect();
-    for decision in decisions {
-        let same = ids.iter().filter(|(clause, _)| *clause == decision.clause);
-        let about: Vec<&str> = same.map(|(_, id)| id.as_str()).collect();
-        let Some(hidden) = hidden.iter().find(|hidden| hidden.hides(decision, &about, steps)) else {
+    for open in all {
+        let same = ids
+            .iter()
+            .filter(|(path, word, _)| *path == open.path && *word == open.clause.word);
+        let about: Vec<String> = same.map(|(_, _, id)| id.clone()).collect();
+        let Some(hidden) = hidden.iter().find(|hidden| hidden.hides(open, &about)) else {
             continue;
         };
         let why = format!(
             "the states do not show `{}` as they must (#{}: {} is broken, found by {})",
             hidden.member, hidden.seq, hidden.requirement, hidden.monitor
         );
-        decision.verdict = Verdict::Inconclusive;
-        decision.message = format!("cannot be told, since {why}; {}", decision.message);
+        open.clause.holds = Holds::Unseen(why.clone());
+        open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
         told.get_or_insert(why);
     }
     told
@@ -75,76 +94,73 @@ pub(super) fn take_back(decisions: &mut [Decision], steps: &[StepResult], hidden
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnostic::{Source, Span};
+    use crate::pack::RequirementId;
     use crate::report::result::NearestMiss;
 
-    fn decision(requirement: &str, path: &str) -> Decision {
-        Decision {
-            requirement: requirement.to_owned(),
-            verdict: Verdict::Fail,
-            clause: "steps[1].checks".to_owned(),
-            place: String::new(),
-            witness: None,
-            message: "nothing came".to_owned(),
-            expected: None,
-            nearest: Some(NearestMiss {
-                seq: 20,
-                path: path.to_owned(),
-                found: String::new(),
-                expected: String::new(),
-            }),
+    fn clause(requirement: &str, path: &str) -> Open {
+        let nearest = NearestMiss {
+            seq: 20,
+            path: path.to_owned(),
+            found: String::new(),
+            expected: String::new(),
+        };
+        Open {
+            clause: Clause {
+                requirement: RequirementId::from(requirement),
+                word: "checks",
+                span: Span::new(&Source::new("test", ""), 0, 0),
+                label: String::new(),
+                holds: Holds::No,
+                witness: None,
+                message: "nothing came".to_owned(),
+                expected: None,
+                nearest: Some(nearest),
+            },
+            path: "steps[1]".to_owned(),
+            walks: false,
+            ended: 30,
             waited: None,
-            explanation: None,
-            interpretation: None,
+            of_time: None,
         }
     }
 
-    fn verdict(decision: Decision, found: u64) -> Verdict {
-        verdicts(&mut [decision], found)
+    fn is_hidden(open: Open, found: u64) -> bool {
+        first_is_hidden(&mut [open], found)
     }
 
-    fn verdicts(decisions: &mut [Decision], found: u64) -> Verdict {
-        let steps = [StepResult {
-            path: "steps[1]".to_owned(),
-            verb: "expect".to_owned(),
-            title: None,
-            place: String::new(),
-            outcome: "failed".to_owned(),
-            journal: Some((10, 30)),
-            took: None,
-            seconds: 0.0,
-        }];
+    fn first_is_hidden(all: &mut [Open], found: u64) -> bool {
         let hidden = [Hidden {
             member: "orderId".to_owned(),
             monitor: "state/order-kept".to_owned(),
             requirement: "STATE-MSG-02".to_owned(),
             decides: vec!["STATE-MSG-02".to_owned()],
             seq: found,
+            lasting: false,
         }];
-        take_back(decisions, &steps, &hidden);
-        decisions[0].verdict
+        hide(all, &hidden);
+        matches!(all[0].clause.holds, Holds::Unseen(_))
     }
 
     #[test]
-    fn what_was_missed_where_nothing_is_shown_is_inconclusive() {
-        assert_eq!(verdict(decision("ORD-06", "orderId"), 15), Verdict::Inconclusive);
-        assert_eq!(verdict(decision("ORD-06", "orderId[0].x"), 15), Verdict::Inconclusive);
+    fn what_was_missed_where_nothing_is_shown_is_unseen() {
+        assert!(is_hidden(clause("ORD-06", "orderId"), 15));
+        assert!(is_hidden(clause("ORD-06", "orderId[0].x"), 15));
     }
 
     #[test]
-    fn anything_else_stays_as_it_was_decided() {
-        assert_eq!(verdict(decision("ORD-06", "lastNodeId"), 15), Verdict::Fail);
-        assert_eq!(verdict(decision("STATE-MSG-02", "orderId"), 15), Verdict::Fail);
-        assert_eq!(verdict(decision("ORD-06", "orderId"), 31), Verdict::Fail);
-        let came = Decision {
-            witness: Some(20),
-            ..decision("ORD-06", "orderId")
-        };
-        assert_eq!(verdict(came, 15), Verdict::Fail);
+    fn anything_else_stays_as_it_was() {
+        assert!(!is_hidden(clause("ORD-06", "lastNodeId"), 15));
+        assert!(!is_hidden(clause("STATE-MSG-02", "orderId"), 15));
+        assert!(!is_hidden(clause("ORD-06", "orderId"), 31));
+        let mut came = clause("ORD-06", "orderId");
+        came.clause.witness = Some(20);
+        assert!(!is_hidden(came, 15));
     }
 
     #[test]
     fn a_step_about_the_member_itself_is_decided() {
-        let mut step = [decision("MQTT-10", "orderId"), decision("STATE-MSG-02", "orderId")];
-        assert_eq!(verdicts(&mut step, 15), Verdict::Fail);
+        let mut step = [clause("MQTT-10", "orderId"), clause("STATE-MSG-02", "orderId")];
+        assert!(!first_is_hidden(&mut step, 15));
     }
 }

@@ -9,13 +9,13 @@ use serde_json::Map;
 
 use super::decide::mood;
 use super::hidden::Hidden;
-use super::step::shown_path;
+use super::step::{shown_path, unbound_text};
 use super::test::Ground;
 use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
-use crate::pattern::{Bindings, Bound};
+use crate::pattern::{Bindings, Bound, Unbound};
 use crate::report::result::{MonitorFinding, MonitorResult};
 use crate::suite::model::{Monitor, Need, Rule};
 use crate::verdict::{Accumulated, Verdict};
@@ -30,9 +30,22 @@ pub struct MonitorJudge {
     monitor: Arc<Monitor>,
     rule: Watching,
     judged: u64,
+    /// What requirements are about, and has not come by yet.
+    unseen: Vec<Awaited>,
     findings: Vec<MonitorFinding>,
+    /// Why it cannot be judged, though it should be: a variable without a value.
+    open: Option<String>,
     /// The first fail since the running test began: requirement and entry.
     broken: Option<(String, u64)>,
+    /// The requirement of the first fail of the run.
+    accuses: Option<String>,
+}
+
+/// A message without which nothing is known of a requirement.
+struct Awaited {
+    requirement: String,
+    topic: String,
+    pattern: Bound,
 }
 
 enum Watching {
@@ -60,39 +73,55 @@ impl MonitorJudge {
         if !monitor.spec.contains(ground.pack.version) || !wanted {
             return None;
         }
+        let mut open = None;
         let rule = if monitor.needs.contains(&Need::Tap) && !tap {
             Watching::Off
         } else {
-            Self::watch(&monitor.rule, ground, bindings).unwrap_or(Watching::Off)
+            Self::watch(&monitor.rule, ground, bindings).unwrap_or_else(|unbound| {
+                open = Some(unbound_text(&unbound));
+                Watching::Off
+            })
         };
+        let about = monitor.about.iter().filter_map(|about| {
+            Some(Awaited {
+                requirement: about.requirement.requirement.as_str().to_owned(),
+                topic: about.topic.clone(),
+                pattern: about.pattern.bind(bindings).ok()?,
+            })
+        });
         Some(Self {
+            unseen: about.collect(),
+            open,
             monitor: Arc::clone(monitor),
             rule,
             judged: 0,
             findings: Vec::new(),
             broken: None,
+            accuses: None,
         })
     }
 
-    fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings) -> Option<Watching> {
-        Some(match rule {
+    fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings) -> Result<Watching, Unbound> {
+        Ok(match rule {
             Rule::Always { topic, when, pattern } => Watching::Pattern {
                 topic: topic.clone(),
-                when: when.as_ref().map(|when| when.bind(bindings)).transpose().ok()?,
-                pattern: pattern.bind(bindings).ok()?,
+                when: when.as_ref().map(|when| when.bind(bindings)).transpose()?,
+                pattern: pattern.bind(bindings)?,
                 forbidden: false,
             },
             Rule::Never { topic, pattern } => Watching::Pattern {
                 topic: topic.clone(),
                 when: None,
-                pattern: pattern.bind(bindings).ok()?,
+                pattern: pattern.bind(bindings)?,
                 forbidden: true,
             },
             Rule::Check(check) => {
-                let definition = checks::find(&check.name)?;
+                let Some(definition) = checks::find(&check.name) else {
+                    return Ok(Watching::Off);
+                };
                 let mut with = Map::new();
                 for (name, term) in &check.with {
-                    with.insert(name.clone(), term.bind(bindings).ok()?);
+                    with.insert(name.clone(), term.bind(bindings)?);
                 }
                 Watching::Check {
                     running: (definition.start)(&context(ground, &with, &Shared::default())),
@@ -107,6 +136,7 @@ impl MonitorJudge {
         if matches!(entry.event(), Event::TestBegun { .. }) {
             self.broken = None;
         }
+        self.see(entry, subject);
         let mut found = Vec::new();
         match &mut self.rule {
             Watching::Off => {}
@@ -144,6 +174,34 @@ impl MonitorJudge {
         self.keep(found, ground);
     }
 
+    /// Notes what came by of what requirements are about.
+    fn see(&mut self, entry: &Entry, subject: Option<&str>) {
+        let (false, Some(subject)) = (self.unseen.is_empty(), subject) else {
+            return;
+        };
+        if matches!(entry.event(), Event::Message { retain: true, .. }) {
+            return;
+        }
+        let Some(message) = entry.subject() else { return };
+        self.unseen
+            .retain(|awaited| awaited.topic != subject || !awaited.pattern.matches(&message, None));
+    }
+
+    /// The requirements it is bound to and had something to judge of.
+    pub(super) fn judged(&self) -> Vec<String> {
+        if self.judged == 0 {
+            return Vec::new();
+        }
+        let bound = self.monitor.checks.iter().map(|binding| binding.requirement.as_str());
+        let seen = bound.filter(|id| !self.unseen.iter().any(|awaited| awaited.requirement == *id));
+        seen.map(str::to_owned).collect()
+    }
+
+    /// Why nothing of it can be judged, though it should be.
+    pub(super) fn open(&self) -> Option<&str> {
+        self.open.as_deref()
+    }
+
     /// The run has ended.
     pub fn finish(&mut self, end: Moment, ground: &Ground, shared: &Shared) {
         let mut found = Vec::new();
@@ -169,6 +227,7 @@ impl MonitorJudge {
             }
             if verdict == Verdict::Fail && self.broken.is_none() && !self.monitor.hides.is_empty() {
                 self.broken = Some((id.as_str().to_owned(), finding.seq));
+                self.accuses.get_or_insert_with(|| id.as_str().to_owned());
             }
             let known = self
                 .findings
@@ -198,6 +257,9 @@ impl MonitorJudge {
         if self.judged > 0 {
             verdict.add(Verdict::Pass);
         }
+        if self.open.is_some() {
+            verdict.add(Verdict::Inconclusive);
+        }
         MonitorResult {
             id: self.monitor.id.clone(),
             title: self.monitor.title.clone(),
@@ -222,8 +284,18 @@ impl MonitorJudge {
                 requirement: requirement.clone(),
                 decides: decides.clone(),
                 seq: *seq,
+                lasting: false,
             })
             .collect()
+    }
+
+    /// The members that show nothing for what was found in this run, with the requirement.
+    pub(super) fn accused(&self) -> Vec<(String, String)> {
+        let Some(requirement) = &self.accuses else {
+            return Vec::new();
+        };
+        let members = self.monitor.hides.iter();
+        members.map(|member| (member.clone(), requirement.clone())).collect()
     }
 
     /// The monitor.

@@ -4,19 +4,24 @@
 //! result at any time. Nothing but the journal and the suites enters it, so judging a journal again gives
 //! the same result, byte for byte.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use serde_json::Value;
+
 use super::decide::mood;
+use super::hidden::Hidden;
+use super::mend::mended;
 use super::reactions::Reactions;
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
-use crate::clock::Stamp;
+use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
-use crate::journal::event::{Event, Gate, Plan, RunHeader};
+use crate::journal::event::{Event, Gate, Plan, Reading, RunHeader, Waiver};
 use crate::pack::{Catalogue, Decided, Packs, Role};
-use crate::report::result::{Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult};
+use crate::report::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
 use crate::suite::Suites;
 use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};
@@ -46,6 +51,9 @@ pub enum JudgeError {
     /// It was made for a protocol version this program does not have.
     #[error("the journal is about protocol version {0}, which this program does not have")]
     Version(String),
+    /// It is about a side of the interface nobody knows.
+    #[error("the journal is about the role `{0}`, which there is not")]
+    Role(String),
     /// It names a test the suites do not have.
     #[error("the journal names the test `{0}`, which the suites do not have")]
     UnknownTest(String),
@@ -62,6 +70,9 @@ pub struct RunJudge {
     timeline: Timeline,
     watches: Watches,
     reactions: Reactions,
+    /// The instant actions the harness has sent: type by id.
+    instants: BTreeMap<String, String>,
+    last_order: Option<(Moment, String)>,
     current: Option<TestJudge>,
     done: Vec<TestResult>,
     plan: Plan,
@@ -79,11 +90,10 @@ impl RunJudge {
             .packs
             .get(&header.protocol)
             .ok_or_else(|| JudgeError::Version(header.protocol.clone()))?;
-        let role = if header.role == Role::Agv.word() {
-            Role::Agv
-        } else {
-            Role::MasterControl
-        };
+        let role = [Role::Agv, Role::MasterControl]
+            .into_iter()
+            .find(|role| role.word() == header.role)
+            .ok_or_else(|| JudgeError::Role(header.role.clone()))?;
         let bindings = Arc::new(header.bindings.clone());
         let ground_of = |topics: &BTreeMap<String, String>, manufacturer: &str, serial_number: &str| Ground {
             pack: Arc::clone(pack),
@@ -92,6 +102,7 @@ impl RunJudge {
             role,
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: Arc::clone(&bindings),
+            waivers: Vec::new(),
         };
         // What a master control sends names the vehicle it is for.
         let mut of_vehicles = header
@@ -125,6 +136,8 @@ impl RunJudge {
             last: first.at(),
             watches,
             reactions,
+            instants: BTreeMap::new(),
+            last_order: None,
             current: None,
             done: Vec::new(),
             plan: Plan::default(),
@@ -141,7 +154,11 @@ impl RunJudge {
         }
         self.watches
             .observe(entry, subject.as_deref(), &self.timeline, &self.ground);
+        if self.role == Role::Agv {
+            self.note_instants(entry);
+        }
         match entry.event() {
+            Event::Waived { waiver } => self.ground.waivers.push(waiver.clone()),
             Event::Planned { plan } => self.plan = (**plan).clone(),
             // Outside a test, a variable gets its value for the whole run.
             Event::Bound { name, value } if self.current.is_none() => {
@@ -163,16 +180,76 @@ impl RunJudge {
         }
         if let Some(current) = &mut self.current {
             if matches!(entry.event(), Event::TestEnded { .. }) {
-                current.hide(self.watches.hidden());
+                current.hide(hidden(&self.watches, &self.ground.waivers));
             }
             current.observe(entry, subject.as_deref(), &self.timeline, &self.ground);
         }
         if matches!(entry.event(), Event::TestEnded { .. })
             && let Some(current) = self.current.take()
         {
-            self.done.push(current.result().clone());
+            self.ended(current.result().clone());
         }
         Ok(())
+    }
+
+    fn note_instants(&mut self, entry: &Entry) {
+        let Event::Sent { topic, .. } = entry.event() else {
+            return;
+        };
+        if self.ground.topics.get("order") == Some(topic) {
+            let id = entry.json().and_then(|order| order.get("orderId")?.as_str());
+            self.last_order = id.map(|id| (entry.at().moment, id.to_owned()));
+        }
+        if self.ground.topics.get("instantActions") != Some(topic) {
+            return;
+        }
+        let actions = entry.json().and_then(|message| message.get("actions")?.as_array());
+        for action in actions.into_iter().flatten() {
+            let text = |name: &str| action.get(name).and_then(Value::as_str).map(str::to_owned);
+            if let (Some(id), Some(kind)) = (text("actionId"), text("actionType")) {
+                self.instants.insert(id, kind);
+            }
+        }
+    }
+
+    /// Keeps the result of a test. One that was tried before and decided nothing is replaced.
+    fn ended(&mut self, mut result: TestResult) {
+        let decided = |result: &TestResult| {
+            let mut decisions = result.decisions.iter();
+            decisions.any(|decision| decision.verdict() != Verdict::Inconclusive)
+        };
+        let before = self.done.iter().position(|done| done.id == result.id && !decided(done));
+        if let Some(before) = before {
+            let before = self.done.remove(before);
+            let why = before.reason.unwrap_or_else(|| "it decided nothing".to_owned());
+            result.allowances.push(format!("tried again, since at first: {why}"));
+        }
+        self.done.push(result);
+    }
+
+    /// What the vehicle says of itself: the last state of its present connection, read as it is meant.
+    pub fn state(&self) -> Option<Cow<'_, Value>> {
+        let entry = self.timeline.present("state")?;
+        let state = entry.json()?;
+        Some(match mended(state, entry.seq(), &self.timeline, &self.ground.waivers) {
+            Some((meant, _)) => Cow::Owned(meant),
+            None => Cow::Borrowed(state),
+        })
+    }
+
+    /// The order the harness has sent last: when, and its id.
+    pub fn last_order(&self) -> Option<&(Moment, String)> {
+        self.last_order.as_ref()
+    }
+
+    /// The type of an instant action of the harness, by its id.
+    pub fn sent_instant(&self, id: &str) -> Option<String> {
+        self.instants.get(id).cloned()
+    }
+
+    /// The members of the state that show nothing, by what monitors have found in this run: member and requirement.
+    pub fn accused(&self) -> Vec<(String, String)> {
+        self.watches.accused()
     }
 
     /// The journal is at its end without `RunEnded`, as after a crash.
@@ -186,7 +263,7 @@ impl RunJudge {
 
     fn break_off(&mut self, why: &str) {
         if let Some(mut current) = self.current.take() {
-            current.hide(self.watches.hidden());
+            current.hide(hidden(&self.watches, &self.ground.waivers));
             self.done.push(current.break_off(self.last.moment, why, &self.ground));
         }
     }
@@ -227,7 +304,17 @@ impl RunJudge {
 
     /// The result as it stands.
     pub fn result(&self) -> RunResult {
+        // Which order they were run in is the harness's own business.
         let mut tests = self.done.clone();
+        let places: BTreeMap<&str, usize> = self
+            .rules
+            .suites
+            .tests
+            .iter()
+            .enumerate()
+            .map(|(at, test)| (test.id.as_str(), at))
+            .collect();
+        tests.sort_by_key(|test| places.get(test.id.as_str()).copied());
         tests.extend(self.set_aside());
         let watched = self.watches.results();
         let all = tests
@@ -279,10 +366,23 @@ impl RunJudge {
                 })
                 .collect(),
             fleet: self.reactions.result(),
-            limits: self.plan.limits.clone(),
+            limits: self.limits(),
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
         }
+    }
+
+    /// What restricts the statement, the harness's own lag included.
+    fn limits(&self) -> Vec<String> {
+        let mut limits = self.plan.limits.clone();
+        let lag = self.timeline.longest_lag();
+        if !lag.is_zero() {
+            limits.push(format!(
+                "The harness itself was held up for up to {:.1} s; what that can explain was not held against the device.",
+                lag.as_secs_f64()
+            ));
+        }
+        limits
     }
 
     /// The planned tests that did not run, with the reason.
@@ -300,14 +400,13 @@ impl RunJudge {
                 not_applicable: None,
                 seconds: 0.0,
                 reason: None,
-                maturity: "watchlist".to_owned(),
+                maturity: test.maturity.word().to_owned(),
+                maturity_note: test.maturity.note().map(str::to_owned),
                 journal: None,
                 decisions: Vec::new(),
                 steps: Vec::new(),
+                allowances: Vec::new(),
             };
-            if test.maturity == crate::suite::model::Maturity::Reviewed {
-                "reviewed".clone_into(&mut result.maturity);
-            }
             let why = match &planned.gate {
                 Gate::NotApplicable(why) => {
                     result.not_applicable = Some(why.clone());
@@ -335,14 +434,11 @@ impl RunJudge {
     }
 
     fn requirements(&self, tests: &[TestResult], watched: &[Watched]) -> Vec<RequirementResult> {
-        let mut decided: BTreeMap<&str, (Accumulated, Vec<String>)> = BTreeMap::new();
+        let mut decided: BTreeMap<&str, Opinions> = BTreeMap::new();
         for test in tests {
             for decision in &test.decisions {
-                let (verdict, by) = decided.entry(decision.requirement.as_str()).or_default();
-                verdict.add(decision.verdict);
-                if !by.contains(&test.id) {
-                    by.push(test.id.clone());
-                }
+                let opinions = decided.entry(decision.requirement.as_str()).or_default();
+                opinions.add(decision.verdict(), &test.id, test.journal.is_some());
             }
         }
         let monitored: Vec<(String, Vec<(String, Verdict)>)> = watched
@@ -351,11 +447,7 @@ impl RunJudge {
             .collect();
         for (id, decisions) in &monitored {
             for (requirement, verdict) in decisions {
-                let (all, by) = decided.entry(requirement.as_str()).or_default();
-                all.add(*verdict);
-                if !by.contains(id) {
-                    by.push(id.clone());
-                }
+                decided.entry(requirement.as_str()).or_default().add(*verdict, id, true);
             }
         }
         let mut all = Vec::new();
@@ -364,15 +456,17 @@ impl RunJudge {
                 continue;
             }
             let id = requirement.id.as_str();
-            let (verdict, decided_by) = decided.remove(id).unwrap_or_default();
-            let not_decided = match verdict.get() {
+            let opinions = decided.remove(id).unwrap_or_default();
+            let verdict = opinions.verdict();
+            let not_decided = match verdict {
                 Some(_) => None,
                 None => Some(self.why_not(id, &requirement.decided, tests, watched)),
             };
             all.push(RequirementResult {
                 id: id.to_owned(),
-                verdict: verdict.get(),
-                decided_by,
+                verdict,
+                verdicts: opinions.verdicts(),
+                decided_by: opinions.by,
                 not_decided,
             });
         }
@@ -403,20 +497,67 @@ impl RunJudge {
     }
 }
 
-fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
-    Decision {
-        requirement: requirement.to_owned(),
-        verdict: Verdict::Inconclusive,
-        clause,
-        place,
-        witness: None,
-        message: why.to_owned(),
-        expected: None,
-        nearest: None,
-        waited: None,
-        explanation: None,
-        interpretation: None,
+/// What tests and monitors say about one requirement.
+#[derive(Default)]
+struct Opinions {
+    /// Of those that ran.
+    run: Accumulated,
+    /// Of tests that were set aside before they began: for a hook that is missing, or motion that is not permitted.
+    aside: Accumulated,
+    by: Vec<String>,
+    given: BTreeMap<Verdict, Vec<String>>,
+}
+
+impl Opinions {
+    fn add(&mut self, verdict: Verdict, by: &str, ran: bool) {
+        if ran {
+            self.run.add(verdict);
+        } else {
+            self.aside.add(verdict);
+        }
+        let given = self.given.entry(verdict).or_default();
+        for list in [&mut self.by, given] {
+            if !list.iter().any(|known| known == by) {
+                list.push(by.to_owned());
+            }
+        }
     }
+
+    /// What could not be tried does not make undecided what was decided.
+    fn verdict(&self) -> Option<Verdict> {
+        self.run.get().or(self.aside.get())
+    }
+
+    /// All of them, the worst first; nothing where they agree.
+    fn verdicts(&self) -> Vec<Given> {
+        if self.given.len() < 2 {
+            return Vec::new();
+        }
+        let given = self.given.iter().rev().map(|(verdict, by)| Given {
+            verdict: *verdict,
+            by: by.clone(),
+        });
+        given.collect()
+    }
+}
+
+/// What shows nothing in a test: what was found in it, and what is known from before.
+fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
+    let mut all = watches.hidden();
+    let kept = waivers.iter().filter(|waiver| waiver.reading == Reading::Kept);
+    all.extend(kept.map(|waiver| Hidden {
+        member: waiver.member.clone(),
+        monitor: "a monitor, earlier in this run".to_owned(),
+        requirement: waiver.about.first().cloned().unwrap_or_default(),
+        decides: waiver.about.clone(),
+        seq: 0,
+        lasting: true,
+    }));
+    all
+}
+
+fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
+    Decision::new(requirement, Verdict::Inconclusive, clause, place, why.to_owned())
 }
 
 /// Judges a whole journal.

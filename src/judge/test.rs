@@ -11,17 +11,17 @@ use serde_json::{Map, Value};
 
 use super::decide::decide;
 use super::departure::Departure;
-use super::hidden::{Hidden, take_back};
-use super::step::{Evaluator, Position, Progress, StepOutcome};
+use super::hidden::{Hidden, Open, hide};
+use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use super::window::Scene;
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::{Event, StepEnd};
+use crate::journal::event::{Event, StepEnd, Waiver};
 use crate::pack::{Catalogue, Pack, Role};
 use crate::pattern::Bindings;
-use crate::report::result::{StepResult, TestResult, Waited};
-use crate::suite::model::{Maturity, Section, Step, Test, Verb};
+use crate::report::result::{Decision, StepResult, TestResult, Waited};
+use crate::suite::model::{Section, Step, Test, Verb};
 use crate::verdict::{Accumulated, Verdict};
 
 /// What does not change during a run.
@@ -38,6 +38,51 @@ pub struct Ground {
     pub identity: (String, String),
     /// `time`, `device`.
     pub bindings: Arc<Map<String, Value>>,
+    /// Lasting mistakes of the vehicle that do not stand in the way any more.
+    pub waivers: Vec<Waiver>,
+}
+
+/// What the vehicle itself says is wrong, in its last state.
+fn reported(timeline: &Timeline) -> Option<String> {
+    let state = timeline.of("state").last()?.json()?;
+    let errors = state.get("errors")?.as_array()?;
+    let text = |value: &Value, name: &str| -> String {
+        let found = value.get(name).and_then(Value::as_str).unwrap_or_default();
+        found.chars().take(60).collect()
+    };
+    let one = |error: &Value| {
+        let references = error.get("errorReferences").and_then(Value::as_array);
+        let named: Vec<String> = references
+            .into_iter()
+            .flatten()
+            .take(3)
+            .map(|reference| {
+                format!(
+                    "{} {}",
+                    text(reference, "referenceKey"),
+                    text(reference, "referenceValue")
+                )
+            })
+            .collect();
+        let named = if named.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", named.join(", "))
+        };
+        format!("{} {}{named}", text(error, "errorLevel"), text(error, "errorType"))
+    };
+    let all: Vec<String> = errors.iter().take(2).map(one).collect();
+    (!all.is_empty()).then(|| format!("the vehicle itself reports {}", all.join(" and ")))
+}
+
+/// How a precondition comes out that is itself an obligation: it is broken when what is seen contradicts it. Coming late is
+/// no matter of it, and nothing at all shows nothing.
+fn of_precondition(holds: Holds, seen: u64) -> Holds {
+    match holds {
+        Holds::Late | Holds::Softly => Holds::Yes,
+        Holds::No if seen == 0 => Holds::Unseen("nothing came that could have shown it".to_owned()),
+        other => other,
+    }
 }
 
 /// A test being judged.
@@ -57,6 +102,9 @@ pub struct TestJudge {
     result: TestResult,
     departure: Departure,
     hidden: Vec<Hidden>,
+    /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
+    /// decided before.
+    open: Vec<Open>,
     ended: bool,
 }
 
@@ -75,10 +123,6 @@ impl TestJudge {
         if let Some(own) = own.as_object() {
             bindings.extend(own);
         }
-        let maturity = match test.maturity {
-            Maturity::Watchlist => "watchlist",
-            Maturity::Reviewed => "reviewed",
-        };
         let (seq, moment) = (entry.seq(), entry.at().moment);
         Self {
             test: Arc::clone(test),
@@ -100,13 +144,16 @@ impl TestJudge {
                 not_applicable: None,
                 seconds: 0.0,
                 reason: None,
-                maturity: maturity.to_owned(),
+                maturity: test.maturity.word().to_owned(),
+                maturity_note: test.maturity.note().map(str::to_owned),
                 journal: Some((seq, seq)),
                 decisions: Vec::new(),
                 steps: Vec::new(),
+                allowances: Vec::new(),
             },
             departure: Departure::default(),
             hidden: Vec::new(),
+            open: Vec::new(),
             ended: false,
         }
     }
@@ -171,7 +218,10 @@ impl TestJudge {
                 self.base = entry.at().moment;
             }
             Event::Bound { name, value } => self.bindings.set(name, value.clone()),
-            Event::TestEnded { .. } => self.finish(entry.at().moment, ground),
+            Event::TestEnded { .. } => {
+                self.allow_for_lag(timeline);
+                self.finish(entry.at().moment, ground);
+            }
             _ => {
                 if let Some(mut running) = self.running.take() {
                     running.evaluator.observe(entry, subject, &self.scene(timeline, ground));
@@ -191,6 +241,7 @@ impl TestJudge {
             bindings: &self.bindings,
             timeline,
             entries: &self.entries,
+            waivers: &ground.waivers,
         }
     }
 
@@ -210,6 +261,7 @@ impl TestJudge {
             cursor: self.cursor,
             base: self.base,
             begun: begun.1,
+            step: begun.0,
         };
         let evaluator = Evaluator::begin(&step, position, &self.scene(timeline, ground));
         self.running = Some(Running {
@@ -235,13 +287,20 @@ impl TestJudge {
         let cut_short = match end {
             StepEnd::Decided | StepEnd::Deadline => None,
             StepEnd::Interrupted => Some("the run was interrupted".to_owned()),
-            StepEnd::Broken(why) => Some(why.clone()),
+            StepEnd::Broken(why) | StepEnd::Refused(why) => Some(why.clone()),
         };
         let at = entry.at().moment;
         let outcome = evaluator.end(at, cut_short.as_deref(), &self.scene(timeline, ground));
         self.record_step(&step, &outcome, end, begun, entry);
-        if let StepEnd::Broken(why) = end {
-            self.broken(section, &step, why);
+        for allowance in &outcome.allowances {
+            if !self.result.allowances.contains(allowance) {
+                self.result.allowances.push(allowance.clone());
+            }
+        }
+        match end {
+            StepEnd::Broken(why) => self.broken(section, &step, why),
+            StepEnd::Refused(why) => self.refused(section, &step, why),
+            _ => {}
         }
         for (name, value) in &outcome.saves {
             self.bindings.set(name, value.clone());
@@ -262,22 +321,56 @@ impl TestJudge {
                 step.title.clone().unwrap_or_else(|| step.path.clone()),
                 step.span.place()
             );
+            let own = reported(timeline).map(|own| format!("; {own}")).unwrap_or_default();
             match section {
-                Section::Given => self.preamble = Err(format!("the precondition was not reached: {place}: {why}")),
+                Section::Given => {
+                    self.preamble = Err(format!("the precondition was not reached: {place}: {why}{own}"));
+                }
                 Section::Steps => self.body = Err(format!("{place}: {why}")),
                 Section::Finally => {}
             }
         }
-        if section == Section::Steps {
+        let owed = section == Section::Given && step.owes;
+        if owed || section == Section::Steps {
             let waited = Waited {
                 seconds: at.since(base).as_secs_f64(),
                 since: self.mark,
                 messages: outcome.seen,
             };
-            for clause in outcome.clauses {
+            for mut clause in outcome.clauses {
+                if owed {
+                    clause.word = "owes";
+                    clause.holds = of_precondition(clause.holds, outcome.seen);
+                }
+                // A walk that went wrong, or a message that shows what it must not, is no matter of time.
+                let of_time = match (&clause.holds, &outcome.timing) {
+                    (Holds::Late, timing) => *timing,
+                    (Holds::No, Some(timing @ Timing::Missed(_)))
+                        if clause.witness.is_none() || matches!(step.verb, Verb::Action(_)) =>
+                    {
+                        Some(*timing)
+                    }
+                    _ => None,
+                };
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
-                self.push(decide(clause, &step.path, waited, &ground.catalogue, &ground.pack));
+                self.open.push(Open {
+                    clause,
+                    path: step.path.clone(),
+                    walks: matches!(step.verb, Verb::Action(_)),
+                    ended: entry.seq(),
+                    waited,
+                    of_time,
+                });
             }
+        }
+    }
+
+    /// A device that does not do what it is asked for leaves the test undecided; it is nobody's breakdown.
+    fn refused(&mut self, section: Section, step: &Step, why: &str) {
+        match section {
+            Section::Given => self.preamble = Err(format!("the precondition was not reached: {}: {why}", step.path)),
+            Section::Steps => self.body = Err(format!("{}: {why}", step.path)),
+            Section::Finally => {}
         }
     }
 
@@ -290,6 +383,7 @@ impl TestJudge {
     fn record_step(&mut self, step: &Step, outcome: &StepOutcome, end: &StepEnd, begun: (u64, Moment), entry: &Entry) {
         let word = match (end, &outcome.reached) {
             (StepEnd::Broken(_), _) => "broken",
+            (StepEnd::Refused(_), _) => "failed",
             (StepEnd::Interrupted, _) => "interrupted",
             (_, Some(Err(_))) => "failed",
             _ => "done",
@@ -306,9 +400,9 @@ impl TestJudge {
         });
     }
 
-    fn push(&mut self, decision: Option<crate::report::result::Decision>) {
+    fn push(&mut self, decision: Option<Decision>) {
         if let Some(decision) = decision {
-            self.verdict.add(decision.verdict);
+            self.verdict.add(decision.verdict());
             self.result.decisions.push(decision);
         }
     }
@@ -318,15 +412,33 @@ impl TestJudge {
         self.hidden = hidden;
     }
 
+    /// What the harness's own lag can explain is not held against the device.
+    fn allow_for_lag(&mut self, timeline: &Timeline) {
+        for open in &mut self.open {
+            let Some(lag) = open.of_time.and_then(|timing| timing.explained(timeline)) else {
+                continue;
+            };
+            let why = format!(
+                "the harness itself was held up for {:.1} s meanwhile",
+                lag.as_secs_f64()
+            );
+            open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+            open.clause.holds = Holds::Unseen(why);
+        }
+    }
+
     /// Clauses that were never reached are inconclusive, and a test that decided nothing is an error.
     fn finish(&mut self, at: Moment, ground: &Ground) {
         if std::mem::replace(&mut self.ended, true) {
             return;
         }
         self.result.seconds = at.since(self.begun.1).as_secs_f64();
-        let hidden = take_back(&mut self.result.decisions, &self.result.steps, &self.hidden);
-        let decided = self.result.decisions.iter();
-        self.verdict = decided.map(|decision| decision.verdict).collect();
+        let mut open = std::mem::take(&mut self.open);
+        let hidden = hide(&mut open, &self.hidden);
+        for open in open {
+            let decision = decide(open.clause, &open.path, open.waited, &ground.catalogue, &ground.pack);
+            self.push(decision);
+        }
         let why = match (&self.trouble, &self.preamble, &self.body) {
             (Some(trouble), _, _) => trouble.clone(),
             (None, Ok(()), _) if hidden.is_some() => hidden.unwrap_or_default(),
@@ -358,19 +470,8 @@ impl TestJudge {
                 if super::decide::mood(&ground.catalogue, &ground.pack, requirement.as_str()).is_none() {
                     continue;
                 }
-                let decision = crate::report::result::Decision {
-                    requirement: requirement.as_str().to_owned(),
-                    verdict: Verdict::Inconclusive,
-                    clause,
-                    place: step.verb_span.place(),
-                    witness: None,
-                    message: why.clone(),
-                    expected: None,
-                    nearest: None,
-                    waited: None,
-                    explanation: None,
-                    interpretation: None,
-                };
+                let place = step.verb_span.place();
+                let decision = Decision::new(requirement.as_str(), Verdict::Inconclusive, clause, place, why.clone());
                 self.push(Some(decision));
             }
         }
@@ -393,7 +494,7 @@ impl TestJudge {
             .result
             .decisions
             .iter()
-            .find(|decision| decision.verdict == verdict);
+            .find(|decision| decision.verdict() == verdict);
         Some(match decisive {
             Some(decision) if verdict != Verdict::Inconclusive => {
                 format!("{}: {}", decision.requirement, decision.message)

@@ -61,6 +61,10 @@ impl Watch {
 pub(super) struct Watched {
     pub monitor: Arc<Monitor>,
     pub result: MonitorResult,
+    /// The requirements of which something was judged.
+    judged: Vec<String>,
+    /// Why nothing can be judged, though it should be.
+    open: Option<String>,
 }
 
 impl Watched {
@@ -68,14 +72,20 @@ impl Watched {
     pub fn decisions(&self) -> Vec<(String, Verdict)> {
         let found = self.result.findings.iter();
         let mut all: Vec<(String, Verdict)> = found.map(|f| (f.requirement.clone(), f.verdict)).collect();
-        if self.result.judged > 0 {
+        all.extend(self.judged.iter().map(|id| (id.clone(), Verdict::Pass)));
+        if self.open.is_some() {
             let bound = self.monitor.checks.iter();
-            all.extend(bound.map(|binding| (binding.requirement.as_str().to_owned(), Verdict::Pass)));
+            all.extend(bound.map(|binding| (binding.requirement.as_str().to_owned(), Verdict::Inconclusive)));
         }
         all
     }
 
-    fn absorb(&mut self, other: MonitorResult) {
+    fn absorb(&mut self, other: MonitorResult, judged: Vec<String>) {
+        for id in judged {
+            if !self.judged.contains(&id) {
+                self.judged.push(id);
+            }
+        }
         self.result.judged += other.judged;
         for finding in other.findings {
             let known = self
@@ -148,6 +158,11 @@ impl Watches {
         all.flat_map(MonitorJudge::hidden).collect()
     }
 
+    /// The members that show nothing any more for what monitors have found in this run, with the requirement.
+    pub fn accused(&self) -> Vec<(String, String)> {
+        self.first.monitors.iter().flat_map(MonitorJudge::accused).collect()
+    }
+
     /// What was found, monitor by monitor.
     pub fn results(&self) -> Vec<Watched> {
         let mut all: Vec<Watched> = self.first.monitors.iter().map(of).collect();
@@ -155,7 +170,7 @@ impl Watches {
             // All vehicles have the same monitors.
             let known = all.iter_mut().find(|known| known.result.id == monitor.monitor().id);
             if let Some(known) = known {
-                known.absorb(monitor.result());
+                known.absorb(monitor.result(), monitor.judged());
             }
         }
         all
@@ -166,6 +181,8 @@ fn of(monitor: &MonitorJudge) -> Watched {
     Watched {
         monitor: Arc::clone(monitor.monitor()),
         result: monitor.result(),
+        judged: monitor.judged(),
+        open: monitor.open().map(str::to_owned),
     }
 }
 

@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
+use super::mend::Mends;
 use super::step::Holds;
 use super::timeline::Timeline;
 use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::journal::Entry;
+use crate::journal::event::Waiver;
 use crate::pack::{Pack, Role};
 use crate::pattern::Bindings;
 use crate::suite::model::{Binding, CheckUse};
@@ -33,6 +35,8 @@ pub struct Scene<'a> {
     pub timeline: &'a Timeline,
     /// All entries of the test so far.
     pub entries: &'a [Arc<Entry>],
+    /// Lasting mistakes of the vehicle that do not stand in the way any more.
+    pub waivers: &'a [Waiver],
 }
 
 /// A named check running over a window.
@@ -41,6 +45,8 @@ pub(super) struct CheckWindow {
     shared: Shared,
     with: Map<String, Value>,
     findings: Vec<CheckFinding>,
+    /// How the states are read.
+    mends: Mends,
     /// Those of them that are about the window.
     told: Vec<CheckFinding>,
     /// How many entries of the test it has seen.
@@ -86,9 +92,16 @@ impl CheckWindow {
             shared,
             with,
             findings: Vec::new(),
+            mends: Mends::default(),
             told: Vec::new(),
             seen: 0,
         })
+    }
+
+    /// From now on the states are read as they are meant.
+    pub(super) fn lenient(mut self, mends: Mends) -> Self {
+        self.mends = mends;
+        self
     }
 
     /// Shows it everything of the test up to and including this entry, which may be of any topic: a check of the
@@ -98,9 +111,11 @@ impl CheckWindow {
         while let Some(next) = scene.entries.get(self.seen).filter(|next| next.seq() <= entry.seq()) {
             self.seen += 1;
             let before = self.findings.len();
+            let meant = self.mends.read(next, scene);
+            let shown = meant.as_deref().unwrap_or(next);
             let judged = self
                 .running
-                .observe(next, &context(scene, &self.with, &self.shared), &mut self.findings);
+                .observe(shown, &context(scene, &self.with, &self.shared), &mut self.findings);
             if next.seq() == entry.seq() {
                 let here = self.findings.iter().skip(before);
                 self.told
@@ -202,6 +217,7 @@ mod tests {
             shared: Shared::default(),
             with: Map::new(),
             findings: Vec::new(),
+            mends: Mends::default(),
             told,
             seen: 0,
         };

@@ -6,6 +6,7 @@
 //! patterns, checks and the judge.
 
 mod assets;
+mod breakage;
 mod catalogue;
 mod catalogue_file;
 mod protocol;
@@ -17,6 +18,7 @@ mod version;
 mod tests;
 
 pub use assets::{AssetFile, Assets};
+pub use breakage::{Breakage, Ground, Way};
 pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionNote};
 pub use protocol::{Pack, PackError, Packs, TopicName, TopicRule};
 pub use schema::{Finding, FindingKind, MessageSchema};

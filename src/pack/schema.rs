@@ -101,6 +101,12 @@ impl MessageSchema {
     pub fn members(&self, path: &[&str]) -> Vec<String> {
         super::shape::members(&self.0.raw, path)
     }
+
+    /// Every way to break one member of a message that is right.
+    #[must_use]
+    pub fn breakages(&self, ground: &super::Ground) -> Vec<super::Breakage> {
+        super::breakage::breakages(&self.0.raw, ground)
+    }
 }
 
 impl fmt::Debug for MessageSchema {

@@ -77,7 +77,7 @@ pub(super) fn members(root: &Value, path: &[&str]) -> Vec<String> {
 }
 
 /// A schema together with everything it refers to: all of these hold at the same place.
-fn parts<'a>(root: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
+pub(super) fn parts<'a>(root: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
     let mut found: Vec<&Value> = vec![schema];
     let mut at = 0;
     while let Some(part) = found.get(at).copied() {
@@ -113,7 +113,8 @@ fn elements<'a>(root: &'a Value, mut here: Vec<&'a Value>) -> Vec<&'a Value> {
     here
 }
 
-fn kinds(here: &[&Value]) -> Vec<&'static str> {
+/// The JSON types all of these allow.
+pub(super) fn kinds(here: &[&Value]) -> Vec<&'static str> {
     let named: Vec<&str> = here
         .iter()
         .filter_map(|part| part.get("type"))

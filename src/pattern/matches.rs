@@ -79,6 +79,31 @@ impl Bound {
         found
     }
 
+    /// Of what kind the elements are that a `$hasNew` asks for: the members that name a type, with what they must be.
+    #[must_use]
+    pub fn kinds_of_new(&self) -> Vec<(&str, &Self)> {
+        let mut found = Vec::new();
+        self.gather_kinds(false, &mut found);
+        found
+    }
+
+    fn gather_kinds<'a>(&'a self, inside: bool, found: &mut Vec<(&'a str, &'a Self)>) {
+        match &self.kind {
+            BoundKind::Object(members) => {
+                for (name, member) in members {
+                    if inside && name.ends_with("Type") {
+                        found.push((name, member));
+                    } else if !inside {
+                        member.gather_kinds(false, found);
+                    }
+                }
+            }
+            BoundKind::All(parts) => parts.iter().for_each(|part| part.gather_kinds(inside, found)),
+            BoundKind::Elements(Element::HasNew, inner) => inner.gather_kinds(true, found),
+            _ => {}
+        }
+    }
+
     fn gather_new<'a>(&self, values: &[&'a Value], baseline: &Baseline, found: &mut Vec<&'a Value>) {
         let elements = || values.iter().filter_map(|value| value.as_array()).flatten();
         match &self.kind {

@@ -32,7 +32,23 @@ pub enum Claim {
     Statement(String),
     /// `no` and a name of [`STATEMENTS`] or [`SAMPLE_ACTIONS`].
     NoStatement(String),
+    /// `no hook NAME`: it has nothing that the hook could be about, such as a lift or a latch. One of [`EQUIPMENT`].
+    NoHook(String),
 }
+
+/// Hooks about what a vehicle need not have.
+pub const EQUIPMENT: &[&str] = &[
+    "block-pause",
+    "drive-manually",
+    "enable-map",
+    "lock-charger",
+    "press-pause",
+    "release-pause",
+    "trigger",
+    "unblock-pause",
+    "unlock-charger",
+    "use-lift",
+];
 
 const SCOPES: [&str; 3] = ["INSTANT", "NODE", "EDGE"];
 
@@ -56,6 +72,11 @@ impl FromStr for Claim {
                 diagnostic::did_you_mean(scope, SCOPES),
             )),
             ["no", "action", name] => Ok(Self::NoAction((*name).to_owned())),
+            ["no", "hook", name] if EQUIPMENT.contains(name) => Ok(Self::NoHook((*name).to_owned())),
+            ["no", "hook", name] => Err((
+                format!("a device cannot do without `{name}`"),
+                format!("only these may be missing at a device: {}", EQUIPMENT.join(", ")),
+            )),
             ["optional", path] => Ok(Self::Optional((*path).to_owned())),
             ["no", "optional", path] => Ok(Self::NoOptional((*path).to_owned())),
             ["limit", name, "=", value] => match value.parse() {
@@ -76,7 +97,7 @@ impl FromStr for Claim {
             _ => Err((
                 format!("`{text}` is not a claim"),
                 "a claim is `action NAME`, `action NAME NODE`, `no action NAME`, `optional PATH`, `no optional PATH`, \
-                 `limit NAME = 10`, or the name of a statement"
+                 `limit NAME = 10`, `no hook NAME`, or the name of a statement"
                     .to_owned(),
             )),
         }
@@ -137,6 +158,7 @@ impl std::fmt::Display for Claim {
             Self::Limit { name, value } => write!(f, "limit {name} = {value}"),
             Self::Statement(name) => f.write_str(name),
             Self::NoStatement(name) => write!(f, "no {name}"),
+            Self::NoHook(name) => write!(f, "no hook {name}"),
         }
     }
 }
@@ -157,6 +179,7 @@ mod tests {
             "line-guided",
             "no line-guided",
             "no uninterruptible-action",
+            "no hook use-lift",
         ] {
             assert_eq!(text.parse::<Claim>().expect("a claim").to_string(), text);
         }
@@ -172,6 +195,7 @@ mod tests {
             "long-action",
             "limit x = y",
             "limit x 10",
+            "no hook power-cycle",
             "a b c",
         ] {
             let (_, hint) = text.parse::<Claim>().expect_err(text);

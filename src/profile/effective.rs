@@ -135,6 +135,7 @@ impl Taken<'_> {
             broker: limit("time.broker").unwrap_or(default.broker),
             state_period: limit("time.state-period").unwrap_or(default.state_period),
             settle: limit("time.settle").unwrap_or(default.settle),
+            notice: limit("time.notice").unwrap_or(default.notice),
         }
     }
 

@@ -378,6 +378,7 @@ pub const KEYS: &[Key] = &[
     key("time.will", Kind::Duration),
     key("time.quiet", Kind::Duration),
     key("time.settle", Kind::Duration),
+    key("time.notice", Kind::Duration),
     key("time.broker", Kind::Duration),
     key("maps.files", Kind::Files),
 ];
@@ -449,7 +450,7 @@ impl Kind {
                     .to_owned()
             }
             Self::Claims => "a list of texts such as \"action pick NODE\", \"no action drop\", \"optional PATH\", \
-                             \"limit NAME = 10\", or names of statements"
+                             \"limit NAME = 10\", \"no hook use-lift\", or names of statements"
                 .to_owned(),
             Self::Names => "a list of names, such as [\"n1\", \"n2\"]".to_owned(),
         }

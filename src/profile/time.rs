@@ -36,6 +36,8 @@ pub struct TimeLimits {
     pub state_period: Duration,
     /// How long the device is left alone until it counts as settled.
     pub settle: Duration,
+    /// How long a message may be under way to a master control and lie there unread.
+    pub notice: Duration,
 }
 
 /// The last will when the keep-alive of the device is not known.
@@ -57,6 +59,7 @@ impl Default for TimeLimits {
             broker: Duration::from_secs(5),
             state_period: Duration::from_secs(31),
             settle: Duration::from_secs(2),
+            notice: Duration::from_secs(1),
         }
     }
 }
@@ -71,7 +74,7 @@ enum Loosened {
 
 impl TimeLimits {
     /// Name in suites, value, and in which direction it gets looser.
-    fn named(&self) -> [(&'static str, Duration, Loosened); 13] {
+    fn named(&self) -> [(&'static str, Duration, Loosened); 14] {
         use Loosened::{ByLonger, ByShorter, Never};
         [
             ("react", self.react, ByLonger),
@@ -87,6 +90,7 @@ impl TimeLimits {
             ("broker", self.broker, Never),
             ("statePeriod", self.state_period, ByLonger),
             ("settle", self.settle, ByShorter),
+            ("notice", self.notice, ByLonger),
         ]
     }
 

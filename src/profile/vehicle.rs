@@ -144,12 +144,12 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
     ),
     word(
         "reject-orders",
-        &["errorType", "errorLevel", "count", "references"],
+        &["errorType", "count", "references"],
         "It rejects new orders with this error; all of them unless said.",
     ),
     word(
         "reject-updates",
-        &["errorType", "errorLevel", "count", "references"],
+        &["errorType", "count", "references"],
         "It rejects updates of its order with this error; all of them unless said.",
     ),
     word(

@@ -174,7 +174,7 @@ fn test_case(test: &TestResult) -> TestCase {
     let worst = test
         .decisions
         .iter()
-        .filter(|decision| Some(decision.verdict) == verdict)
+        .filter(|decision| Some(decision.verdict()) == verdict)
         .collect::<Vec<_>>();
     let kind = worst.first().map_or("", |decision| decision.requirement.as_str());
     let message = match (&test.not_applicable, &test.reason, worst.first()) {
@@ -183,8 +183,8 @@ fn test_case(test: &TestResult) -> TestCase {
         (_, None, Some(decision)) => decision.message.as_str(),
         (_, None, None) => "the test decided nothing",
     };
-    let mut findings: Vec<&Decision> = test.decisions.iter().filter(|d| d.verdict != Verdict::Pass).collect();
-    findings.sort_by_key(|decision| std::cmp::Reverse(decision.verdict));
+    let mut findings: Vec<&Decision> = test.decisions.iter().filter(|d| d.verdict() != Verdict::Pass).collect();
+    findings.sort_by_key(|decision| std::cmp::Reverse(decision.verdict()));
     let details = findings
         .iter()
         .map(|decision| finding(decision))
@@ -203,8 +203,8 @@ fn test_case(test: &TestResult) -> TestCase {
 }
 
 fn finding(decision: &Decision) -> String {
+    let verdict = decision.verdict();
     let Decision {
-        verdict,
         requirement,
         clause,
         place,

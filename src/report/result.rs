@@ -158,14 +158,20 @@ pub struct TestResult {
     /// Why the verdict is not a pass, in one line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// `watchlist` or `reviewed`.
+    /// `reviewed`, `not reviewed` or `watchlist`.
     pub maturity: String,
+    /// When it was reviewed and what was looked at, or what is disputed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub maturity_note: Option<String>,
     /// First and last journal number.
     pub journal: Option<(u64, u64)>,
     /// What was decided.
     pub decisions: Vec<Decision>,
     /// The steps as they went.
     pub steps: Vec<StepResult>,
+    /// Lasting mistakes of the device that would have stood in the way, and what else had to be done to get here.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub allowances: Vec<String>,
 }
 
 /// One step of a test.
@@ -199,8 +205,8 @@ pub struct StepResult {
 pub struct Decision {
     /// Requirement id.
     pub requirement: String,
-    /// What was decided.
-    pub verdict: Verdict,
+    /// What was decided. It is given once, and nothing changes it afterwards.
+    verdict: Verdict,
     /// Path of the clause, such as `steps[6].assert`.
     pub clause: String,
     /// File and line of the clause.
@@ -228,6 +234,30 @@ pub struct Decision {
 }
 
 impl Decision {
+    /// A decision with nothing to show but its message.
+    #[must_use]
+    pub fn new(requirement: &str, verdict: Verdict, clause: String, place: String, message: String) -> Self {
+        Self {
+            requirement: requirement.to_owned(),
+            verdict,
+            clause,
+            place,
+            witness: None,
+            message,
+            expected: None,
+            nearest: None,
+            waited: None,
+            explanation: None,
+            interpretation: None,
+        }
+    }
+
+    /// What was decided.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
     /// Whether it wants to be shown in full: something was seen that should not be, or a search can show what
     /// came closest. What merely could not be decided is listed.
     #[must_use]
@@ -301,6 +331,16 @@ pub struct MonitorFinding {
     pub interpretation: Option<String>,
 }
 
+/// A verdict on a requirement, and who gave it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Given {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Tests and monitors.
+    pub by: Vec<String>,
+}
+
 /// What is known about one requirement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -311,6 +351,9 @@ pub struct RequirementResult {
     pub verdict: Option<Verdict>,
     /// Tests and monitors that decided it.
     pub decided_by: Vec<String>,
+    /// Where they disagree: every verdict with those that gave it, the worst first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub verdicts: Vec<Given>,
     /// Why nothing did: `not applicable`, `no test`, `not testable: …`, `not selected`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_decided: Option<String>,

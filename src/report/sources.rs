@@ -231,6 +231,7 @@ mod tests {
             title: None,
             spec: None,
             verb,
+            owes: false,
             verb_span: span.clone(),
             span,
         }
@@ -245,13 +246,14 @@ mod tests {
             spec: ">=1".parse().expect("range"),
             needs: Vec::new(),
             moves: false,
-            maturity: Maturity::Reviewed,
+            maturity: Maturity::Open,
             why: "because".to_owned(),
             given: Vec::new(),
             steps,
             finally: Vec::new(),
             source: Arc::clone(source),
             course: CourseNeed::default(),
+            drawn: None,
         }
     }
 

@@ -280,8 +280,8 @@ pub fn limits(result: &RunResult) -> Vec<String> {
     if young > 0 {
         let tests = many(young, "test");
         all.push(match young {
-            1 => format!("{tests} with a finding is still on the watchlist: its evidence wants a second look."),
-            _ => format!("{tests} with a finding are still on the watchlist: their evidence wants a second look."),
+            1 => format!("{tests} with a finding is on the watchlist: what it holds true is disputed."),
+            _ => format!("{tests} with a finding are on the watchlist: what they hold true is disputed."),
         });
     }
     for limit in &result.limits {

@@ -88,7 +88,7 @@ pub fn test(test: &TestResult, sources: &Sources, journal: Option<&Journal>, col
     let (blocks, undecided): (Vec<&Decision>, Vec<&Decision>) = test
         .decisions
         .iter()
-        .filter(|decision| decision.verdict != Verdict::Pass)
+        .filter(|decision| decision.verdict() != Verdict::Pass)
         .partition(|decision| decision.is_finding());
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
     if blocks.is_empty() && !matches!(verdict, Some(Verdict::Pass) | None) {
@@ -126,11 +126,11 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
     let origin = known.map_or(String::new(), |known| {
         format!("   {}, §{}", line(&known.mood), line(&known.section))
     });
-    let styled = color.verdict(Some(decision.verdict)).apply_to(&id);
-    let origin = color.dim().apply_to(format!("{}{origin}", decision.verdict));
+    let styled = color.verdict(Some(decision.verdict())).apply_to(&id);
+    let origin = color.dim().apply_to(format!("{}{origin}", decision.verdict()));
     let mut text = format!("      {styled}   {origin}\n\n");
     let gutter = if let Some(explanation) = &decision.explanation {
-        explained(explanation, decision.verdict, color, &mut text)
+        explained(explanation, decision.verdict(), color, &mut text)
     } else {
         let _ = writeln!(text, "   --> {}\n    |", line(&decision.place));
         let _ = writeln!(text, "    | {}\n    |", line(&decision.message));

@@ -1,8 +1,9 @@
 //! Before the first test: the device is there, and has said what it can do.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::between::Presence;
 use super::session::Session;
@@ -44,6 +45,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         }
         self.factsheet().await?;
         self.active_map()?;
+        self.home.first = self.engine.recorder.judge().state().map(Cow::into_owned);
+        self.home.before.clone_from(&self.home.first);
+        self.read_over(self.engine.link.now().moment).await?;
         Ok(Ok(()))
     }
 
@@ -65,7 +69,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             .map(str::to_owned)
             .filter(|_| !found)
         {
-            self.instant_action(&request).await?;
+            self.instant_action(&request, json!([])).await?;
             let until = self.engine.link.now().moment + self.time("react");
             found = self.engine.watch(until, has_sheet).await?;
         }
@@ -90,6 +94,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
                 value: sheet.clone(),
             })?;
             self.setup.capabilities.factsheet = Some(sheet);
+            let contradictions = self.setup.capabilities.contradictions();
+            self.setup.limits.extend(contradictions);
         }
         Ok(())
     }
@@ -114,11 +120,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             })?;
             Some(json!({ "mapId": id, "mapVersion": active.get("mapVersion")? }))
         });
-        self.setup
-            .capabilities
-            .statements
-            .insert("active-map".to_owned(), found.is_some());
         if let Some(value) = found {
+            let statements = &mut self.setup.capabilities.statements;
+            statements.insert("active-map".to_owned(), true);
             self.engine.note(Event::Bound {
                 name: "device.activeMap".to_owned(),
                 value,
@@ -127,11 +131,11 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
-    /// Sends one instant action outside any test.
-    pub(super) async fn instant_action(&mut self, action_type: &str) -> Result<(), EngineError> {
+    /// Sends one instant action outside any test, and gives its id.
+    pub(super) async fn instant_action(&mut self, action_type: &str, parameters: Value) -> Result<String, EngineError> {
         let id = self.engine.composer.action_id();
         let members = json!({ "actions": [{
-            "actionType": action_type, "actionId": id, "blockingType": "HARD", "actionParameters": [],
+            "actionType": action_type, "actionId": id, "blockingType": "HARD", "actionParameters": parameters,
         }] });
         let now = self.engine.link.now();
         let message = self
@@ -139,14 +143,14 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             .composer
             .plain("instantActions", members, self.engine.recorder.judge().ground(), now);
         match message {
-            Ok(message) => self.engine.publish(message).await,
+            Ok(message) => self.engine.publish(message).await?,
             Err(error) => {
                 self.engine.note(Event::Trouble {
                     text: error.to_string(),
                 })?;
-                Ok(())
             }
         }
+        Ok(id)
     }
 
     /// A time limit of the profile.

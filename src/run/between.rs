@@ -4,13 +4,16 @@ use serde_json::Map;
 
 use super::admission::is_stale;
 use super::session::Session;
-use crate::engine::vehicle::{has_any_open_connection, has_open_connection, is_idle};
+use crate::engine::vehicle::{has_any_open_connection, has_open_connection};
 use crate::engine::{EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, LinkFault};
 use crate::judge::RunJudge;
 use crate::link::{Link, Vantage};
 use crate::pack::Role;
 use crate::profile::show_duration;
+
+/// So often a device is switched on before it is given up.
+const STARTS: usize = 2;
 
 /// Whether the device is connected, as far as the harness can see.
 pub(super) enum Presence {
@@ -105,47 +108,85 @@ pub(super) async fn revive<L: Link, O: Operator>(
     })
 }
 
-/// Switches the device off and on by its hook, and waits for the first state of the new connection. `Err` says
-/// what did not work.
-async fn power_cycle<L: Link, O: Operator>(
+/// Switches the device off and on by its hook, and waits for the first state of the new connection. A start that takes
+/// long is waited for as long as it gets on; one that does not is tried once more. `Err` says what did not work.
+pub(super) async fn power_cycle<L: Link, O: Operator>(
     session: &mut Session<'_, L, O>,
     reason: String,
 ) -> Result<Result<(), String>, EngineError> {
-    let vantage = session.setup.capabilities.vantage;
     session.progress.note(&reason);
-    let before = session.engine.note(Event::Note { text: reason })?;
+    session.engine.note(Event::Note { text: reason })?;
+    let mut outcome = Err(String::new());
+    for attempt in 0..STARTS {
+        if attempt > 0 {
+            let text = "it is switched off and on once more".to_owned();
+            session.progress.note(&text);
+            session.engine.note(Event::Note { text })?;
+        }
+        outcome = off_and_on(session).await?;
+        if outcome.is_ok() || session.engine.interrupted() {
+            break;
+        }
+    }
+    Ok(outcome)
+}
+
+async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Result<Result<(), String>, EngineError> {
+    let vantage = session.setup.capabilities.vantage;
+    let before = next_seq(&session.engine.recorder);
     match session.engine.hook("power-cycle", Map::new(), true).await? {
         HookOutcome::Done(_) => {}
-        HookOutcome::Failed(failed) => return Ok(Err(format!("hook `power-cycle` failed: {failed}"))),
+        HookOutcome::Failed(failed) | HookOutcome::Refused(failed) => {
+            return Ok(Err(format!("hook `power-cycle` failed: {failed}")));
+        }
         HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),
     }
-    let after = session
-        .engine
-        .recorder
-        .journal()
-        .entries()
-        .last()
-        .map_or(0, |entry| entry.seq() + 1);
+    let after = next_seq(&session.engine.recorder);
+    let on_again = move |recorder: &Recorder| match vantage {
+        // What the device still said before it was switched off is not what it says now that it is on again.
+        Vantage::Tap => recorder
+            .judge()
+            .timeline()
+            .since("mqtt/connect", before)
+            .first()
+            .map(|entry| entry.seq()),
+        Vantage::Subscriber => Some(after),
+    };
     let back = move |recorder: &Recorder| {
         let timeline = recorder.judge().timeline();
-        // What the device still said before it was switched off is not what it says now that it is on again.
-        let on_again = match vantage {
-            Vantage::Tap => timeline.since("mqtt/connect", before).first().map(|entry| entry.seq()),
-            Vantage::Subscriber => Some(after),
-        };
         let said = |since| timeline.since("state", since).iter().any(|entry| !is_stale(entry));
-        on_again.is_some_and(said)
+        on_again(recorder).is_some_and(said)
             && Presence::of(recorder.judge(), vantage).is_there()
             && says_online(recorder.judge())
     };
-    let until = session.engine.link.now().moment + session.time("connect");
-    if session.engine.watch(until, back).await? {
+    let begun = session.engine.link.now().moment;
+    let patience = session.time("connect");
+    if session.engine.watch(begun + patience, back).await? {
         return Ok(Ok(()));
     }
+    // It has connected meanwhile, so it is on its way.
+    let is_coming = on_again(&session.engine.recorder).is_some() && vantage == Vantage::Tap;
+    if is_coming && !session.engine.interrupted() {
+        let text = "it has connected, and is given more time".to_owned();
+        session.engine.note(Event::Note { text })?;
+        if session.engine.watch(begun + patience * 2, back).await? {
+            return Ok(Ok(()));
+        }
+    }
+    let waited = session.engine.link.now().moment.since(begun);
+    let missing = if is_coming {
+        "it connected but sent no state, or does not say that it is online,"
+    } else {
+        "it did not come back"
+    };
     Ok(Err(format!(
-        "it did not come back within {} after hook `power-cycle`",
-        show_duration(session.time("connect"))
+        "{missing} within {} after hook `power-cycle`",
+        show_duration(waited)
     )))
+}
+
+fn next_seq(recorder: &Recorder) -> u64 {
+    recorder.journal().entries().last().map_or(0, |entry| entry.seq() + 1)
 }
 
 fn last_sent(recorder: &Recorder) -> String {
@@ -155,38 +196,4 @@ fn last_sent(recorder: &Recorder) -> String {
         .rev()
         .find(|entry| matches!(entry.event(), Event::Sent { .. }));
     sent.map_or_else(|| "none".to_owned(), |entry| format!("#{}", entry.seq()))
-}
-
-/// Brings a vehicle that was left with an order, or without saying that it is online, back to idle: by cancelOrder,
-/// else by the `power-cycle` hook. Gives whether it is idle.
-pub(super) async fn recover<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Result<bool, EngineError> {
-    let well = |recorder: &Recorder| is_idle(recorder.judge()) && says_online(recorder.judge());
-    let idle = |recorder: &Recorder| is_idle(recorder.judge());
-    let until = session.engine.link.now().moment + session.time("settle");
-    if session.engine.watch(until, well).await? {
-        return Ok(true);
-    }
-    let has_hook = session.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
-    let mut why = "the device is connected but does not say that it is online; it is restarted";
-    if !idle(&session.engine.recorder) {
-        why = "the vehicle was left with an order that cancelOrder does not end; it is restarted";
-        if session.engine.cancels {
-            session.engine.note(Event::Note {
-                text: "the test has left the vehicle with an order; the harness cancels it".to_owned(),
-            })?;
-            session.instant_action("cancelOrder").await?;
-            let until = session.engine.link.now().moment + session.time("react") + session.time("slow");
-            let cancelled = session.engine.watch(until, idle).await?;
-            // With another way at hand, a device that does not obey is not asked again after every test.
-            session.engine.cancels = cancelled || !has_hook;
-        }
-    }
-    if !well(&session.engine.recorder)
-        && has_hook
-        && !session.engine.interrupted()
-        && let Err(failed) = power_cycle(session, why.to_owned()).await?
-    {
-        session.progress.note(&failed);
-    }
-    Ok(idle(&session.engine.recorder))
 }

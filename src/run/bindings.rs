@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::{Map, Value};
 
 use super::pace::{Pace, between_looks};
+use super::rest::Home;
 use crate::course::{Layout, Standing};
 use crate::journal::event::{Event, Packet};
 use crate::judge::RunJudge;
@@ -15,7 +16,7 @@ use crate::suite::model::Test;
 const WILL_MARGIN: u64 = 3_000;
 
 /// Where the vehicle stands, as its last state says.
-pub(super) fn standing(judge: &RunJudge, layout: &Layout) -> Option<Standing> {
+pub(super) fn standing(judge: &RunJudge, layout: &Layout, home: &Home) -> Option<Standing> {
     let state = judge
         .timeline()
         .of("state")
@@ -26,7 +27,8 @@ pub(super) fn standing(judge: &RunJudge, layout: &Layout) -> Option<Standing> {
         .get("lastNodeId")
         .and_then(Value::as_str)
         .filter(|id| !id.is_empty());
-    if let Some(node) = node.filter(|id| layout.node(id).is_some()) {
+    // An order has to begin where the vehicle stands, which may be off its last node.
+    if let Some(node) = node.filter(|id| layout.node(id).is_some() && !home.is_between_nodes(state, layout)) {
         return Some(Standing::Node(node.to_owned()));
     }
     let position = state.get("agvPosition")?;
@@ -39,12 +41,17 @@ pub(super) fn standing(judge: &RunJudge, layout: &Layout) -> Option<Standing> {
 }
 
 /// The course of a test; `Err` says why there is none.
-pub(super) fn course_of(test: &Test, layout: Option<&Layout>, judge: &RunJudge) -> Result<Option<Value>, String> {
+pub(super) fn course_of(
+    test: &Test,
+    layout: Option<&Layout>,
+    judge: &RunJudge,
+    home: &Home,
+) -> Result<Option<Value>, String> {
     if test.course.nodes.is_empty() {
         return Ok(None);
     }
     let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
-    let standing = standing(judge, layout).ok_or("the vehicle does not say where it stands")?;
+    let standing = standing(judge, layout, home).ok_or("the vehicle does not say where it stands")?;
     let course = if test.device == Role::MasterControl {
         layout.outward(&test.course, &standing)
     } else if test.course.directed {
@@ -100,6 +107,11 @@ pub(super) fn own_bindings(
 fn will(judge: &RunJudge) -> Option<u64> {
     let entry = judge.timeline().of("mqtt/connect").last()?;
     match entry.event() {
+        // Of a will that was never registered nothing is to be expected.
+        Event::Packet {
+            packet: Packet::Connect { will: None, .. },
+            ..
+        } => Some(WILL_MARGIN),
         Event::Packet {
             packet: Packet::Connect { keep_alive, .. },
             ..

@@ -1,7 +1,8 @@
 //! What the device can do, and who says so.
 //!
-//! Applicability comes from the device's own factsheet, completed or contradicted by the profile. Declared
-//! absent is not applicable; left open is not.
+//! Applicability comes from the device's own factsheet, completed by the profile. Declared absent is not applicable;
+//! what is left open, not allowed, not named or not there is not, and the tests in question stay undecided. So do those
+//! about which profile and factsheet contradict each other.
 
 use std::collections::BTreeMap;
 
@@ -11,6 +12,9 @@ use crate::journal::event::{Capability, Gate};
 use crate::link::Vantage;
 use crate::profile::{SAMPLE_ACTIONS, SampleKind};
 use crate::suite::model::{Need, Test, Verb};
+
+/// Found out from the first state, and said by no profile.
+const ACTIVE_MAP: &str = "active-map";
 
 /// What is known about device, bench and profile.
 #[derive(Clone, Debug)]
@@ -29,6 +33,8 @@ pub struct Capabilities {
     pub maps: bool,
     /// Whether the vehicle may drive; `Err` says why not.
     pub motion: Result<(), String>,
+    /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
+    pub claims_add: bool,
 }
 
 impl Capabilities {
@@ -61,7 +67,7 @@ impl Capabilities {
         if test.moves
             && let Err(why) = &self.motion
         {
-            return Gate::NotApplicable(why.clone());
+            open.get_or_insert_with(|| why.clone());
         }
         open.map_or(Gate::Runs, Gate::Unobservable)
     }
@@ -73,44 +79,91 @@ impl Capabilities {
             Need::MapServer if self.maps => Gate::Runs,
             Need::MapServer => Gate::Unobservable("the device cannot reach the map server".to_owned()),
             Need::Hook(name) if self.hooks.iter().any(|hook| hook == name) => Gate::Runs,
+            Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => Gate::NotApplicable(
+                format!("the profile says that the device has nothing for the hook `{name}`"),
+            ),
             Need::Hook(name) => Gate::Unobservable(format!("the profile has no hook `{name}` ([hooks.{name}])")),
             Need::Profile(name) => match self.statements.get(name) {
                 Some(true) => Gate::Runs,
+                Some(false) if SAMPLE_ACTIONS.iter().any(|sample| sample.name == name) => {
+                    Gate::NotApplicable(format!("the profile says that the device has no `{name}`"))
+                }
                 Some(false) => Gate::NotApplicable(format!("the profile says that the device is not `{name}`")),
+                None if name == ACTIVE_MAP => {
+                    Gate::Unobservable("the first state shows no enabled map on which the vehicle stands".to_owned())
+                }
                 None => Gate::Unobservable(match SAMPLE_ACTIONS.iter().find(|sample| sample.name == name) {
                     Some(sample) => format!("the profile does not name `device.{name}`: {}", sample.doc),
                     None => format!("the profile does not say whether the device is `{name}`"),
                 }),
             },
-            Need::Action { name, scope } => self.declared(&action_name(name, scope.as_deref()), |sheet| {
-                has_action(sheet, name, scope.as_deref())
-            }),
-            Need::NoAction(name) => reverse(
-                self.declared(&action_name(name, None), |sheet| has_action(sheet, name, None)),
-                name,
-            ),
-            Need::Optional(path) => self.declared(&format!("optional {path}"), |sheet| has_optional(sheet, path)),
-            Need::NoOptional(path) => reverse(
-                self.declared(&format!("optional {path}"), |sheet| has_optional(sheet, path)),
-                path,
-            ),
-            Need::Limit(path) => self.declared(&format!("limit {path}"), |sheet| has_limit(sheet, path)),
+            Need::Action { name, scope } => self.action(name, scope.as_deref()),
+            Need::NoAction(name) => reverse(self.action(name, None), name),
+            Need::Optional(path) => self.optional(path),
+            Need::NoOptional(path) => reverse(self.optional(path), path),
+            Need::Limit(path) => self.declared(&[format!("limit {path}")], |sheet| has_limit(sheet, path)),
         }
     }
 
-    fn declared(&self, name: &str, says: impl Fn(&Value) -> bool) -> Gate {
-        if let Some(claimed) = self.claims.get(name) {
-            return if *claimed {
-                Gate::Runs
+    fn action(&self, name: &str, scope: Option<&str>) -> Gate {
+        let whole = action_name(name, None);
+        let names = match scope {
+            Some(_) => vec![action_name(name, scope), whole],
+            None => vec![whole],
+        };
+        self.declared(&names, |sheet| has_action(sheet, name, scope))
+    }
+
+    fn optional(&self, path: &str) -> Gate {
+        self.declared(&[format!("optional {path}")], |sheet| has_optional(sheet, path))
+    }
+
+    /// Whether it has something, by its names, the most exact one first.
+    fn declared(&self, names: &[String], says: impl Fn(&Value) -> Option<bool>) -> Gate {
+        let name = names.first().map_or("", String::as_str);
+        let claimed = names.iter().find_map(|name| self.claims.get(name)).copied();
+        let listed = self.factsheet.as_ref().map(says);
+        match (listed, claimed) {
+            (Some(Some(true)), Some(false)) => Gate::Unobservable(format!(
+                "the factsheet lists what the profile says the device does not have: {name}"
+            )),
+            (Some(Some(false)), Some(true)) if !self.claims_add => Gate::Unobservable(format!(
+                "the factsheet does not list what the profile says the device has: {name}"
+            )),
+            (Some(Some(true)), _) | (_, Some(true)) => Gate::Runs,
+            (_, Some(false)) => Gate::NotApplicable(format!("the profile says that the device does not have: {name}")),
+            (Some(Some(false)), None) => Gate::NotApplicable(format!("the factsheet does not list: {name}")),
+            (Some(None), None) => Gate::Unobservable(format!(
+                "the factsheet has no list that could say whether it has: {name}"
+            )),
+            (None, None) => Gate::Unobservable(format!("there is no factsheet that could say whether it has: {name}")),
+        }
+    }
+
+    /// Where the profile and the factsheet say the opposite of each other, one sentence each.
+    #[must_use]
+    pub fn contradictions(&self) -> Vec<String> {
+        let Some(sheet) = &self.factsheet else {
+            return Vec::new();
+        };
+        let one = |(name, claimed): (&String, &bool)| {
+            let words: Vec<&str> = name.split(' ').collect();
+            let listed = match words[..] {
+                ["action", action] => has_action(sheet, action, None),
+                ["action", action, scope] => has_action(sheet, action, Some(scope)),
+                ["optional", path] => has_optional(sheet, path),
+                ["limit", path] => has_limit(sheet, path),
+                _ => None,
+            }?;
+            let (sheet_says, profile_says) = if *claimed {
+                ("does not list", "has")
             } else {
-                Gate::NotApplicable(format!("the profile says that the device does not have: {name}"))
+                ("lists", "does not have")
             };
-        }
-        match &self.factsheet {
-            Some(sheet) if says(sheet) => Gate::Runs,
-            Some(_) => Gate::NotApplicable(format!("the factsheet does not list: {name}")),
-            None => Gate::Unobservable(format!("there is no factsheet that could say whether it has: {name}")),
-        }
+            (listed != *claimed)
+                .then(|| format!("The factsheet {sheet_says} what the profile says the device {profile_says}: {name}."))
+        };
+        self.claims.iter().filter_map(one).collect()
     }
 
     /// The capabilities for the report, with their sources.
@@ -148,7 +201,15 @@ impl Capabilities {
         for (name, claimed) in self.statements.iter().chain(&self.claims) {
             let said = if *claimed { "yes" } else { "no" };
             all.entry(name.clone())
-                .and_modify(|(_, source)| "factsheet, and the profile".clone_into(source))
+                .and_modify(|(listed, source)| {
+                    let agrees = *claimed == !matches!(listed.as_str(), "no");
+                    let both = if agrees {
+                        "factsheet, and the profile"
+                    } else {
+                        "factsheet; the profile says the opposite"
+                    };
+                    both.clone_into(source);
+                })
                 .or_insert_with(|| (said.to_owned(), "profile".to_owned()));
         }
         all.into_iter()
@@ -170,32 +231,30 @@ fn reverse(gate: Gate, name: &str) -> Gate {
     }
 }
 
-fn has_action(sheet: &Value, name: &str, scope: Option<&str>) -> bool {
-    let all = sheet.pointer("/protocolFeatures/agvActions").and_then(Value::as_array);
-    all.into_iter().flatten().any(|action| {
+/// Whether the factsheet lists an action; `None` when it has no such list.
+fn has_action(sheet: &Value, name: &str, scope: Option<&str>) -> Option<bool> {
+    let all = sheet.pointer("/protocolFeatures/agvActions")?.as_array()?;
+    Some(all.iter().any(|action| {
         let scopes = action.get("actionScopes").and_then(Value::as_array);
         action.get("actionType").and_then(Value::as_str) == Some(name)
             && scope.is_none_or(|scope| scopes.into_iter().flatten().any(|other| other.as_str() == Some(scope)))
-    })
+    }))
 }
 
-fn has_optional(sheet: &Value, path: &str) -> bool {
-    let all = sheet
-        .pointer("/protocolFeatures/optionalParameters")
-        .and_then(Value::as_array);
-    all.into_iter()
-        .flatten()
-        .any(|one| one.get("parameter").and_then(Value::as_str) == Some(path))
+/// Whether the factsheet lists an optional parameter; `None` when it has no such list.
+fn has_optional(sheet: &Value, path: &str) -> Option<bool> {
+    let all = sheet.pointer("/protocolFeatures/optionalParameters")?.as_array()?;
+    let named = |one: &Value| one.get("parameter").and_then(Value::as_str) == Some(path);
+    Some(all.iter().any(named))
 }
 
-/// `maxArrayLens.order.nodes`: a group of `protocolLimits` and a member whose name has dots in it.
-fn has_limit(sheet: &Value, path: &str) -> bool {
-    let Some(limits) = sheet.get("protocolLimits") else {
-        return false;
-    };
+/// `maxArrayLens.order.nodes`: a group of `protocolLimits` and a member whose name has dots in it; `None` when there are
+/// no limits at all.
+fn has_limit(sheet: &Value, path: &str) -> Option<bool> {
+    let limits = sheet.get("protocolLimits")?;
     let (group, member) = path.split_once('.').unwrap_or((path, ""));
     let value = limits.get(group).and_then(|group| group.get(member));
-    value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0)
+    Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
 }
 
 #[cfg(test)]
@@ -212,6 +271,7 @@ mod tests {
             hooks: Vec::new(),
             maps: true,
             motion: Ok(()),
+            claims_add: true,
         }
     }
 
@@ -249,6 +309,37 @@ mod tests {
         assert!(matches!(
             known.has(&Need::Limit("maxArrayLens.order.edges".to_owned())),
             Gate::NotApplicable(_)
+        ));
+    }
+
+    #[test]
+    fn a_profile_that_contradicts_the_factsheet_decides_nothing_by_it() {
+        let mut known = capabilities(Some(sheet()));
+        known.claims = BTreeMap::from([
+            ("action pick".to_owned(), false),
+            ("action drop".to_owned(), true),
+            ("hook use-lift".to_owned(), false),
+        ]);
+        assert!(matches!(known.has(&action(Some("NODE"))), Gate::Unobservable(_)));
+        let drop = Need::Action {
+            name: "drop".to_owned(),
+            scope: None,
+        };
+        assert_eq!(known.has(&drop), Gate::Runs);
+        assert_eq!(known.contradictions().len(), 2);
+        known.claims_add = false;
+        assert!(matches!(known.has(&drop), Gate::Unobservable(_)));
+        let lift = Need::Hook("use-lift".to_owned());
+        assert!(matches!(known.has(&lift), Gate::NotApplicable(_)));
+    }
+
+    #[test]
+    fn a_factsheet_without_lists_leaves_everything_open() {
+        let header_only = capabilities(Some(json!({ "headerId": 1 })));
+        assert!(matches!(header_only.has(&action(None)), Gate::Unobservable(_)));
+        assert!(matches!(
+            header_only.has(&Need::Limit("maxArrayLens.order.nodes".to_owned())),
+            Gate::Unobservable(_)
         ));
     }
 

@@ -12,6 +12,10 @@ use tokio::process::{Child, Command};
 use crate::engine::{HookOutcome, Operator};
 use crate::profile::{Hook, HookAction, show_duration};
 
+/// Answers of a device that has understood what is wanted, and does not do it: in conflict with what it does now, not
+/// to be processed, not implemented.
+const REFUSALS: [u16; 3] = [409, 422, 501];
+
 /// A device that the harness starts itself (`device.command`).
 #[derive(Debug)]
 pub struct DeviceProcess {
@@ -221,6 +225,9 @@ fn request(method: &str, url: &str, body: Option<&str>) -> HookOutcome {
     };
     match ureq::run(made) {
         Ok(answer) => HookOutcome::Done(format!("{method} {url}: {}", answer.status())),
+        Err(ureq::Error::StatusCode(code)) if REFUSALS.contains(&code) => {
+            HookOutcome::Refused(format!("{method} {url}: {code}"))
+        }
         Err(error) => HookOutcome::Failed(format!("{method} {url}: {error}")),
     }
 }

@@ -172,7 +172,7 @@ pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
                 requirement: decision.requirement.clone(),
                 place: format!("{} {}", test.id, decision.clause),
             };
-            all.push((decider, decision.verdict));
+            all.push((decider, decision.verdict()));
         }
     }
     for requirement in &result.requirements {
@@ -195,6 +195,21 @@ pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
         }
     }
     all
+}
+
+/// What was decided, the cases that come from a schema counting as one: which of them are drawn is chance.
+fn decided_in(library: &Library, result: &RunResult) -> Vec<(Decider, Verdict)> {
+    let tests = &library.rules.suites.tests;
+    let fold = |mut decider: Decider| {
+        let (id, clause) = decider.place.split_once(' ').unwrap_or((&decider.place, ""));
+        let found = tests.binary_search_by(|test| test.id.as_str().cmp(id)).ok();
+        if let Some(test) = found.map(|at| &tests[at]).filter(|test| test.drawn.is_some()) {
+            decider.place = format!("{} {clause}", test.table());
+        }
+        decider
+    };
+    let all = decided(result).into_iter();
+    all.map(|(decider, verdict)| (fold(decider), verdict)).collect()
 }
 
 /// Qualifies all tests and monitors of a protocol version and a role with these faults of its reference device.
@@ -232,12 +247,12 @@ pub fn qualify_tests(
     for mut request in requests {
         let Finished { result, .. } = run_silently(library, pack, request.clone())?;
         blemishes.extend(blemishes_of(&result));
-        let all = decided(&result).into_iter().map(|(decider, _)| decider);
+        let all = decided_in(library, &result).into_iter().map(|(decider, _)| decider);
         let own: BTreeSet<Decider> = all.filter(|decider| !deciders.contains(decider)).collect();
         if !vehicles.is_empty() {
             // What also runs on the usual vehicle is proven there.
             let is_own = |id: &str| own.iter().any(|decider| decider.place.split(' ').next() == Some(id));
-            request.tests.retain(|test| is_own(&test.id));
+            request.tests.retain(|test| is_own(test.table()));
             request.complete = false;
         }
         vehicles.push(Vehicle {
@@ -258,15 +273,25 @@ pub fn qualify_tests(
     let selected = |fault: &Fault, test: &Test| faults.len() <= FEW || concerns(fault, test);
     let mut kills = each(faults, |fault| {
         told(fault.name);
-        kill(library, pack, &vehicles, fault, &|test| selected(fault, test))
+        kill(library, pack, &vehicles, fault, DRAWN, &|test| selected(fault, test))
     })?;
+    // What only some members show is tried on all that is drawn from.
+    let missed = kills.iter().filter(|kill| !kill.named());
+    let missed: Vec<Fault> = missed.map(|kill| kill.fault).collect();
+    let drawn = |fault: &Fault, test: &Test| test.drawn.is_some() && concerns(fault, test);
+    merge(
+        &mut kills,
+        each(&missed, |fault| {
+            kill(library, pack, &vehicles, fault, None, &|test| drawn(fault, test))
+        })?,
+    );
     if faults.len() > FEW {
         // What no test it names has found is tried on everything.
         let missed = kills.iter().filter(|kill| !kill.named());
         let missed: Vec<Fault> = missed.map(|kill| kill.fault).collect();
         merge(
             &mut kills,
-            each(&missed, |fault| kill(library, pack, &vehicles, fault, &|_| true))?,
+            each(&missed, |fault| kill(library, pack, &vehicles, fault, DRAWN, &|_| true))?,
         );
         prove_the_rest(library, pack, &vehicles, faults, &deciders, &mut kills)?;
     }
@@ -275,9 +300,16 @@ pub fn qualify_tests(
         blemishes,
         deciders,
         kills,
-        excused: excused.filter(|one| one.role == role).cloned().collect(),
+        excused: excused
+            .filter(|one| one.role == role)
+            .filter(|one| one.spec.as_ref().is_none_or(|spec| spec.contains(pack.version)))
+            .cloned()
+            .collect(),
     })
 }
+
+/// What is drawn of the cases that come from a schema.
+const DRAWN: Option<u64> = Some(1);
 
 /// So many faults are tried on every test.
 const FEW: usize = 5;
@@ -304,7 +336,7 @@ fn prove_the_rest(
     // failed it elsewhere, are tried on everything.
     let tests = &vehicles.first().map_or(&[][..], |vehicle| &vehicle.request.tests);
     let is_monitor =
-        |decider: &&Decider| !decider.place.contains(' ') && !tests.iter().any(|test| test.id == decider.place);
+        |decider: &&Decider| !decider.place.contains(' ') && !tests.iter().any(|test| test.table() == decider.place);
     let monitored = |kills: &[Kill]| -> BTreeSet<String> {
         let open = unproven(kills);
         open.iter()
@@ -328,7 +360,7 @@ fn prove_the_rest(
             found || fault.breaks.iter().any(|id| open.contains(*id))
         };
         let some: Vec<Fault> = some.iter().filter(about).copied().collect();
-        let more = each(&some, |fault| kill(library, pack, vehicles, fault, &|_| true))?;
+        let more = each(&some, |fault| kill(library, pack, vehicles, fault, DRAWN, &|_| true))?;
         merge(kills, more);
     }
     let group = |id: &str| id.rsplit_once('-').map_or(id, |(group, _)| group).to_owned();
@@ -344,7 +376,7 @@ fn prove_the_rest(
             .iter()
             .filter_map(|decider| decider.place.split(' ').next())
             .collect();
-        let is_open = |test: &Test| places.contains(test.id.as_str());
+        let is_open = |test: &Test| places.contains(test.table());
         if !vehicles
             .iter()
             .any(|vehicle| vehicle.request.tests.iter().any(|test| is_open(test)))
@@ -353,7 +385,7 @@ fn prove_the_rest(
         }
         let more = each(some, |fault| {
             // What it breaks was tried before.
-            kill(library, pack, vehicles, fault, &|test| {
+            kill(library, pack, vehicles, fault, DRAWN, &|test| {
                 is_open(test) && !concerns(fault, test)
             })
         })?;
@@ -367,7 +399,7 @@ fn prove_the_rest(
             .filter(|fault| fault.breaks.contains(&decider.requirement.as_str()));
         let about: Vec<Fault> = about.copied().collect();
         let more = each(&about, |fault| {
-            kill(library, pack, vehicles, fault, &|test| test.id == place)
+            kill(library, pack, vehicles, fault, DRAWN, &|test| test.table() == place)
         })?;
         merge(kills, more);
     }
@@ -457,6 +489,7 @@ fn kill(
     pack: &Pack,
     vehicles: &[Vehicle],
     fault: &Fault,
+    draw: Option<u64>,
     selected: &dyn Fn(&Test) -> bool,
 ) -> Result<Kill, EngineError> {
     let mut kill = Kill {
@@ -474,9 +507,10 @@ fn kill(
             continue;
         }
         request.complete = false;
+        request.draw = draw;
         request.faults = vec![fault.name.to_owned()];
         let finished = run_silently(library, pack, request)?;
-        for (decider, verdict) in decided(&finished.result) {
+        for (decider, verdict) in decided_in(library, &finished.result) {
             if matches!(verdict, Verdict::Fail | Verdict::Warning) {
                 kill.report(&decider, verdict);
                 if !kill.requirements.contains(&decider.requirement) {

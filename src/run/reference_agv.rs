@@ -298,7 +298,7 @@ impl ReferenceAgv {
         self.config.speed *= TIMES;
         self.config.rotation_speed *= TIMES;
         self.config.action_duration = self.config.action_duration.div_f64(TIMES);
-        self.config.state_interval = Duration::from_secs(1);
+        self.config.state_interval = Duration::from_millis(500);
         self.config.reconnect_delay = Duration::from_millis(100);
         for (name, seconds) in [
             ("long-action", 0.2),

@@ -84,6 +84,7 @@ impl ReferenceMasterControl {
                 drive: Duration::from_secs(6),
                 quiet: Duration::from_millis(500),
                 settle: Duration::from_millis(300),
+                notice: Duration::from_millis(200),
                 reconnect: Duration::from_secs(20),
                 connect: Duration::from_secs(20),
                 ..TimeLimits::default()
@@ -120,6 +121,7 @@ impl ReferenceMasterControl {
         // What the tests let pass so that nobody is accused of what was under way; here nothing is for long.
         self.time.slow = Duration::from_millis(650);
         self.time.settle = Duration::from_millis(70);
+        self.time.notice = Duration::from_millis(50);
         self.config.reconnect_delay = Duration::from_millis(100);
         self.config.resend_after = Duration::from_secs(2);
         self.config.trigger_timeout = Duration::from_secs(3);
@@ -137,6 +139,7 @@ impl ReferenceMasterControl {
         let later = self.config.answers_after.saturating_sub(before);
         self.time.quiet += later * 2;
         self.time.settle += later * 2;
+        self.time.notice += later;
         self.time.drive += later * 8;
         Ok(())
     }

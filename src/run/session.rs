@@ -5,12 +5,15 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use super::between::{Presence, recover, revive, says_online, settle_link};
+use super::between::{Presence, revive, settle_link};
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
+use super::draw::draw;
 use super::estimate::{self, Estimate};
+use super::rest::{Home, Obstacle};
+use super::risk::by_risk;
+use super::strikes::Strikes;
 use crate::course::Layout;
-use crate::engine::vehicle::is_idle;
 use crate::engine::{Engine, EngineError, Operator, Watcher};
 use crate::journal::event::{Event, Gate, Plan, PlannedTest};
 use crate::judge::RunJudge;
@@ -25,6 +28,8 @@ pub struct Setup {
     pub tests: Vec<Arc<Test>>,
     /// Whether that is every test there is for this role and version.
     pub complete: bool,
+    /// Of the cases that come from a schema, those are run that this seed draws; all of them without one.
+    pub draw: Option<u64>,
     /// What is known before the device is there.
     pub capabilities: Capabilities,
     /// Where the vehicle may drive.
@@ -46,6 +51,8 @@ pub enum End {
     Completed,
     /// The device never showed up; the text says how long was waited.
     NoDevice(String),
+    /// The device went away, and did not come back.
+    Lost(String),
     /// The user stopped it.
     Interrupted,
     /// The device sent more than can be kept.
@@ -79,7 +86,7 @@ pub async fn run<L: Link, O: Operator>(
     };
     let (partial, reason) = match &end {
         End::Completed => (false, None),
-        End::NoDevice(why) | End::Flooded(why) => (true, Some(why.clone())),
+        End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => (true, Some(why.clone())),
         End::Interrupted => (true, Some("interrupted by the user".to_owned())),
         End::Broken(error) => (true, Some(error.to_string())),
     };
@@ -98,20 +105,46 @@ pub(super) struct Session<'a, L, O> {
     pub(super) progress: &'a mut dyn Progress,
     /// Why the vehicle is not moved any more.
     pub(super) halted: Option<String>,
+    /// What the vehicle was like before.
+    pub(super) home: Home,
+    /// How often in a row the way back to rest was tried in vain.
+    pub(super) ladders: u32,
+    /// The id of the last cancelOrder on that way.
+    pub(super) cancelled: Option<String>,
+    /// The vehicle was found to refuse every order, until it was restarted.
+    pub(super) refuses: bool,
+    /// How often in a row a restart did not make it take orders again.
+    pub(super) unhelped: u32,
+    /// How many orders were sent on that way.
+    pub(super) orders: u32,
+    /// Preconditions that are not reached again and again.
+    strikes: Strikes,
 }
 
 impl<'a, L: Link, O: Operator> Session<'a, L, O> {
-    fn new(engine: &'a mut Engine<L, O>, setup: Setup, progress: &'a mut dyn Progress) -> Self {
+    fn new(engine: &'a mut Engine<L, O>, mut setup: Setup, progress: &'a mut dyn Progress) -> Self {
+        if engine.recorder.judge().role() == Role::Agv {
+            by_risk(&mut setup.tests);
+        }
         Self {
             engine,
             setup,
             progress,
             halted: None,
+            home: Home::default(),
+            ladders: 0,
+            cancelled: None,
+            refuses: false,
+            unhelped: 0,
+            orders: 0,
+            strikes: Strikes::default(),
         }
     }
 
     async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
-        if let Err(why) = self.admit().await? {
+        let admitted = self.admit().await?;
+        self.draw();
+        if let Err(why) = admitted {
             let end = self.stopped().unwrap_or_else(|| End::NoDevice(why.clone()));
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
@@ -148,7 +181,8 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             if gone.is_none() && test.device == Role::MasterControl {
                 self.let_it_finish().await?;
             }
-            let ready = match (&gone, &self.halted) {
+            let aside = gone.clone().or_else(|| self.strikes.against(test));
+            let ready = match (&aside, &self.halted) {
                 (Some(why), _) => Err(why.clone()),
                 (None, Some(why)) if test.moves => Err(why.clone()),
                 _ => self.bindings(test, number),
@@ -164,19 +198,35 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
                 Ok(own) => {
                     self.progress.test_begun(test, number, runs);
-                    self.engine
-                        .run_test(test, own, &mut AsWatcher(&mut *self.progress))
-                        .await?;
+                    gone = self.run_and_restore(test, own, number).await?;
                     if let Some(result) = self.engine.recorder.judge().done().last() {
                         self.progress.test_ended(result);
                     }
-                    self.after(test).await?;
                     saved(self.engine.recorder.judge());
                 }
             }
         }
+        if let (Some(why), None) = (&gone, self.stopped()) {
+            self.record_plan(&plan)?;
+            return Ok(End::Lost(why.clone()));
+        }
         self.record_plan(&plan)?;
         Ok(self.stopped().unwrap_or(End::Completed))
+    }
+
+    /// Leaves out cases that come from a schema, where the run need not be thorough.
+    fn draw(&mut self) {
+        let Some(seed) = self.setup.draw else { return };
+        let runs = |test: &Test| self.setup.capabilities.gate(test) == Gate::Runs;
+        let drawing = draw(&self.setup.tests, seed, runs);
+        if drawing.taken < drawing.of {
+            self.setup.limits.push(format!(
+                "Of {} messages broken after the schemas, {} were to be sent, drawn by the seed {seed}; `--thorough` \
+                 sends all of them.",
+                drawing.of, drawing.taken
+            ));
+        }
+        self.setup.tests = drawing.tests;
     }
 
     /// How the run ended before its time, if it did.
@@ -214,6 +264,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             .as_ref()
             .and_then(|sheet| sheet.pointer("/typeSpecification/seriesName"));
         let mut limits = self.setup.limits.clone();
+        if let Err(why) = &self.setup.capabilities.motion {
+            limits.push(format!("No test that moves the vehicle was run: {why}."));
+        }
         limits.extend(self.halted.clone());
         if !self.setup.complete {
             limits.push("Only a selection of the tests was run.".to_owned());
@@ -249,27 +302,104 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
 
     fn bindings(&self, test: &Test, number: usize) -> Result<Map<String, Value>, String> {
         let judge = self.engine.recorder.judge();
-        let course = course_of(test, self.setup.layout.as_ref(), judge)?;
+        let course = course_of(test, self.setup.layout.as_ref(), judge, &self.home)?;
         Ok(own_bindings(test, course, judge, &self.setup.run, number))
     }
 
-    /// Restores the link, and makes sure the vehicle stands idle.
+    /// Runs a test and brings the vehicle back. One whose precondition was not reached is run once more, when something
+    /// was learned about the vehicle or it could be restarted. Gives the reason when the device stays away.
+    async fn run_and_restore(
+        &mut self,
+        test: &Arc<Test>,
+        own: Map<String, Value>,
+        number: usize,
+    ) -> Result<Option<String>, EngineError> {
+        let known = self.engine.recorder.judge().ground().waivers.len();
+        self.look_at_home();
+        self.engine
+            .run_test(test, own, &mut AsWatcher(&mut *self.progress))
+            .await?;
+        self.after(test).await?;
+        if test.device == Role::MasterControl {
+            return Ok(None);
+        }
+        let Some(place) = self.unreached(test) else {
+            self.strikes.reached(test);
+            return Ok(None);
+        };
+        if self.engine.interrupted() {
+            return Ok(None);
+        }
+        let learned = self.engine.recorder.judge().ground().waivers.len() > known;
+        if !learned && self.strikes.is_worth_a_restart(&place) {
+            let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
+            if !has_hook || !self.restart().await? {
+                self.strikes.missed(test, &place);
+                return Ok(None);
+            }
+        } else if !learned {
+            self.strikes.missed(test, &place);
+            return Ok(None);
+        }
+        if let Some(why) = self.be_there().await? {
+            return Ok(Some(why));
+        }
+        if let Ok(own) = self.bindings(test, number) {
+            self.progress
+                .note("the precondition was not reached; the test is tried once more");
+            self.look_at_home();
+            self.engine
+                .run_test(test, own, &mut AsWatcher(&mut *self.progress))
+                .await?;
+            self.after(test).await?;
+        }
+        match self.unreached(test) {
+            Some(place) => self.strikes.missed(test, &place),
+            None => self.strikes.reached(test),
+        }
+        Ok(None)
+    }
+
+    fn look_at_home(&mut self) {
+        self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        self.home.since = self.engine.link.now().moment;
+    }
+
+    /// Where the precondition of the test that ended last was not reached.
+    fn unreached(&self, test: &Test) -> Option<String> {
+        let result = self.engine.recorder.judge().done().last()?;
+        let mut steps = result.steps.iter();
+        let failed = steps.find(|step| step.path.starts_with("given") && step.outcome == "failed")?;
+        (result.id == test.id).then(|| failed.place.clone())
+    }
+
+    /// Restores the link, and makes sure the vehicle is at rest.
     async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
         settle_link(self).await?;
         self.engine.drain().await?;
         if self.engine.recorder.judge().role() == Role::MasterControl {
             return self.tidy_fleet(test).await;
         }
-        let judge = self.engine.recorder.judge();
-        if (is_idle(judge) && says_online(judge))
-            || !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there()
-        {
+        if !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there() {
             return Ok(());
         }
-        if !recover(self).await? {
+        self.read_over(self.engine.link.now().moment).await?;
+        let left = if self.obstacles().is_empty() {
+            Vec::new()
+        } else {
+            self.bring_to_rest().await?
+        };
+        if left.is_empty() {
+            self.still_takes_orders().await?;
+        }
+        if !left.iter().any(Obstacle::halts) {
+            self.halted = None;
+        } else if self.halted.is_none() {
+            let all: Vec<String> = left.iter().map(Obstacle::describe).collect();
             let why = format!(
-                "After test {} the vehicle did not return to idle; no test that moves it was run from then on.",
-                test.id
+                "After test {} the vehicle did not return to idle ({}); no test that moves it was run from then on.",
+                test.id,
+                all.join("; ")
             );
             self.progress.note(&why);
             self.halted = Some(why);

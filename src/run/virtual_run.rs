@@ -35,6 +35,8 @@ pub struct VirtualRun {
     pub tests: Vec<Arc<Test>>,
     /// Whether that is every test.
     pub complete: bool,
+    /// Which cases that come from a schema are run; all of them without a seed.
+    pub draw: Option<u64>,
     /// Seed of the jitter.
     pub seed: u64,
     /// Jitter on every packet.
@@ -43,6 +45,8 @@ pub struct VirtualRun {
     pub coalesce: Duration,
     /// From where the harness sees.
     pub vantage: Vantage,
+    /// Whether the vehicle may drive; `Err` says why not.
+    pub motion: Result<(), String>,
     /// When it begins; virtual time goes on from here.
     pub begun: jiff::Timestamp,
     /// Identifier of the run.
@@ -68,10 +72,12 @@ impl VirtualRun {
             faults: Vec::new(),
             tests: library.tests(role, &pack.id),
             complete: true,
+            draw: Some(1),
             seed: 1,
             jitter: Duration::ZERO,
             coalesce: Duration::ZERO,
             vantage: Vantage::Tap,
+            motion: Ok(()),
             begun: jiff::Timestamp::UNIX_EPOCH,
             run: "virtual".to_owned(),
             command: Vec::new(),
@@ -173,6 +179,7 @@ pub async fn run_virtually(
     let setup = Setup {
         tests: request.tests,
         complete: request.complete,
+        draw: request.draw,
         capabilities: Capabilities {
             factsheet: None,
             statements: device.statements(),
@@ -180,7 +187,8 @@ pub async fn run_virtually(
             vantage: request.vantage,
             hooks,
             maps: true,
-            motion: Ok(()),
+            motion: request.motion,
+            claims_add: true,
         },
         layout: Some(device.layout().clone()),
         vehicles: mocks,

@@ -246,13 +246,14 @@ fn lint_state(
         spec,
         needs: Vec::new(),
         moves: true,
-        maturity: Maturity::Watchlist,
+        maturity: Maturity::Open,
         why: String::new(),
         given,
         steps: Vec::new(),
         finally: Vec::new(),
         source: Arc::clone(source),
         course: CourseNeed::default(),
+        drawn: None,
     };
     if problems.len() == before {
         // A state is meant for one side or for both.

@@ -5,6 +5,7 @@
 //! requirement, variable, state and check name. Running a test is left to the engine, judging it to the judge.
 
 mod course;
+mod drawn;
 mod expand;
 mod fields;
 mod grammar;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::diagnostic::{Source, Span};
-use crate::pack::{RequirementId, Role, VersionRange};
+use crate::pack::{RequirementId, Role, VersionRange, Way};
 use crate::pattern::{Pattern, Term};
 
 /// One scripted exchange; one row of `cases:` is one test.
@@ -42,9 +42,31 @@ pub struct Test {
     pub source: Arc<Source>,
     /// The names of course nodes it uses, in order of appearance, and the pairs it drives.
     pub course: CourseNeed,
+    /// What it breaks, when it is one of many cases that come from a schema.
+    pub drawn: Option<Drawn>,
+}
+
+/// One of many cases that come from a schema, of which a run takes some.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    /// The topic whose schema it is.
+    pub topic: String,
+    /// How a member is broken.
+    pub way: Way,
+    /// How many cases of the table a run takes.
+    pub draw: usize,
 }
 
 impl Test {
+    /// What it is known by where the cases of a schema count as one: its table, else its id.
+    #[must_use]
+    pub fn table(&self) -> &str {
+        match self.drawn {
+            Some(_) => self.id.split('[').next().unwrap_or(&self.id),
+            None => &self.id,
+        }
+    }
+
     /// Every step with its section, in the order they run.
     pub fn sections(&self) -> [(Section, &[Step]); 3] {
         [
@@ -58,7 +80,8 @@ impl Test {
     #[must_use]
     pub fn requirements(&self) -> Vec<RequirementId> {
         let mut all = Vec::new();
-        for step in &self.steps {
+        let owed = self.given.iter().filter(|step| step.owes);
+        for step in owed.chain(&self.steps) {
             for (id, _) in step.clauses() {
                 if !all.contains(&id) {
                     all.push(id);
@@ -81,12 +104,35 @@ pub enum Section {
 }
 
 /// How far a test is trusted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Maturity {
-    /// Young: a failure wants a second look at the evidence.
-    Watchlist,
-    /// Reviewed.
-    Reviewed,
+    /// No second reader has held it against the standard yet.
+    Open,
+    /// What it holds true is disputed, for this reason: a finding of it wants a second look.
+    Watchlist(String),
+    /// A second reader has held it against the standard: when, and what was looked at.
+    Reviewed(String),
+}
+
+impl Maturity {
+    /// The word used in results.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Open => "not reviewed",
+            Self::Watchlist(_) => "watchlist",
+            Self::Reviewed(_) => "reviewed",
+        }
+    }
+
+    /// What is noted about it.
+    #[must_use]
+    pub fn note(&self) -> Option<&str> {
+        match self {
+            Self::Open => None,
+            Self::Watchlist(note) | Self::Reviewed(note) => Some(note),
+        }
+    }
 }
 
 /// What a test needs to be applicable.
@@ -119,7 +165,7 @@ pub enum Need {
 }
 
 pub use crate::course::CourseNeed;
-pub use monitor::{Monitor, Rule};
+pub use monitor::{About, Monitor, Rule};
 pub use vehicle::{VehicleStep, Which};
 
 /// One step.
@@ -133,6 +179,8 @@ pub struct Step {
     pub spec: Option<VersionRange>,
     /// The verb and its arguments.
     pub verb: Verb,
+    /// Whether its requirements stand under `owes:`: a precondition that is itself an obligation of the device.
+    pub owes: bool,
     /// The whole step.
     pub span: Span,
     /// Key and value of the verb, for carets: `expect: state`.
@@ -144,6 +192,7 @@ impl Step {
     #[must_use]
     pub fn clauses(&self) -> Vec<(RequirementId, String)> {
         let mut all = Vec::new();
+        let word = if self.owes { ".owes" } else { ".checks" };
         let mut checks = |bindings: &[Binding], suffix: &str| {
             all.extend(
                 bindings
@@ -153,27 +202,27 @@ impl Step {
         };
         match &self.verb {
             Verb::Expect(step) => {
-                checks(&step.checks, ".checks");
+                checks(&step.checks, word);
                 let asserts = step.assert.iter().chain(&step.prefer);
                 for assertion in asserts {
-                    let word = if step.prefer.iter().any(|other| std::ptr::eq(other, assertion)) {
+                    let kind = if step.prefer.iter().any(|other| std::ptr::eq(other, assertion)) {
                         "prefer"
                     } else {
                         "assert"
                     };
-                    all.push((assertion.requirement.clone(), format!("{}.{word}", self.path)));
+                    all.push((assertion.requirement.clone(), format!("{}.{kind}", self.path)));
                 }
             }
-            Verb::Never(step) => checks(&step.checks, ".checks"),
+            Verb::Never(step) => checks(&step.checks, word),
             Verb::Always(step) => {
-                checks(&step.checks, ".checks");
+                checks(&step.checks, word);
                 if let Extent::Until(until) = &step.extent {
                     checks(&until.checks, ".until");
                 }
             }
-            Verb::Action(step) => checks(&step.checks, ".checks"),
+            Verb::Action(step) => checks(&step.checks, word),
             Verb::Retained(step) => {
-                checks(&step.checks, ".checks");
+                checks(&step.checks, word);
                 for assertion in &step.assert {
                     all.push((assertion.requirement.clone(), format!("{}.assert", self.path)));
                 }
@@ -335,6 +384,8 @@ pub enum From {
     Mark,
     /// At the cursor.
     Here,
+    /// Where the step itself begins: what came while an earlier step only waited is left aside.
+    Now,
     /// The most recent message there is, whenever it came; then new ones.
     Latest,
     /// At the start of the test.

@@ -1,28 +1,41 @@
 //! One file into tests or a monitor: header keys, the rows of a table, the rule.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::CheckInfo;
 use super::course::course_need;
+use super::drawn;
 use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::load::{States, parse};
-use super::model::{CourseNeed, Maturity, Monitor, Need, Rule, Test};
+use super::model::{About, Binding, CourseNeed, Drawn, Maturity, Monitor, Need, Rule, Test};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
 use crate::diagnostic::{Diagnostic, Source, Span};
-use crate::pack::{Role, VersionRange};
+use crate::pack::{RequirementId, Role, VersionRange};
 use crate::yaml::{Kind, Node};
 
 const TEST_KEYS: &[&str] = &[
-    "test", "title", "device", "spec", "needs", "moves", "maturity", "why", "cases", "given", "steps", "finally",
+    "test",
+    "title",
+    "device",
+    "spec",
+    "needs",
+    "moves",
+    "reviewed",
+    "watchlist",
+    "why",
+    "cases",
+    "given",
+    "steps",
+    "finally",
 ];
 const MONITOR_KEYS: &[&str] = &[
-    "monitor", "title", "device", "spec", "needs", "why", "checks", "check", "with", "topic", "always", "when",
-    "never", "hides",
+    "monitor", "title", "device", "spec", "needs", "why", "checks", "about", "check", "with", "topic", "always",
+    "when", "never", "hides",
 ];
 const ROLES: [(&str, Role); 2] = [("agv", Role::Agv), ("master-control", Role::MasterControl)];
 
@@ -116,24 +129,17 @@ pub(super) fn read_test(
     let Some(cases) = fields.get("cases", problems) else {
         let root = Fill::new("case", nothing).apply_to(&root, problems);
         let root = Fill::new("with", nothing).apply_to(&root, problems);
-        return reader.read(&root, None, problems).into_iter().collect();
+        return reader.read(&root, Case::Whole, problems).into_iter().collect();
     };
+    if cases.get(drawn::FROM_SCHEMA).is_some() {
+        return reader.draw(&fields, &root, cases, problems);
+    }
     let before_rows = problems.len();
     let rows = rows(cases, problems);
     if problems.len() > before_rows {
         return Vec::new();
     }
-    let without_cases = Node {
-        kind: Kind::Map(
-            fields
-                .entries()
-                .iter()
-                .filter(|(key, _)| key.text() != Some("cases"))
-                .cloned()
-                .collect(),
-        ),
-        span: root.span.clone(),
-    };
+    let without_cases = without_cases(&fields, &root);
     let mut used: BTreeMap<&str, (bool, &Span)> = BTreeMap::new();
     let mut tests = Vec::new();
     for (name, values) in &rows {
@@ -145,7 +151,7 @@ pub(super) fn read_test(
                 .or_insert((false, &key.span))
                 .0 |= is_used;
         }
-        tests.extend(reader.read(&filled, Some(name), problems));
+        tests.extend(reader.read(&filled, Case::Row(name), problems));
     }
     for (name, (is_used, span)) in used {
         if !is_used {
@@ -158,6 +164,15 @@ pub(super) fn read_test(
         }
     }
     tests
+}
+
+/// A test without its table.
+fn without_cases(fields: &Fields<'_>, root: &Node) -> Node {
+    let others = fields.entries().iter().filter(|(key, _)| key.text() != Some("cases"));
+    Node {
+        kind: Kind::Map(others.cloned().collect()),
+        span: root.span.clone(),
+    }
 }
 
 /// The rows of a table of cases, each with the same names.
@@ -225,8 +240,53 @@ struct TestReader<'a> {
     before: usize,
 }
 
+/// Which test of a file is read.
+enum Case<'a> {
+    /// The only one.
+    Whole,
+    /// A row of its table.
+    Row(&'a str),
+    /// A row that came from a schema, and whether it is linted.
+    Drawn(&'a drawn::Row, bool),
+}
+
 impl TestReader<'_> {
-    fn read(&self, root: &Node, case: Option<&str>, problems: &mut Problems) -> Option<Test> {
+    /// The tests of a table that comes from a schema.
+    fn draw(&self, fields: &Fields<'_>, root: &Node, cases: &Node, problems: &mut Problems) -> Vec<Test> {
+        let spec = fields.get("spec", &mut Problems::default());
+        let rows = drawn::rows(cases, spec, self.vocabulary, problems);
+        if !fields
+            .entries()
+            .iter()
+            .any(|(_, value)| value.span.text().contains("${case.patch}"))
+            && !rows.is_empty()
+        {
+            problems.at(
+                "unused-value",
+                &cases.span,
+                "the cases of the schema are not used",
+                "no `${case.patch}` in this test",
+            );
+        }
+        let without_cases = without_cases(fields, root);
+        let mut tests = Vec::new();
+        let mut linted = BTreeSet::new();
+        for row in &rows {
+            let filled = Fill::new("case", &row.values).apply(&without_cases, problems);
+            let filled = Fill::new("with", &[]).apply_to(&filled, problems);
+            // The rows differ in what they break, which only the first of each way and length can do wrong.
+            let length = row
+                .values
+                .first()
+                .and_then(|(_, patch)| patch.list())
+                .map_or(0, <[Node]>::len);
+            let lint = linted.insert((row.drawn.way, length, row.spec.is_some()));
+            tests.extend(self.read(&filled, Case::Drawn(row, lint), problems));
+        }
+        tests
+    }
+
+    fn read(&self, root: &Node, case: Case<'_>, problems: &mut Problems) -> Option<Test> {
         let fields = Fields::of(root, problems)?;
         let at = start(root);
         let header = header(&fields, &at, problems);
@@ -241,10 +301,7 @@ impl TestReader<'_> {
                 format!("the folder says `{role}`"),
             );
         }
-        let maturities = [("watchlist", Maturity::Watchlist), ("reviewed", Maturity::Reviewed)];
-        let maturity = fields
-            .word("maturity", "unknown-word", &maturities, problems)
-            .unwrap_or(Maturity::Watchlist);
+        let maturity = maturity(&fields, problems);
         let moves = fields.flag("moves", problems);
         let mut reader = StepReader {
             states: self.states,
@@ -264,12 +321,20 @@ impl TestReader<'_> {
         let id = fields.text("test", &mut Problems::default())?.to_owned();
         let group = id.split('/').next().unwrap_or_default().to_owned();
         let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
+        let (name, drawn, lint): (_, Option<Drawn>, _) = match case {
+            Case::Whole => (None, None, true),
+            Case::Row(name) => (Some(name), None, true),
+            Case::Drawn(row, lint) => (Some(row.name.as_str()), Some(row.drawn.clone()), lint),
+        };
         let mut test = Test {
-            id: case.map_or_else(|| id.clone(), |case| format!("{id}[{case}]")),
+            id: name.map_or_else(|| id.clone(), |name| format!("{id}[{name}]")),
             group,
             title: header.title,
             device: header.device.or(self.role)?,
-            spec: header.spec?,
+            spec: match case {
+                Case::Drawn(row, _) => row.spec.clone().or(header.spec)?,
+                _ => header.spec?,
+            },
             needs,
             moves,
             maturity,
@@ -279,8 +344,12 @@ impl TestReader<'_> {
             finally,
             source: Arc::clone(self.source),
             course: CourseNeed::default(),
+            drawn,
         };
         test.course = course_need(&test);
+        if !lint {
+            return Some(test);
+        }
         let value_place = |key: &str| fields.get(key, &mut Problems::default()).map(|node| node.span.clone());
         let places = HeaderPlaces {
             hides: Vec::new(),
@@ -293,6 +362,43 @@ impl TestReader<'_> {
         lint::test(&test, &places, self.vocabulary, self.known, problems);
         Some(test)
     }
+}
+
+/// Whether a second reader has held the test against the standard, or what is disputed of it.
+fn maturity(fields: &Fields<'_>, problems: &mut Problems) -> Maturity {
+    let note = |key: &str, problems: &mut Problems| fields.text(key, problems).map(str::to_owned);
+    if let Some(key) = fields.key("watchlist").filter(|_| fields.has("reviewed")) {
+        let title = "`watchlist` beside `reviewed`";
+        problems.at(
+            "conflicting-keys",
+            &key.span,
+            title,
+            "a review settles what is disputed",
+        );
+    }
+    if let Some(why) = note("watchlist", problems) {
+        return Maturity::Watchlist(why);
+    }
+    let Some(note) = note("reviewed", problems) else {
+        return Maturity::Open;
+    };
+    let (date, looked_at) = note.split_once(',').unwrap_or((&note, ""));
+    let is_date = date.parse::<jiff::civil::Date>().is_ok() && date.len() == 10;
+    if let Some(node) = fields
+        .get("reviewed", problems)
+        .filter(|_| !is_date || looked_at.trim().is_empty())
+    {
+        problems.add(
+            Diagnostic::new(
+                "review-undated",
+                node.span.clone(),
+                "a review says when it was, and what was looked at",
+                "needs a date, a comma and a few words",
+            )
+            .hint("such as `reviewed: \"2026-11-22, section 6.6.4 and both rulings\"`"),
+        );
+    }
+    Maturity::Reviewed(note)
 }
 
 /// The monitor of a file. `name` is what its path asks for.
@@ -331,6 +437,7 @@ pub(super) fn read_monitor(
         spec: header.spec?,
         needs,
         checks: bindings,
+        about: about(&fields, problems),
         why: header.why,
         rule: rule?,
         hides: hides
@@ -354,6 +461,45 @@ pub(super) fn read_monitor(
         .map(|node| node.span.clone());
     lint::monitor(&monitor, &places, topic_place.as_ref(), vocabulary, known, problems);
     Some(monitor)
+}
+
+/// Requirement id to topic to picture.
+fn about(fields: &Fields<'_>, problems: &mut Problems) -> Vec<About> {
+    let Some(inner) = fields
+        .get("about", problems)
+        .and_then(|node| Fields::of(node, problems))
+    else {
+        return Vec::new();
+    };
+    let mut all = Vec::new();
+    for (key, value) in inner.entries() {
+        let Some(id) = text_of(key, problems) else { continue };
+        let Some(subject) = Fields::of(value, problems) else {
+            continue;
+        };
+        let [(topic, picture)] = subject.entries() else {
+            let label = "one topic, and what a message on it shows";
+            problems.at(
+                "about-one-topic",
+                &value.span,
+                format!("`{id}` is about one topic"),
+                label,
+            );
+            continue;
+        };
+        let (Some(topic), Some(pattern)) = (text_of(topic, problems), pattern(picture, problems)) else {
+            continue;
+        };
+        all.push(About {
+            requirement: Binding {
+                requirement: RequirementId::from(id),
+                span: key.span.clone(),
+            },
+            topic: topic.to_owned(),
+            pattern,
+        });
+    }
+    all
 }
 
 fn rule(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Option<Rule> {

@@ -24,15 +24,20 @@ const VERBS: [(&str, &[&str]); 11] = [
     (
         "expect",
         &[
-            "checks", "where", "check", "with", "within", "from", "assert", "prefer", "save", "of",
+            "checks", "owes", "where", "check", "with", "within", "from", "assert", "prefer", "save", "of",
         ],
     ),
-    ("never", &["checks", "where", "check", "with", "during", "from", "of"]),
+    (
+        "never",
+        &["checks", "owes", "where", "check", "with", "during", "from", "of"],
+    ),
     (
         "always",
-        &["checks", "where", "check", "with", "from", "during", "until", "of"],
+        &[
+            "checks", "owes", "where", "check", "with", "from", "during", "until", "of",
+        ],
     ),
-    ("action", &["checks", "through", "tolerated", "within", "save"]),
+    ("action", &["checks", "owes", "through", "tolerated", "within", "save"]),
     ("retained", &["checks", "where", "check", "with", "assert", "within"]),
     ("link", &[]),
     ("serve", SERVE_KEYS),
@@ -41,10 +46,11 @@ const VERBS: [(&str, &[&str]); 11] = [
     ("use", &["with"]),
 ];
 
-const FROM: [(&str, From); 5] = [
+const FROM: [(&str, From); 6] = [
     ("cursor", From::Here),
     ("mark", From::Mark),
     ("here", From::Here),
+    ("now", From::Now),
     ("latest", From::Latest),
     ("test", From::Test),
 ];
@@ -113,11 +119,26 @@ impl StepReader<'_> {
         let Some(verb) = self.verb(word, value, &fields, &verb_span) else {
             return;
         };
+        let owes = fields.key("owes");
+        if let Some(owes) = owes
+            && (!path.starts_with("given[") || fields.has("checks"))
+        {
+            self.problems.add(
+                Diagnostic::new(
+                    "owes-elsewhere",
+                    owes.span.clone(),
+                    "only a precondition is owed",
+                    "not in `given`, or beside `checks`",
+                )
+                .hint("what a step of `steps` decides stands under `checks:`"),
+            );
+        }
         steps.push(Step {
             path,
             title,
             spec,
             verb,
+            owes: owes.is_some(),
             span: node.span.clone(),
             verb_span,
         });
@@ -312,10 +333,11 @@ pub(super) fn version_range(node: &Node, problems: &mut Problems) -> Option<Vers
     }
 }
 
-/// The requirements under `checks`.
+/// The requirements under `checks`, or under `owes` of a precondition.
 pub(super) fn checks(fields: &Fields<'_>, problems: &mut Problems) -> Vec<Binding> {
     let mut bindings: Vec<Binding> = Vec::new();
-    for node in fields.list("checks", problems) {
+    let key = if fields.has("owes") { "owes" } else { "checks" };
+    for node in fields.list(key, problems) {
         let Some(text) = text_of(node, problems) else { continue };
         let requirement = RequirementId::from(text);
         if bindings.iter().any(|other| other.requirement == requirement) {

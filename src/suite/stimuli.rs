@@ -161,13 +161,14 @@ fn exclusive(fields: &Fields<'_>, key: &str, others: &[&str], problems: &mut Pro
 }
 
 fn check_operations(node: &Node, problems: &mut Problems) {
-    const OPERATIONS: [(&str, ()); 6] = [
+    const OPERATIONS: [(&str, ()); 7] = [
         ("add", ()),
         ("remove", ()),
         ("replace", ()),
         ("move", ()),
         ("copy", ()),
         ("test", ()),
+        ("as-text", ()),
     ];
     for item in node.list().unwrap_or_default() {
         let Some(fields) = Fields::of(item, problems) else {

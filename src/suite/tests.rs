@@ -315,11 +315,11 @@ fn all_mistakes_are_told_at_once_by_file_and_place() {
     let mut files = good();
     let path = "suites/agv/order/update-lower-id-refused.yaml";
     let text = files[path]
-        .replace("maturity: reviewed", "maturity: revewed")
+        .replace("reviewed: \"2026-11-22, ", "reviewed: \"soon, ")
         .replace("ORD-REJ-17", "ORD-REJ-99")
         .replace("errorLevel: WARNING", "errorLevel: WARN");
     files.insert(path.to_owned(), text);
-    assert_eq!(codes(&files), ["unknown-word", "unknown-requirement", "bad-literal"]);
+    assert_eq!(codes(&files), ["review-undated", "unknown-requirement", "bad-literal"]);
 }
 
 #[test]

@@ -8,14 +8,17 @@ use super::fields::{Fields, Problems};
 use super::lint::Vocabulary;
 use super::load::parse;
 use super::read::start;
+use super::steps::version_range;
 use crate::diagnostic::Source;
-use crate::pack::Role;
+use crate::pack::{Role, VersionRange};
 
 /// A clause or monitor that no fault can fail.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unproven {
     /// The side under test.
     pub role: Role,
+    /// The versions in which nothing can; all unless said.
+    pub spec: Option<VersionRange>,
     /// Requirement id.
     pub requirement: String,
     /// Test id and clause, or monitor id, as the kill matrix names it.
@@ -44,7 +47,7 @@ pub(super) fn read(
         let Some(fields) = Fields::of(node, problems) else {
             continue;
         };
-        fields.only(&[&["requirement", "place", "why"]], problems);
+        fields.only(&[&["requirement", "place", "spec", "why"]], problems);
         let requirement = fields.need_text("requirement", &node.span, problems);
         let place = fields.need_text("place", &node.span, problems);
         let why = fields.need_text("why", &node.span, problems);
@@ -64,8 +67,10 @@ pub(super) fn read(
                 ids.iter().map(String::as_str),
             );
         }
+        let spec = fields.get("spec", problems);
         all.push(Unproven {
             role,
+            spec: spec.and_then(|node| version_range(node, problems)),
             requirement: requirement.to_owned(),
             place: place.to_owned(),
             why: why.to_owned(),

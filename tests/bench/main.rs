@@ -5,6 +5,7 @@ mod brokers;
 mod device;
 mod faults;
 mod hostile;
+mod lag;
 mod rig;
 mod surroundings;
 mod traffic;

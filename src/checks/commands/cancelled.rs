@@ -1,29 +1,34 @@
 //! `commands/base-kept`: a base is given up only by cancelOrder.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use serde_json::Value;
 
-use super::vehicle::{Outside, Vehicle};
+use super::vehicle::{Outside, Seen, Vehicle};
 use super::{Command, ELEMENTS, Found, released, short};
 use crate::checks::orders::number;
 use crate::checks::traffic::{Traffic, elements, quote, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
+use crate::clock::Moment;
 use crate::journal::Entry;
 
 /// See the module.
 pub(in crate::checks) const BASE_KEPT: Check = Check {
     name: "commands/base-kept",
     decides: &["ORD-CANCEL-01"],
-    doc: "While the states of the vehicle show released elements of an order, no other order is sent to it and no update \
-          replaces them, unless cancelOrder has come before and the vehicle has reported it done or shows nothing left \
-          of the order. A vehicle that may have given its order up by itself is not judged.",
+    doc: "While the states of the vehicle show released elements or a running action of an order, no other order is sent \
+          to it and no update replaces them, unless cancelOrder has come before and the vehicle has reported it done or \
+          shows nothing left of the order. After cancelOrder no update of that order comes, unless cancelOrder has \
+          FAILED. A vehicle that may have given its order up by itself is not judged.",
     arguments: &[],
     start: |_| Box::new(BaseKept::default()),
 };
 
 /// How many released elements and orders are remembered.
 const KEPT: usize = 4096;
+/// What was decided before cancelOrder may be sent behind it, within this time.
+const CROSSING: Duration = Duration::from_millis(100);
 
 #[derive(Default)]
 struct BaseKept {
@@ -35,8 +40,12 @@ struct BaseKept {
     taken: bool,
     /// Orders that were sent before.
     before: BTreeSet<String>,
-    /// The actionId of the last cancelOrder for it.
-    cancel: Option<String>,
+    /// actionIds of its released elements.
+    actions: BTreeSet<String>,
+    /// The highest orderUpdateId of it.
+    newest: Option<u64>,
+    /// The actionId of the last cancelOrder for it, and since when.
+    cancel: Option<(String, Moment)>,
     /// Whether something may have ended the order without cancelOrder.
     free: bool,
 }
@@ -48,26 +57,47 @@ impl BaseKept {
         if self.free || !self.taken || seen.order != self.order {
             return false;
         }
-        match &self.cancel {
-            None => seen.base > 0,
-            Some(id) => {
-                let status = seen
-                    .actions
-                    .iter()
-                    .find(|(action, _)| action == id)
-                    .map(|(_, status)| status.as_str());
-                match status {
-                    Some("FINISHED" | "FAILED") => false,
-                    Some(_) => true,
-                    None => seen.base > 0,
-                }
-            }
+        match self.cancel.as_ref().and_then(|(id, _)| status(seen, id)) {
+            Some("FINISHED" | "FAILED") => false,
+            Some(_) => true,
+            None => seen.base > 0 || self.is_at_work(seen),
         }
+    }
+
+    /// Whether an action of the order is listed and has not ended.
+    fn is_at_work(&self, seen: &Seen) -> bool {
+        let mut open = seen.actions.iter().filter(|(_, status)| !is_over(status));
+        open.any(|(id, _)| self.actions.contains(id))
+    }
+
+    /// An update of an order that was called off.
+    fn continued(&self, update: u64, now: Moment, found: &mut Found<'_>) -> bool {
+        let Some((id, since)) = &self.cancel else { return false };
+        let seen = self.vehicle.last();
+        let failed = self
+            .vehicle
+            .states
+            .iter()
+            .any(|seen| status(seen, id) == Some("FAILED"));
+        // Where the vehicle never heard of cancelOrder, this is not the mistake to speak of.
+        let heard = self.vehicle.states.iter().any(|seen| status(seen, id).is_some());
+        let taken = heard && self.taken && !self.free && seen.is_some_and(|seen| seen.order == self.order);
+        if failed || !taken || self.newest.is_none_or(|newest| update <= newest) || now.since(*since) < CROSSING {
+            return false;
+        }
+        let text = format!(
+            "update {update} of order {} comes after cancelOrder",
+            quote(&self.order)
+        );
+        found.broken("ORD-CANCEL-01", text);
+        true
     }
 
     fn forget(&mut self) {
         self.before.insert(std::mem::take(&mut self.order));
         self.base.clear();
+        self.actions.clear();
+        self.newest = None;
         self.cancel = None;
         self.taken = false;
         self.free = false;
@@ -96,7 +126,7 @@ impl Running for BaseKept {
         let Command::Order(order) = command else {
             for (_, action) in command.actions() {
                 if text(action, "actionType") == "cancelOrder" {
-                    self.cancel = short(action, "actionId");
+                    self.cancel = short(action, "actionId").map(|id| (id, entry.at().moment));
                 }
             }
             return false;
@@ -129,6 +159,14 @@ impl Running for BaseKept {
             self.order = id;
         } else if self.cancel.is_none() && self.is_busy() {
             judged = self.replaced(order, &mut found);
+        } else if let Some(update) = number(order, "orderUpdateId") {
+            judged = self.continued(update, entry.at().moment, &mut found);
+        }
+        self.newest = self.newest.max(number(order, "orderUpdateId"));
+        for (_, action) in command.actions() {
+            if let Some(id) = short(action, "actionId").filter(|_| self.actions.len() < KEPT) {
+                self.actions.insert(id);
+            }
         }
         let base = released_elements(order).collect::<Vec<_>>();
         for (sequence, id) in base {
@@ -171,6 +209,16 @@ impl BaseKept {
         found.broken("ORD-CANCEL-01", text);
         true
     }
+}
+
+fn is_over(status: &str) -> bool {
+    matches!(status, "FINISHED" | "FAILED")
+}
+
+/// How far an action is.
+fn status<'s>(seen: &'s Seen, id: &str) -> Option<&'s str> {
+    let mut all = seen.actions.iter();
+    all.find(|(action, _)| action == id).map(|(_, status)| status.as_str())
 }
 
 fn released_elements(order: &Value) -> impl Iterator<Item = (u64, String)> {

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use regex::Regex;
 use serde_json::Value;
 
-use super::sheet::Sheets;
+use super::sheet::{Sheet, Sheets};
 use super::{Command, ELEMENTS, Each, Found, in_sequence};
 use crate::checks::traffic::{Traffic, elements, quote, show, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
@@ -64,7 +64,7 @@ pub(in crate::checks) const POSITION: Check = Check {
     name: "commands/node-position",
     decides: &["ORD-MSG-08"],
     doc: "Every node has a nodePosition, unless the vehicle is bound to lines. A missing one is a warning where the \
-          factsheet does not require it.",
+          factsheet does not require it; a factsheet that lists optional parameters, and not this one, has no use for it.",
     arguments: &[],
     start: |_| Box::new(Position::default()),
 };
@@ -204,6 +204,11 @@ fn topics(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> 
     is_order || is_instant
 }
 
+/// Whether an optional parameter of a factsheet is the position of a node, or something in it.
+fn names_position(parameter: &str) -> bool {
+    parameter.split('.').any(|level| level == "nodePosition")
+}
+
 #[derive(Default)]
 struct Position {
     traffic: Traffic,
@@ -218,7 +223,13 @@ impl Running for Position {
         let Some(order) = order else { return false };
         let sheets = self.sheets.valid(entry, context);
         // A vehicle nobody has described may be of any kind.
-        if sheets.is_empty() || sheets.iter().any(|sheet| sheet.line_guided) {
+        let unlisted = |sheet: &Sheet| {
+            sheet
+                .supported
+                .as_ref()
+                .is_some_and(|listed| !listed.iter().any(|one| names_position(one)))
+        };
+        if sheets.is_empty() || sheets.iter().any(|sheet| sheet.line_guided || unlisted(sheet)) {
             return false;
         }
         let mut found = Found::new(entry, findings);

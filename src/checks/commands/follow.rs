@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde_json::Value;
 
+use super::sheet::grace;
 use super::vehicle::{Outside, Vehicle};
 use super::{Command, ELEMENTS, Found, content, fingerprint, in_sequence, released, short};
 use crate::checks::orders::number;
@@ -19,7 +20,7 @@ pub(in crate::checks) const UPDATES: Check = Check {
     doc: "An update keeps the orderId, raises orderUpdateId, begins with the last released node as it was sent before \
           and repeats nothing else of the base. Steps larger than one, and a stitching node that has lost actions or \
           optional values, are warnings. A message that is sent again unchanged is no update. Where the vehicle has \
-          not taken an update over, the next one may begin where the one before did.",
+          not taken an update over, the next one may begin where the one before did; where it has refused it, it must.",
     arguments: &[],
     start: |_| Box::new(Follow::new(Focus::Updates)),
 };
@@ -292,20 +293,32 @@ impl Follow {
             .unwrap_or_default();
         let sequence = number(first, "sequenceId");
         let is_end = |end: &&End| Some(end.sequence) == sequence && text(first, "nodeId") == end.id;
+        // The end of an update that was refused is nowhere on the vehicle.
+        let refused =
+            |sent: &Sent| sent.update > confirmed && self.knows_refused(&order.id, sent.update, entry, context);
         let candidates = order
             .sent
             .iter()
             .rev()
-            .filter(|sent| sent.update >= confirmed || sent.update == newest);
+            .filter(|sent| (sent.update >= confirmed || sent.update == newest) && !refused(sent));
         let stitching = candidates.filter_map(|sent| sent.end.as_ref()).find(is_end);
         if let Some(end) = stitching {
             stitched(&end.node, first, found);
             return true;
         }
-        if let Some(end) = order.sent.back().and_then(|sent| sent.end.as_ref()) {
+        let newest = order.sent.iter().rev().find(|sent| !refused(sent));
+        if let Some(end) = newest.and_then(|sent| sent.end.as_ref()) {
             elsewhere(order, end, message, first, found);
         }
         true
+    }
+
+    /// Whether the master control could have known that the vehicle has refused this update.
+    fn knows_refused(&self, order: &str, update: u64, entry: &Entry, context: &CheckContext<'_>) -> bool {
+        let now = entry.at().moment;
+        let states = self.vehicle.states.iter();
+        let mut known = states.filter(|seen| seen.order == order && now.since(seen.at) >= grace(context));
+        known.any(|seen| seen.update < update && seen.refused.contains(&update))
     }
 }
 

@@ -16,8 +16,8 @@ use crate::journal::Entry;
 pub(in crate::checks) const ENABLED: Check = Check {
     name: "commands/map-enabled",
     decides: &["MAP-09"],
-    doc: "The nodes of an order are on maps that the states of the vehicle list as ENABLED, or that the master control \
-          has had downloaded or enabled before. Judged only for a vehicle that lists maps.",
+    doc: "The nodes of an order are on maps that the states of the vehicle list as ENABLED, that an enableMap which has \
+          FINISHED has enabled, or that an order enables on its way. Judged only for a vehicle that lists maps.",
     arguments: &[],
     start: |_| Box::new(Enabled::default()),
 };
@@ -36,9 +36,14 @@ pub(in crate::checks) const DUPLICATES: Check = Check {
     name: "commands/map-duplicate",
     decides: &["MAP-28"],
     doc: "When a downloadMap has failed for a map version the vehicle already lists, deleteMap for it comes before the \
-          next downloadMap for it.",
-    arguments: &[],
-    start: |_| Box::new(Duplicates::default()),
+          next downloadMap for it. With `settled`, a download that follows the refusal at once is judged as well.",
+    arguments: &["settled"],
+    start: |context| {
+        Box::new(Duplicates {
+            settled: context.with.get("settled") == Some(&Value::Bool(true)),
+            ..Duplicates::default()
+        })
+    },
 };
 
 /// How many maps or downloads are remembered.
@@ -77,8 +82,10 @@ struct Enabled {
     vehicle: Vehicle,
     /// Enabled maps of the last states; `None` for a state that lists no maps.
     reported: VecDeque<(Moment, Option<BTreeSet<String>>)>,
-    /// Maps that the master control has begun to bring to the vehicle.
-    ordered: BTreeSet<String>,
+    /// Maps to be enabled, by the id of the action.
+    asked: BTreeMap<String, String>,
+    /// Maps that are enabled on the way, or were by an action that has ended well.
+    enabled: BTreeSet<String>,
 }
 
 impl Running for Enabled {
@@ -100,16 +107,23 @@ impl Running for Enabled {
                 self.reported.pop_front();
             }
             self.reported.push_back((entry.at().moment, enabled));
+            let all = elements(state, "actionStates").take(ELEMENTS);
+            for action in all.filter(|action| text(action, "actionStatus") == "FINISHED") {
+                let map = self.asked.remove(text(action, "actionId"));
+                self.enabled.extend(map.filter(|_| self.enabled.len() < KEPT));
+            }
         }
         let Some(command) = Command::read(self.traffic, entry, context) else {
             return false;
         };
-        for (_, action) in command.actions() {
-            if matches!(text(action, "actionType"), "enableMap" | "downloadMap")
-                && let Some((map, _)) = pair(action)
-                && self.ordered.len() < KEPT
-            {
-                self.ordered.insert(map);
+        for (scope, action) in command.actions() {
+            let (Some((map, _)), "enableMap") = (pair(action), text(action, "actionType")) else {
+                continue;
+            };
+            if scope != "INSTANT" && self.enabled.len() < KEPT {
+                self.enabled.insert(map);
+            } else if let Some(id) = short(action, "actionId").filter(|_| self.asked.len() < KEPT) {
+                self.asked.insert(id, map);
             }
         }
         let Some(order) = command.order() else { return false };
@@ -128,7 +142,7 @@ impl Running for Enabled {
                 continue;
             };
             judged = true;
-            let known = recent.iter().flatten().any(|enabled| enabled.contains(map)) || self.ordered.contains(map);
+            let known = recent.iter().flatten().any(|enabled| enabled.contains(map)) || self.enabled.contains(map);
             if !known && said.insert(map) {
                 found.broken(
                     "MAP-09",
@@ -142,6 +156,8 @@ impl Running for Enabled {
 
 #[derive(Default)]
 struct Duplicates {
+    /// The one who asks knows that the master control has seen the refusal.
+    settled: bool,
     traffic: Traffic,
     vehicle: Vehicle,
     /// Downloads by actionId.
@@ -200,7 +216,8 @@ impl Running for Duplicates {
                     if !self.sent.insert(id.clone()) {
                         continue;
                     }
-                    let late = |at: &Moment| entry.at().moment.since(*at) >= grace(context);
+                    let late = |at: &Moment| self.settled || entry.at().moment.since(*at) >= grace(context);
+                    judged |= self.settled;
                     if self.refused.get(&pair).is_some_and(late) {
                         let text = format!("map {} is downloaded again, and was not deleted", quote(&pair.0));
                         found.broken("MAP-28", text);

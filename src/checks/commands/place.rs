@@ -49,8 +49,25 @@ pub(in crate::checks) const CANCELLED_BETWEEN: Check = Check {
     start: |_| Box::new(Start::new(Rule::Between)),
 };
 
+/// `commands/first-place`.
+pub(in crate::checks) const FIRST_PLACE: Check = Check {
+    name: "commands/first-place",
+    decides: &["MAP-02"],
+    doc: "A new order that begins at the node on which the vehicle was put says that this node is where the vehicle says \
+          it is. One that is far off is in another unit. Only for a test that knows the vehicle to stand on its node, and not at the origin.",
+    arguments: &[],
+    start: |_| {
+        Box::new(Start {
+            settled: true,
+            ..Start::new(Rule::Place)
+        })
+    },
+};
+
 /// How far a position may be off by measuring and rounding, in metres.
 const MEASURED: f64 = 0.3;
+/// Farther off than this is another unit, and not another direction, in metres.
+const FAR_OFF: f64 = 50.0;
 /// A vehicle this far from the place of its last node stands between nodes, in metres.
 const BETWEEN: f64 = 0.6;
 /// How many ids are remembered.
@@ -61,6 +78,7 @@ enum Rule {
     Start,
     OnNode,
     Between,
+    Place,
 }
 
 struct Start {
@@ -130,6 +148,20 @@ impl Start {
                     quote(newest)
                 );
                 found.broken("ORD-03", text);
+                true
+            }
+            Rule::Place => {
+                let Some(seen) = recent.first().filter(|seen| seen.last_node == id) else {
+                    return false;
+                };
+                let (Some((x, y, _)), Some((at_x, at_y, _))) = (place_of(node), seen.pose.as_ref()) else {
+                    return false;
+                };
+                let off = (x - at_x).hypot(y - at_y);
+                if off > FAR_OFF {
+                    let text = format!("node {shown} is said to be {off:.1} m from where the vehicle stands on it");
+                    found.broken("MAP-02", text);
+                }
                 true
             }
             Rule::OnNode => {

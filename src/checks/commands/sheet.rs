@@ -173,5 +173,5 @@ impl Sheets {
 
 /// How long a message may be under way and lie with the master control.
 pub(super) fn grace(context: &CheckContext<'_>) -> Duration {
-    context.time("slow").unwrap_or(Duration::from_secs(10))
+    context.time("notice").unwrap_or(Duration::from_secs(10))
 }

@@ -33,6 +33,8 @@ pub(super) struct Seen {
     pub abandons: bool,
     /// Action ids with their status.
     pub actions: Vec<(String, String)>,
+    /// orderUpdateIds of its order that an error names.
+    pub refused: Vec<u64>,
 }
 
 impl Seen {
@@ -68,6 +70,7 @@ impl Seen {
             mode: text(state, "operatingMode").chars().take(64).collect(),
             abandons: may_abandon(state),
             actions,
+            refused: refused(state),
         }
     }
 
@@ -75,6 +78,22 @@ impl Seen {
     pub fn is_idle(&self) -> bool {
         self.base + self.horizon == 0 && !self.driving
     }
+}
+
+/// The orderUpdateIds of the order of this state that errors name.
+fn refused(state: &Value) -> Vec<u64> {
+    let order = text(state, "orderId");
+    let errors = elements(state, "errors").take(ELEMENTS);
+    let named = errors.filter_map(|error| {
+        let value = |key: &str| {
+            let mut all = elements(error, "errorReferences").take(ELEMENTS);
+            let found = all.find(|reference| text(reference, "referenceKey") == key)?;
+            Some(text(found, "referenceValue"))
+        };
+        let own = value("orderId").is_none_or(|id| id == order);
+        value("orderUpdateId").filter(|_| own)?.parse().ok()
+    });
+    named.collect()
 }
 
 /// What the harness can do to a vehicle, as far as its master control has to find its bearings again.

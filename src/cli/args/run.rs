@@ -43,6 +43,9 @@ pub struct Run {
         conflicts_with = "profile"
     )]
     pub fault: Vec<String>,
+    /// Whether it is for a certificate.
+    #[arg(skip)]
+    pub certifies: bool,
     /// Give the built-in device a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(
         long,
@@ -67,9 +70,15 @@ pub struct Run {
     /// Run against the built-in device in memory and in virtual time, without a network
     #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
     pub in_virtual_time: bool,
-    /// Make identifiers and the order of events repeatable
+    /// Send every message that can be broken after the schemas, and not a few of them
+    #[arg(long)]
+    pub thorough: bool,
+    /// Make identifiers, the order of events and what is drawn from the schemas repeatable
     #[arg(long, value_name = "NUMBER")]
     pub seed: Option<u64>,
+    /// The same for everybody: set by `certify`.
+    #[arg(skip)]
+    pub certificate: bool,
     /// Only part I of N of the tests, for several benches at once
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
@@ -95,6 +104,9 @@ pub struct Certify {
         required = true
     )]
     pub profile: Option<PathBuf>,
+    /// Send every message that can be broken after the schemas, and not a few of them
+    #[arg(long)]
+    pub thorough: bool,
     /// Where results go.
     #[command(flatten)]
     pub output: OutputArgs,

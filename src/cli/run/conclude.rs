@@ -59,7 +59,7 @@ impl Job {
                 _ => Ok(Exit::of(result.verdict)),
             },
             End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
-            End::NoDevice(why) | End::Flooded(why) => Ok(broken_off(&why, &shown, &result)),
+            End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Ok(broken_off(&why, &shown, &result)),
             End::Broken(error) => Ok(broken_off(&error.to_string(), &shown, &result)),
         }
     }

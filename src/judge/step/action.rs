@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::{Holds, Position, Progress, StepOutcome, backlog, bound_clauses, limit, seconds};
+use super::{Holds, Position, Progress, StepOutcome, Timing, backlog, bound_clauses, ids, limit, seconds};
 use crate::clock::Moment;
 use crate::diagnostic::Span;
 use crate::journal::Entry;
+use crate::journal::event::Waiver;
 use crate::judge::limit::Limit;
+use crate::judge::mend::{Mends, is_lasting, status_meant};
 use crate::judge::window::Scene;
 use crate::report::result::NearestMiss;
 use crate::suite::model::{ActionWalk, Step, Walk};
@@ -28,6 +30,12 @@ pub(crate) struct Walking {
     walked: Vec<String>,
     last: Option<Arc<Entry>>,
     seen: u64,
+    /// Actions that are known never to end, where nothing is decided.
+    waivers: Vec<Waiver>,
+    /// What stands in the way of reading its status as it is.
+    meant: Option<String>,
+    /// It is one of them.
+    lasting: bool,
 }
 
 /// Where on a walk an action can be.
@@ -100,6 +108,9 @@ impl Walking {
             walked: Vec::new(),
             last: None,
             seen: 0,
+            waivers: Mends::of(scene.waivers, TOPIC, &ids(&verb.checks)).into_waivers(),
+            meant: None,
+            lasting: false,
         };
         for entry in backlog(scene.timeline, TOPIC, sent) {
             this.look_at(&entry);
@@ -128,15 +139,43 @@ impl Walking {
         shown.truncate(shown.char_indices().nth(40).map_or(shown.len(), |(at, _)| at));
         self.walked.push(shown);
         self.last = Some(Arc::clone(entry));
+        let action = entry.json().and_then(|state| action_of(state, &self.id));
+        self.lasting = self.verb.checks.is_empty() && action.is_some_and(|action| is_lasting(action, &self.waivers));
+        let meant = status_meant(status, &self.waivers).map(|(meant, waiver)| (meant.to_owned(), waiver.why.clone()));
+        let status = meant.as_ref().map_or(status, |(meant, _)| meant.as_str());
         self.through.step(status);
         if let Some(tolerated) = &mut self.tolerated {
             tolerated.step(status);
         }
+        self.meant = meant.map(|(_, why)| why).or(self.meant.take());
     }
 
     fn decided(&self) -> bool {
         let lost = self.through.left() && self.tolerated.as_ref().is_none_or(Track::left);
-        self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost
+        self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost || self.lasting
+    }
+
+    pub(super) fn timing(&self) -> Option<Timing> {
+        let (since, limit) = (self.position.base, self.limit.soft);
+        match &self.last {
+            Some(last) if self.decided() => {
+                let at = last.at().moment;
+                Some(Timing::Late { since, at, limit })
+            }
+            _ => Some(Timing::Missed(self.deadline)),
+        }
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        let told = format!(
+            "it is not waited for that this action ends, which is {}",
+            self.walked.join(" -> ")
+        );
+        if self.lasting && !self.through.done() {
+            vec![told]
+        } else {
+            self.meant.iter().cloned().collect()
+        }
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -166,8 +205,13 @@ impl Walking {
                 Some(took) => (Holds::Late, format!("walked {walked}, after {}", seconds(took))),
                 None => (Holds::Yes, format!("walked {walked}")),
             }
+        } else if self.lasting {
+            (Holds::Yes, format!("walked {walked}, and is known to go no further"))
         } else if self.tolerated.as_ref().is_some_and(Track::done) {
             (Holds::Softly, format!("walked {walked}, which a ruling tolerates"))
+        } else if let (true, Some(meant)) = (self.decided(), &self.meant) {
+            let why = format!("walked {walked}, which cannot be told, since {meant}");
+            (Holds::Unseen(why.clone()), why)
         } else if self.decided() {
             (Holds::No, format!("walked {walked}"))
         } else if let Some(why) = cut_short {
@@ -204,15 +248,19 @@ impl Walking {
             saves: saves.collect(),
             clauses,
             seen: self.seen,
+            allowances: Vec::new(),
+            timing: None,
         }
     }
 }
 
+fn action_of<'a>(state: &'a Value, id: &str) -> Option<&'a Value> {
+    let mut all = state.get("actionStates")?.as_array()?.iter();
+    all.find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))
+}
+
 fn status_of<'a>(state: &'a Value, id: &str) -> Option<&'a str> {
-    let all = state.get("actionStates")?.as_array()?;
-    let one = all
-        .iter()
-        .find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))?;
+    let one = action_of(state, id)?;
     Some(one.get("actionStatus").and_then(Value::as_str).unwrap_or("no status"))
 }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::weigh::convinces;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit,
-    seconds, shown_path,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
+    limit, seconds, shown_path,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -48,25 +48,27 @@ struct Violation {
 
 impl Holding {
     pub(super) fn begin(verb: &Always, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
-        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?;
-        let check = selector
-            .check
-            .take()
-            .map(|check| CheckWindow::start(&check, scene))
-            .transpose()?;
+        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
+            &verb.subject(),
+            &ids(&verb.checks),
+            scene,
+        );
+        let check = selector.take_check(scene)?;
         let (until, ends) = match &verb.extent {
             Extent::During(time) => (None, position.begun + limit(time, scene)?.hard),
             Extent::Until(until) => {
                 let limit = limit(&until.within, scene)?;
-                let goal = Goal {
-                    selector: Selector::bind(&until.selection, &until.subject(), &until.at, position, scene)?,
-                    until: (**until).clone(),
-                    limit,
-                    nearest: None,
-                    reached: None,
-                    doubtful: None,
-                    seen: 0,
-                };
+                let goal =
+                    Goal {
+                        selector: Selector::bind(&until.selection, &until.subject(), &until.at, position, scene)?
+                            .lenient(&until.subject(), &ids(&until.checks), scene),
+                        until: (**until).clone(),
+                        limit,
+                        nearest: None,
+                        reached: None,
+                        doubtful: None,
+                        seen: 0,
+                    };
                 (Some(goal), position.base + limit.hard)
             }
         };
@@ -175,6 +177,21 @@ impl Holding {
         self.violated.is_some() || self.until.as_ref().is_some_and(|goal| goal.reached.is_some())
     }
 
+    pub(super) fn timing(&self) -> Option<Timing> {
+        let goal = self.until.as_ref()?;
+        let (since, limit) = (self.position.base, goal.limit.soft);
+        Some(match goal.reached.or(goal.doubtful) {
+            Some((_, at)) => Timing::Late { since, at, limit },
+            None => Timing::Missed(self.ends),
+        })
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        let mut all = self.selector.allowances();
+        all.extend(self.until.iter().flat_map(|goal| goal.selector.allowances()));
+        all
+    }
+
     pub(super) fn progress(&self) -> Progress {
         let doubtful = self.until.as_ref().filter(|goal| goal.doubtful.is_some());
         match doubtful {
@@ -228,6 +245,8 @@ impl Holding {
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
+            timing: None,
         }
     }
 

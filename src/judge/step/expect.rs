@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::weigh::Weighing;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, keep_nearest, limit,
-    seconds, weighed_clause,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
+    limit, seconds, weighed_clause,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -22,6 +22,8 @@ pub(crate) struct Expecting {
     nearest: Option<Near>,
     seen: u64,
     late: Option<u64>,
+    /// When it came, later than it should.
+    came: Option<Moment>,
     taken: Option<StepOutcome>,
     weighing: Weighing,
 }
@@ -30,7 +32,11 @@ impl Expecting {
     pub(super) fn begin(verb: &Expect, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
         let limit = limit(&verb.within, scene)?;
         let mut this = Self {
-            selector: Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?,
+            selector: Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
+                &verb.subject(),
+                &ids(&verb.checks),
+                scene,
+            ),
             deadline: position.base + limit.hard,
             verb: verb.clone(),
             position,
@@ -38,13 +44,14 @@ impl Expecting {
             nearest: None,
             seen: 0,
             late: None,
+            came: None,
             taken: None,
             weighing: Weighing::of(verb, position, scene),
         };
         if verb.from == From::Latest {
             // What is already known counts, however old it is; after that only what is new.
             this.deadline = position.begun + limit.hard;
-            if let Some(entry) = scene.timeline.of(&verb.subject()).last().cloned() {
+            if let Some(entry) = scene.timeline.present(&verb.subject()).cloned() {
                 this.look_at(&entry, scene, true);
             }
         } else {
@@ -81,6 +88,9 @@ impl Expecting {
     fn take(&mut self, entry: &Arc<Entry>, at: Moment, whenever: bool, scene: &Scene<'_>) {
         let took = at.since(self.position.base);
         let late = took > self.limit.soft && !whenever;
+        if late {
+            self.came = Some(at);
+        }
         let (holds, message) = if late {
             let message = format!(
                 "#{} came after {}, which is later than {}",
@@ -124,8 +134,24 @@ impl Expecting {
             saves: saves.collect(),
             clauses,
             seen: self.seen,
+            allowances: Vec::new(),
+            timing: None,
         };
         self.taken = self.weighing.weigh(outcome, &shares, entry, &self.selector, scene);
+    }
+
+    pub(super) fn timing(&self) -> Option<Timing> {
+        match &self.taken {
+            Some(_) => {
+                let (since, limit) = (self.position.base, self.limit.soft);
+                self.came.map(|at| Timing::Late { since, at, limit })
+            }
+            None => Some(Timing::Missed(self.deadline)),
+        }
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        self.selector.allowances()
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -161,6 +187,17 @@ impl Expecting {
             |miss| format!("closest: {} is {}", super::shown_path(&miss.path), miss.found),
         );
         let mut clauses = bound_clauses(&self.verb.checks, "checks", &span, &holds, None, &message);
+        // Whoever reads only that it was not reached wants to know what was in the way.
+        let reached = match &nearest {
+            Some(miss) if cut_short.is_none() => format!(
+                "{message}; closest #{}: {} is {}, expected {}",
+                miss.seq,
+                super::shown_path(&miss.path),
+                miss.found,
+                miss.expected
+            ),
+            _ => message.clone(),
+        };
         for clause in &mut clauses {
             clause.label.clone_from(&label);
             clause.nearest.clone_from(&nearest);
@@ -181,11 +218,13 @@ impl Expecting {
             }));
         }
         StepOutcome {
-            reached: Some(Err(message)),
+            reached: Some(Err(reached)),
             took: None,
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
+            timing: None,
         }
     }
 
@@ -195,6 +234,7 @@ impl Expecting {
             return format!("the {topic} message came too late, in #{late}");
         }
         match self.seen {
+            0 if topic == "order" => format!("no order came within {}: the vehicle is not served", seconds(waited)),
             0 => format!("no {topic} message came within {}", seconds(waited)),
             1 => format!(
                 "1 {topic} message came within {}, and it does not match",

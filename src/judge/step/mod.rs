@@ -17,6 +17,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::limit::Limit;
+use super::mend::Mends;
 use super::timeline::Timeline;
 use super::window::{CheckWindow, Said, Scene};
 use crate::clock::Moment;
@@ -40,6 +41,8 @@ pub struct Position {
     pub base: Moment,
     /// When this step began.
     pub begun: Moment,
+    /// Journal number at which this step began.
+    pub step: u64,
 }
 
 impl Position {
@@ -47,6 +50,7 @@ impl Position {
         match if from == From::Usual { usual } else { from } {
             From::Mark => self.mark,
             From::Test => self.test,
+            From::Now => self.step,
             From::Usual | From::Here | From::Latest => self.cursor,
         }
     }
@@ -103,7 +107,44 @@ pub struct StepOutcome {
     pub saves: Vec<(String, Value)>,
     /// How many entries of its subject it looked at.
     pub seen: u64,
+    /// Lasting mistakes of the vehicle that would have stood in the way.
+    pub allowances: Vec<String>,
+    /// What came too late, or did not come in time.
+    pub timing: Option<Timing>,
 }
+
+/// A finding about time.
+#[derive(Clone, Copy, Debug)]
+pub enum Timing {
+    /// It came later than it should.
+    Late {
+        /// From when it counts.
+        since: Moment,
+        /// When it came.
+        at: Moment,
+        /// How long it may take.
+        limit: Duration,
+    },
+    /// It had not come by then.
+    Missed(Moment),
+}
+
+impl Timing {
+    /// How long the harness was held up itself, if that can explain it.
+    pub(super) fn explained(self, timeline: &Timeline) -> Option<Duration> {
+        let lag = match self {
+            Self::Late { since, at, limit } => {
+                let lag = timeline.lag(since, at);
+                return (at.since(since).saturating_sub(lag) <= limit && !lag.is_zero()).then_some(lag);
+            }
+            Self::Missed(deadline) => timeline.lag(deadline, deadline + AFTERWARDS),
+        };
+        (!lag.is_zero()).then_some(lag)
+    }
+}
+
+/// A harness that was held up at the end of a step has not read yet what came before.
+const AFTERWARDS: Duration = Duration::from_millis(500);
 
 /// What the engine should do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -186,7 +227,9 @@ impl Evaluator {
 
     /// The step has ended at `at`; `cut_short` when it was not the deadline that ended it.
     pub(super) fn end(self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
-        match self {
+        let allowances = self.allowances();
+        let timing = self.timing();
+        let mut outcome = match self {
             Self::Plain => StepOutcome::default(),
             Self::Unbound(outcome) => outcome,
             Self::Expect(step) => step.end(at, cut_short),
@@ -194,6 +237,29 @@ impl Evaluator {
             Self::Always(step) => step.end(at, cut_short, scene),
             Self::Action(step) => step.end(at, cut_short),
             Self::Retained(step) => step.end(at, cut_short),
+        };
+        outcome.allowances.extend(allowances);
+        outcome.timing = timing;
+        outcome
+    }
+
+    fn timing(&self) -> Option<Timing> {
+        match self {
+            Self::Expect(step) => step.timing(),
+            Self::Always(step) => step.timing(),
+            Self::Action(step) => step.timing(),
+            _ => None,
+        }
+    }
+
+    /// Lasting mistakes of the vehicle that would have stood in the way.
+    fn allowances(&self) -> Vec<String> {
+        match self {
+            Self::Expect(step) => step.allowances(),
+            Self::Never(step) => step.allowances(),
+            Self::Always(step) => step.allowances(),
+            Self::Action(step) => step.allowances(),
+            _ => Vec::new(),
         }
     }
 }
@@ -213,6 +279,7 @@ pub(super) struct Selector {
     pub(super) check: Option<crate::suite::model::CheckUse>,
     pub(super) baseline: Option<Value>,
     pub(super) span: Span,
+    mends: Mends,
 }
 
 impl Selector {
@@ -234,18 +301,47 @@ impl Selector {
             check: selection.check.clone(),
             baseline: scene.timeline.baseline(subject, position.mark),
             span,
+            mends: Mends::default(),
         })
+    }
+
+    /// From now on the states are read as they are meant, except for what is about a mistake of the vehicle itself.
+    pub(super) fn lenient(mut self, subject: &str, decides: &[&RequirementId], scene: &Scene<'_>) -> Self {
+        self.mends = Mends::of(scene.waivers, subject, decides);
+        self
+    }
+
+    /// Its named check, to be shown every message.
+    pub(super) fn take_check(&mut self, scene: &Scene<'_>) -> Result<Option<CheckWindow>, String> {
+        let Some(check) = self.check.take() else {
+            return Ok(None);
+        };
+        let window = CheckWindow::start(&check, scene)?;
+        Ok(Some(window.lenient(self.mends.clone())))
+    }
+
+    /// The mistakes of the vehicle that would have stood in the way.
+    pub(super) fn allowances(&self) -> Vec<String> {
+        self.mends.used()
     }
 
     /// Whether a message is what is looked for. A named check looks at everything since the test began.
     pub(super) fn takes(&self, entry: &Entry, scene: &Scene<'_>) -> bool {
         let matches = match &self.pattern {
             None => entry.subject().is_some(),
-            Some(pattern) => entry
-                .subject()
-                .is_some_and(|message| pattern.matches(&message, self.baseline.as_ref())),
+            Some(pattern) => entry.subject().is_some_and(|message| {
+                let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
+                takes(&message) || self.mends.make_up_for(entry, scene, takes)
+            }),
         };
         matches && !matches!(self.check_says(entry, scene), Said::Wrong(..))
+    }
+
+    /// Whether a message is what is looked for only for a lasting mistake of the vehicle.
+    pub(super) fn is_excused(&self, entry: &Entry, scene: &Scene<'_>) -> bool {
+        let Some(pattern) = &self.pattern else { return false };
+        let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
+        self.mends.make_up_for(entry, scene, |message: &Value| !takes(message))
     }
 
     /// What the named check says about this entry; right where there is no check.
@@ -253,7 +349,7 @@ impl Selector {
         let Some(check) = &self.check else { return Said::Right };
         match CheckWindow::start(check, scene) {
             Err(why) => Said::Wrong(Holds::Unseen(why.clone()), why),
-            Ok(mut window) => window.observe(entry, scene),
+            Ok(window) => window.lenient(self.mends.clone()).observe(entry, scene),
         }
     }
 
@@ -312,12 +408,17 @@ pub(super) fn bind_pattern(pattern: Option<&Pattern>, scene: &Scene<'_>) -> Resu
         .map_err(|unbound| unbound_text(&unbound))
 }
 
-pub(super) fn unbound_text(unbound: &Unbound) -> String {
+pub(in crate::judge) fn unbound_text(unbound: &Unbound) -> String {
     format!("the variable ${{{}}} has no value here", unbound.name)
 }
 
 pub(super) fn limit(time: &crate::suite::model::TimeTerm, scene: &Scene<'_>) -> Result<Limit, String> {
     Limit::resolve(time, scene.bindings).ok_or_else(|| "a time limit has no value".to_owned())
+}
+
+/// The requirements of `checks:`.
+fn ids(bindings: &[Binding]) -> Vec<&RequirementId> {
+    bindings.iter().map(|binding| &binding.requirement).collect()
 }
 
 /// The clauses of `checks:`, all with the same outcome.
@@ -378,7 +479,7 @@ fn weighed_clause(
         nearest: None,
     };
     let selector = match Selector::bind(&assertion.selection, subject, &assertion.span, position, scene) {
-        Ok(selector) => selector,
+        Ok(selector) => selector.lenient(subject, &[&assertion.requirement], scene),
         Err(why) => {
             clause.holds = Holds::Unseen(why.clone());
             clause.message = why;

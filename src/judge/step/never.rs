@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, limit, seconds};
+use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, limit, seconds};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
@@ -18,6 +18,8 @@ pub(crate) struct Forbidding {
     probe_until: Moment,
     seen: u64,
     violated: Option<(u64, String)>,
+    /// What a check remarked on, or could not judge, without ending the step.
+    remarked: Option<(u64, Holds, String)>,
     alive: bool,
 }
 
@@ -30,12 +32,12 @@ impl Forbidding {
             .get("time.broker")
             .and_then(serde_json::Value::as_u64)
             .unwrap_or(5_000);
-        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?;
-        let check = selector
-            .check
-            .take()
-            .map(|check| CheckWindow::start(&check, scene))
-            .transpose()?;
+        let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
+            &verb.subject(),
+            &ids(&verb.checks),
+            scene,
+        );
+        let check = selector.take_check(scene)?;
         let mut this = Self {
             verb: verb.clone(),
             position,
@@ -45,6 +47,7 @@ impl Forbidding {
             probe_until: ends + std::time::Duration::from_millis(patience),
             seen: 0,
             violated: None,
+            remarked: None,
             alive: false,
         };
         for entry in backlog(scene.timeline, &verb.subject(), position.start(verb.from, From::Mark)) {
@@ -68,11 +71,38 @@ impl Forbidding {
         }
         self.seen += 1;
         if let Some(check) = &mut self.check {
-            if let Said::Wrong(_, found) = check.observe(entry, scene) {
-                self.violated = Some((entry.seq(), found));
+            // The check has to see everything; what it says counts where the message is one of those meant.
+            let said = check.observe(entry, scene);
+            if let Said::Wrong(holds, found) = said
+                && self.selector.takes(entry, scene)
+            {
+                self.found(entry.seq(), holds, found);
             }
-        } else if self.selector.takes(entry, scene) {
+        } else if self.selector.takes(entry, scene) && !self.selector.is_excused(entry, scene) {
             self.violated = Some((entry.seq(), format!("#{} is what must not come", entry.seq())));
+        }
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        self.selector.allowances()
+    }
+
+    /// Keeps what the check found: a violation ends the step, anything softer waits for the end.
+    fn found(&mut self, seq: u64, holds: Holds, found: String) {
+        match holds {
+            Holds::No => self.violated = Some((seq, found)),
+            Holds::Yes => {}
+            // What could not be judged weighs more than a remark, as everywhere.
+            softer => {
+                let weightier = matches!(softer, Holds::Unseen(_));
+                if self
+                    .remarked
+                    .as_ref()
+                    .is_none_or(|(_, before, _)| weightier && !matches!(before, Holds::Unseen(_)))
+                {
+                    self.remarked = Some((seq, softer, found));
+                }
+            }
         }
     }
 
@@ -89,9 +119,17 @@ impl Forbidding {
         self.probe_until
     }
 
-    pub(super) fn end(self, at: Moment, cut_short: Option<&str>, _scene: &Scene<'_>) -> StepOutcome {
+    pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
+        let last = self.check.as_mut().and_then(|check| check.finish(at, scene));
+        if let Some((holds, found)) = last.filter(|_| self.violated.is_none()) {
+            self.found(0, holds, found);
+        }
         let (holds, message, witness) = match (self.violated, cut_short) {
-            (Some((seq, message)), _) => (Holds::No, message, Some(seq)),
+            (Some((seq, message)), _) => (Holds::No, message, Some(seq).filter(|seq| *seq > 0)),
+            (None, None) if self.alive && self.remarked.is_some() => {
+                let (seq, holds, message) = self.remarked.unwrap_or((0, Holds::Yes, String::new()));
+                (holds, message, Some(seq).filter(|seq| *seq > 0))
+            }
             (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
             (None, None) if self.alive => {
                 let message = format!(
@@ -121,11 +159,17 @@ impl Forbidding {
                 .map(|pattern| format!("no message with {pattern}"));
         }
         StepOutcome {
-            reached: Some(if holds == Holds::Yes { Ok(()) } else { Err(message) }),
+            reached: Some(if matches!(holds, Holds::Yes | Holds::Softly) {
+                Ok(())
+            } else {
+                Err(message)
+            }),
             took: witness,
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
+            timing: None,
         }
     }
 }

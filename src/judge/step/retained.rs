@@ -130,6 +130,8 @@ impl Fetching {
             clauses,
             saves: Vec::new(),
             seen: self.seen,
+            allowances: Vec::new(),
+            timing: None,
         }
     }
 }

@@ -1,10 +1,12 @@
 //! Which of several messages an `expect` is about.
 //!
-//! An assertion about a new element (`$hasNew`) is about what the stimulus brought. A vehicle may report something of
-//! its own in the meantime, so a message without the right element decides nothing yet: the step goes on looking
-//! until its limit, and takes the first message that shows everything. If there is none, each assertion is judged
-//! by the message that came closest. Where nothing is asserted of it, what the vehicle has reported before, without
-//! this stimulus, is taken for the answer only if nothing better comes in good time.
+//! An assertion about a new element (`$hasNew`) is about what the stimulus brought. The first message with the answer
+//! is judged, and a later, better one changes nothing. The answer is a new element that names what was sent, or one of
+//! the asserted kind that was not there before. A vehicle may report something of its own in the meantime: a message
+//! with nothing but that decides nothing yet, and the step goes on looking until its limit. If no answer can be told
+//! from the rest, each assertion is judged by the message that came closest. Where nothing is asserted of it, what the
+//! vehicle has reported before, without this stimulus, is taken for the answer only if nothing better comes in good
+//! time.
 
 use std::collections::BTreeSet;
 
@@ -15,10 +17,13 @@ use crate::journal::Entry;
 use crate::journal::event::Event;
 use crate::judge::window::Scene;
 use crate::pattern::Bound;
-use crate::suite::model::Expect;
+use crate::suite::model::{Assertion, Expect};
 
 /// So many earlier messages are asked whether an element was there before.
 const LOOK_BACK: usize = 200;
+/// So many are asked about one of the asserted kind: what comes and goes of its own shows up in them, and a refusal
+/// of an earlier test, in the same words, does not.
+const LOOK_BACK_KIND: usize = 12;
 
 pub(super) struct Weighing {
     /// Topic, and first journal number of what came after the stimulus.
@@ -27,8 +32,10 @@ pub(super) struct Weighing {
     /// Whether there are assertions, and whether a later message may be the one they mean.
     judges: bool,
     patient: bool,
+    /// What is asserted of new elements.
+    asserted: Vec<Bound>,
     best: Option<Candidate>,
-    /// An element names what was sent, so that it is the answer.
+    /// Nothing is asserted, and something new was there.
     settled: bool,
 }
 
@@ -42,15 +49,17 @@ struct Candidate {
 
 impl Weighing {
     pub(super) fn of(verb: &Expect, position: Position, scene: &Scene<'_>) -> Self {
-        let looks_back = verb.assert.iter().any(|assertion| {
-            let bound = bind_pattern(assertion.selection.pattern.as_ref(), scene);
-            bound.is_ok_and(|pattern| pattern.is_some_and(|pattern| pattern.looks_back()))
-        });
+        let bound = |assertion: &Assertion| {
+            let bound = bind_pattern(assertion.selection.pattern.as_ref(), scene).ok()??;
+            bound.looks_back().then_some(bound)
+        };
+        let patient = verb.assert.iter().any(|assertion| bound(assertion).is_some());
         Self {
             topic: verb.subject().into_owned(),
             mark: position.mark,
             judges: !verb.assert.is_empty(),
-            patient: looks_back,
+            patient,
+            asserted: verb.assert.iter().chain(&verb.prefer).filter_map(bound).collect(),
             best: None,
             settled: false,
         }
@@ -66,7 +75,8 @@ impl Weighing {
         scene: &Scene<'_>,
     ) -> Option<StepOutcome> {
         let missing = |clause: &Clause| clause.word == "assert" && clause.holds == Holds::No;
-        if self.judges && (!self.patient || !outcome.clauses.iter().any(missing)) {
+        let shows_all = || !outcome.clauses.iter().any(missing);
+        if self.judges && (!self.patient || shows_all() || self.answers(entry, selector, scene)) {
             return Some(outcome);
         }
         if !self.judges {
@@ -77,7 +87,6 @@ impl Weighing {
             self.settled = true;
         }
         let novel = is_novel(entry, &self.topic, self.mark, selector, scene);
-        self.settled |= names_what_was_sent(entry, self.mark, selector, scene);
         let held = outcome.clauses.iter().filter(|clause| !missing(clause)).count();
         let weights: Vec<(bool, bool, f64)> = outcome
             .clauses
@@ -111,6 +120,31 @@ impl Weighing {
             *best = Candidate { outcome, rank, weights };
         }
         None
+    }
+
+    /// Whether the message holds the answer to what was sent.
+    fn answers(&self, entry: &Entry, selector: &Selector, scene: &Scene<'_>) -> bool {
+        let Some(message) = entry.subject() else { return false };
+        let selected = selector.pattern.iter().filter(|pattern| pattern.looks_back());
+        selected.chain(&self.asserted).any(|pattern| {
+            let new = pattern.newcomers(&message, selector.baseline.as_ref());
+            if new.is_empty() {
+                return false;
+            }
+            let kinds = self
+                .asserted
+                .iter()
+                .chain(&selector.pattern)
+                .flat_map(Bound::kinds_of_new);
+            let kinds: Vec<(&str, &Bound)> = kinds.collect();
+            let of_kind = |element: &&&Value| {
+                let fits = |(name, kind): &(&str, &Bound)| element.get(name).is_some_and(|it| kind.matches(it, None));
+                kinds.iter().any(fits)
+            };
+            let of_kind: Vec<&Value> = new.iter().filter(of_kind).copied().collect();
+            name_what_was_sent(&new, self.mark, selector, scene)
+                || any_was_not_there(of_kind, pattern, &message, &self.topic, self.mark, scene)
+        })
     }
 
     /// Whether the outcome is known, but for what may come before an answer is called slow.
@@ -163,42 +197,104 @@ fn is_novel(entry: &Entry, topic: &str, mark: u64, selector: &Selector, scene: &
     })
 }
 
-/// Whether a new element repeats a text of what was sent that was in no state before: the identifier of an order or of
-/// an action.
+/// Whether one of the new elements was in none of the last messages before the stimulus.
+fn any_was_not_there(
+    mut elements: Vec<&Value>,
+    pattern: &Bound,
+    message: &Value,
+    topic: &str,
+    mark: u64,
+    scene: &Scene<'_>,
+) -> bool {
+    let all = scene.timeline.of(topic);
+    let before = &all[..all.partition_point(|entry| entry.seq() < mark)];
+    for older in before.iter().rev().take(LOOK_BACK_KIND) {
+        if elements.is_empty() {
+            return false;
+        }
+        let new = pattern.newcomers(message, older.json());
+        elements.retain(|element| new.contains(element));
+    }
+    !elements.is_empty()
+}
+
+/// Whether a new element of the message names what was sent.
 fn names_what_was_sent(entry: &Entry, mark: u64, selector: &Selector, scene: &Scene<'_>) -> bool {
     let (Some(pattern), Some(message)) = (&selector.pattern, entry.subject()) else {
         return false;
     };
     let newcomers = pattern.newcomers(&message, selector.baseline.as_ref());
-    if newcomers.is_empty() {
+    name_what_was_sent(&newcomers, mark, selector, scene)
+}
+
+/// Whether one of the elements repeats something of what was sent that was in no state before: a text, such as the
+/// identifier of an order or of an action, or a number under its name, such as the orderUpdateId.
+fn name_what_was_sent(elements: &[&Value], mark: u64, selector: &Selector, scene: &Scene<'_>) -> bool {
+    if elements.is_empty() {
         return false;
     }
     let mut sent = BTreeSet::new();
     for stimulus in scene.entries.iter().rev().take_while(|entry| entry.seq() >= mark) {
         if let (Event::Sent { .. }, Some(message)) = (stimulus.event(), stimulus.json()) {
-            texts(message, &mut |text| {
-                sent.insert(text.to_owned());
+            facts(message, "", &mut |fact| {
+                sent.insert(fact);
             });
         }
     }
     if let Some(before) = &selector.baseline {
-        texts(before, &mut |text| {
-            sent.remove(text);
+        facts(before, "", &mut |fact| {
+            sent.remove(&fact);
         });
     }
     let mut named = false;
-    for element in newcomers {
-        texts(element, &mut |text| named |= sent.contains(text));
+    for element in elements {
+        facts(element, "", &mut |fact| named |= sent.contains(&fact));
+        references(element, &mut |key, value| {
+            // A number is referenced as text.
+            named |= sent.contains(&Fact::Number(key.to_owned(), value.to_owned()));
+        });
     }
     named
 }
 
-/// All texts of a value.
-fn texts(value: &Value, told: &mut dyn FnMut(&str)) {
+/// Something a message says.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Fact {
+    /// A text, wherever it stands.
+    Text(String),
+    /// A whole number, as text, under a name.
+    Number(String, String),
+}
+
+/// All that a value says.
+fn facts(value: &Value, name: &str, told: &mut dyn FnMut(Fact)) {
     match value {
-        Value::String(text) => told(text),
-        Value::Array(items) => items.iter().for_each(|item| texts(item, told)),
-        Value::Object(members) => members.values().for_each(|member| texts(member, told)),
+        Value::String(text) => told(Fact::Text(text.clone())),
+        Value::Number(number) => told(Fact::Number(name.to_owned(), number.to_string())),
+        Value::Array(items) => items.iter().for_each(|item| facts(item, name, told)),
+        Value::Object(members) => members.iter().for_each(|(name, member)| facts(member, name, told)),
+        _ => {}
+    }
+}
+
+/// The references of an element: objects of a name and its value.
+fn references(value: &Value, told: &mut dyn FnMut(&str, &str)) {
+    match value {
+        Value::Array(items) => items.iter().for_each(|item| references(item, told)),
+        Value::Object(members) => {
+            let ending = |end: &str| {
+                let mut found = members.iter().filter(|(name, _)| name.ends_with(end));
+                found.find_map(|(_, value)| match value {
+                    Value::String(text) => Some(text.clone()),
+                    Value::Number(number) => Some(number.to_string()),
+                    _ => None,
+                })
+            };
+            if let (Some(key), Some(value)) = (ending("Key"), ending("Value")) {
+                told(&key, &value);
+            }
+            members.values().for_each(|member| references(member, told));
+        }
         _ => {}
     }
 }

@@ -33,6 +33,30 @@ const ANSWER_LIMIT: Duration = Duration::from_secs(10);
 /// Keep-alive of the harness's own connections.
 const KEEP_ALIVE: Duration = Duration::from_secs(30);
 
+/// A harness that is late by less is in time.
+const LAG: Duration = Duration::from_millis(100);
+/// How often it looks whether it is late.
+const LOOK: Duration = Duration::from_millis(20);
+
+fn lag_of(late: Duration) -> Event {
+    Event::Lag {
+        micros: u64::try_from(late.as_micros()).unwrap_or(u64::MAX),
+        of: "timer".to_owned(),
+    }
+}
+
+/// Measures by how much timers of the harness are late, for want of a processor or for whatever reason.
+async fn watch_lag(reporter: Reporter) {
+    loop {
+        let due = Instant::now() + LOOK;
+        sleep_until(due).await;
+        let late = due.elapsed();
+        if late >= LAG {
+            reporter.report(Source::Harness, None, lag_of(late)).await;
+        }
+    }
+}
+
 /// Which broker is used.
 #[derive(Clone, Debug)]
 pub enum BrokerChoice {
@@ -161,6 +185,7 @@ impl MqttBench {
             probe_topic(&run),
             reporter.clone(),
         ));
+        tasks.spawn(watch_lag(reporter.clone()));
         let link = MqttLink {
             clock: options.clock,
             vantage: if options.tap { Vantage::Tap } else { Vantage::Subscriber },
@@ -352,13 +377,20 @@ impl Link for MqttLink {
             return Ok(Some(occurrence));
         }
         self.check()?;
+        let begun = self.clock.now().moment;
         let deadline = Instant::from_std(self.clock.instant(until));
         let next = tokio::select! {
             biased;
             next = self.inbox.next() => next.map(Some),
             () = sleep_until(deadline) => Ok(None),
         };
-        self.note(next)
+        let next = self.note(next)?;
+        // The machine did not let the harness go on in time: what came meanwhile has not been read either.
+        let late = self.clock.now().moment.since(until.max(begun));
+        if next.is_none() && late >= LAG {
+            return Ok(Some(Occurrence::harness(self.clock.now(), lag_of(late))));
+        }
+        Ok(next)
     }
 
     async fn fault(&mut self, fault: LinkFault) -> Result<(), LinkError> {

@@ -195,7 +195,8 @@ impl Agv {
             if listed_refused || (!kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked)) {
                 return unable("the action is not possible here", &request.path);
             }
-            if let Some((key, reason)) = action_kinds::refusal(kind, request, true) {
+            let refusal = action_kinds::refusal(kind, request, true);
+            if let Some((key, reason)) = refusal.filter(|_| !self.faults.has(F::ParametersUnchecked)) {
                 let refusal = Refusal::at_field(Rule::Unable, reason, &request.path).naming("actionParameter", key);
                 return Err(refusal.naming("actionId", &request.id));
             }

@@ -12,6 +12,7 @@ use super::faults::FaultName as F;
 use super::order_message::{ActionRequest, Edge, Node, Order};
 use super::read::Defect;
 use super::rejection::{Refusal, Rule};
+use crate::reference::Output;
 
 /// What to do with an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,17 +42,33 @@ impl Agv {
             Err(refusal) => Err(refusal.clone()),
             Ok(message) => self.order_decided(message),
         };
+        if let Err(refusal) = &result
+            && refusal.is_malformed()
+            && self.faults.has(F::CrashesOnMalformedOrder)
+        {
+            self.pending.push(Output::Drop);
+            self.connection.dropped(self.moment() + self.config.reconnect_delay);
+            return;
+        }
         if let Err(refusal) = result {
             self.refuse(message.as_ref().unwrap_or(&Value::Null), refusal);
         }
     }
 
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
-        let mut order = Order::read(message)?;
+        let taken = super::leniency::taken(message, self.faults);
+        let mut order = Order::read(&taken)?;
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
-        let tolerated = |_: &Defect| self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty();
+        let tolerated = |defect: &Defect| {
+            let unchecked = match defect.path.rsplit('.').next() {
+                Some("sequenceId") => self.faults.has(F::SequenceUnchecked),
+                Some("startNodeId" | "endNodeId") => self.faults.has(F::EdgeEndsUnchecked),
+                _ => false,
+            };
+            unchecked || (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
+        };
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
         }
@@ -80,7 +97,8 @@ impl Agv {
             let again = self.faults.has(F::DuplicateExecuted) && !self.is_busy();
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
-        if !new && order.update_id < self.book.update_id && !self.faults.has(F::OutdatedUpdateTakenOver) {
+        let compared = !new || self.faults.has(F::UpdateIdsComparedAcrossOrders);
+        if compared && order.update_id < self.book.update_id && !self.faults.has(F::OutdatedUpdateTakenOver) {
             return Err(Refusal::new(
                 Rule::Outdated,
                 "the order update is older than the current one",
@@ -88,7 +106,10 @@ impl Agv {
         }
         let takes_orders = match self.mode {
             super::Mode::Semiautomatic => !self.faults.has(F::SemiautomaticRefused),
-            mode => mode.takes_orders() || self.faults.has(F::ManualTakesOrders),
+            mode => {
+                let takes = self.faults.has(F::ManualTakesOrders) || self.faults.has(F::ManualDrivesOrders);
+                mode.takes_orders() || takes
+            }
         };
         if !takes_orders {
             return Err(Refusal::new(
@@ -140,33 +161,13 @@ impl Agv {
         Err(Refusal::new(Rule::StartOutOfRange, "the first node is out of reach").naming("nodeId", &order.nodes[0].id))
     }
 
-    fn check_update(&self, order: &mut Order) -> Result<(), Refusal> {
-        let busy = self.is_busy();
-        if self.book.cancel.is_some() || self.book.cancelled {
-            return Err(Refusal::new(Rule::BrokenUpdate, "the order was cancelled"));
-        }
-        if self.faults.has(F::CompletedNotContinued) && !busy {
-            return Err(Refusal::new(Rule::BrokenUpdate, "the order is complete"));
-        }
-        let first = &order.nodes[0];
-        let joins = if busy {
-            (&first.id, first.sequence_id) == (&self.book.base_end.0, self.book.base_end.1)
-                || self.faults.has(F::RunningUpdateGapAccepted)
-                || self.faults.has(F::OutdatedUpdateTakenOver)
-        } else {
-            (&first.id, first.sequence_id) == (&self.book.last_node, self.book.last_sequence)
-                || self.faults.has(F::CompletedUpdateGapAccepted)
-        };
-        if !joins {
-            let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
-            return Err(refusal.naming("nodeId", &first.id));
-        }
-        self.check_ability(order, 1)
-    }
-
     /// Nodes left, an order action not ended, or a cancellation under way; a horizon keeps it busy.
     pub(super) fn is_busy(&self) -> bool {
-        let actions = self.actions.order_unfinished() && !self.faults.has(F::RunningActionIgnored);
+        let free = |action: &Action| {
+            self.faults.has(F::FreeActionIgnored) && action.request.blocking == super::order_message::Blocking::None
+        };
+        let open = |action: &Action| action.of_order() && !action.status.is_terminal() && !free(action);
+        let actions = self.actions.iter().any(open) && !self.faults.has(F::RunningActionIgnored);
         let counts = |released: bool| released || !self.faults.has(F::HorizonNotBusy);
         let nodes = !self.book.cancelled && self.book.nodes.iter().any(|stop| counts(stop.node.released));
         (nodes || actions || self.book.cancel.is_some()) && !self.faults.has(F::BusyIgnored)
@@ -225,66 +226,30 @@ impl Agv {
             self.set_holds(|holds| holds.stuck = false);
         }
         let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
+        let last_update = self.book.has_order().then_some(self.book.update_id);
         self.book = super::book::Book::empty(last.0);
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
-        self.book.update_id = order.update_id;
+        let carried = last_update.filter(|_| self.faults.has(F::UpdateIdCarriedOver));
+        self.book.update_id = carried.unwrap_or(order.update_id);
         self.book.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
+        self.book.first_end = self.book.nodes.back().map_or(0, |stop| stop.node.sequence_id);
+        let pose = self.motion.pose(self.moment());
+        self.book.begun_at = Some((pose.x, pose.y));
+        if self.faults.has(F::LoadForgottenWithOrder) {
+            self.loads.clear();
+        }
+        if self.faults.has(F::OwnErrorClearedByOrder) {
+            self.errors.cleared();
+        }
+        if self.faults.has(F::OrderEndsPause) {
+            self.set_holds(|holds| holds.pause = false);
+        }
         self.linger_on_first_node();
     }
 
-    /// Rows 8 and 10: takes over an update.
-    fn continue_with(&mut self, order: Order) {
-        self.book.continued |= !self.is_busy();
-        let keep = if order.nodes.iter().any(|node| !node.released) {
-            self.faults.has(F::HorizonAppended)
-        } else {
-            self.faults.has(F::HorizonKept)
-        };
-        if !keep {
-            let gone = self.book.drop_horizon();
-            if !self.faults.has(F::HorizonActionsStay) {
-                self.actions.retain(|action| match action.origin {
-                    Origin::Node(sequence_id) | Origin::Edge(sequence_id) => !gone.contains(&sequence_id),
-                    Origin::Instant => true,
-                });
-            }
-        }
-        if self.faults.has(F::UpdateReplacesBase) {
-            while self.book.nodes.len() > 1 {
-                self.book.nodes.pop_front();
-                self.book.edges.pop_front();
-            }
-        }
-        if !self.faults.has(F::UpdateIdKept) {
-            self.book.update_id = order.update_id;
-        }
-        let mut nodes = order.nodes.into_iter();
-        let joint = nodes.next();
-        if let Some(joint) = joint.filter(|_| self.faults.has(F::StitchingNodeOverwritten)) {
-            self.overwrite_joint(joint);
-        }
-        self.append(nodes.collect(), order.edges);
-    }
-
-    /// `stitching-node-overwritten`: what the first transmission said is forgotten.
-    fn overwrite_joint(&mut self, joint: Node) {
-        let origin = Origin::Node(joint.sequence_id);
-        let open = self
-            .book
-            .nodes
-            .iter()
-            .any(|stop| stop.node.sequence_id == joint.sequence_id);
-        self.actions
-            .retain(|action| action.origin != origin || action.status.is_terminal());
-        self.push_actions(joint.actions, origin);
-        if !open {
-            self.actions.trigger(origin, self.faults);
-        }
-    }
-
-    fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
+    pub(super) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
         let mut edges = edges.into_iter().peekable();
         for node in nodes {
             while let Some(edge) = edges.next_if(|edge| edge.sequence_id < node.sequence_id) {
@@ -311,10 +276,15 @@ impl Agv {
         self.book.edges.push_back(edge);
     }
 
-    fn push_actions(&mut self, requests: Vec<ActionRequest>, origin: Origin) {
+    pub(super) fn push_actions(&mut self, requests: Vec<ActionRequest>, origin: Origin) {
         for request in requests {
+            let again = self.book.dropped.contains(&request.id);
+            if again && self.faults.has(F::ReleasedActionsLost) {
+                continue;
+            }
             let kind = action_kinds::find(&self.config, &request.action_type);
-            self.actions.retain(|action| action.request.id != request.id);
+            let doubled = again && self.faults.has(F::ReleasedActionsDoubled);
+            self.actions.retain(|action| action.request.id != request.id || doubled);
             self.actions.push(Action::waiting(request, kind, origin));
         }
     }

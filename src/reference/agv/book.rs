@@ -52,6 +52,18 @@ pub(super) struct Book {
     pub(super) visits: BTreeMap<String, u32>,
     /// The order was cancelled, so it cannot be continued.
     pub(super) cancelled: bool,
+    /// The order was updated.
+    pub(super) updated: bool,
+    /// The link broke since the order came (`update-refused-after-cut` only).
+    pub(super) cut: bool,
+    /// sequenceId behind which everything comes from updates (`update-actions-not-performed` only).
+    pub(super) first_end: u32,
+    /// actionIds of the horizon an update has just replaced.
+    pub(super) dropped: Vec<String>,
+    /// It has asked for a new base (`new-base-request-stays` only).
+    pub(super) asked: bool,
+    /// Where the order began (`distance-not-reset` only).
+    pub(super) begun_at: Option<(f64, f64)>,
     /// The order was complete and is continued (`continuation-not-driven` only).
     pub(super) continued: bool,
     /// When a faulty vehicle does what it does a moment later.
@@ -78,6 +90,12 @@ impl Book {
             left: (None, None),
             visits: BTreeMap::new(),
             cancelled: false,
+            updated: false,
+            cut: false,
+            first_end: u32::MAX,
+            dropped: Vec::new(),
+            asked: false,
+            begun_at: None,
             continued: false,
             soon: None,
             slipped: false,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::Agv;
 use super::action_kinds::Deed;
-use super::actions::{Action, Status};
+use super::actions::{Action, Origin, Status};
 use super::book::Cancel;
 use super::errors::{ActiveError, Life};
 use super::faults::FaultName as F;
@@ -15,12 +15,27 @@ pub(super) const MOMENT: Duration = Duration::from_millis(50);
 impl Agv {
     /// A cancelOrder action begins.
     pub(super) fn cancel_order(&mut self, action_id: &str) {
+        if let Some(cancel) = self
+            .book
+            .cancel
+            .as_mut()
+            .filter(|_| self.faults.has(F::SecondCancelTakesOver))
+        {
+            action_id.clone_into(&mut cancel.action_id);
+            if let Some(action) = self.actions.get_mut(action_id) {
+                action.status = Status::Running;
+            }
+            return;
+        }
         let active = !self.book.nodes.is_empty() || self.actions.order_unfinished();
         if !active || self.book.cancel.is_some() || self.book.cancelled {
             self.nothing_to_cancel(action_id);
             return;
         }
         let to_node = !self.config.stops_between_nodes && (self.book.entered || self.motion.reached);
+        if self.holds.pause && self.faults.has(F::PausedOrderSurvivesCancel) {
+            self.remembered = Some(self.book.clone());
+        }
         self.stop_actions();
         if to_node && !self.faults.has(F::CancelKeepsNodes) {
             self.book.nodes.truncate(1);
@@ -57,7 +72,7 @@ impl Agv {
             return;
         }
         let referenced = !self.faults.has(F::IdleCancelUnreferenced);
-        self.errors.raise(ActiveError {
+        let refusal = ActiveError {
             error_type: self.config.errors.no_order_to_cancel.clone(),
             fatal: self.faults.has(F::IdleCancelFatal),
             references: referenced
@@ -66,7 +81,8 @@ impl Agv {
                 .collect(),
             description: "there is no order to cancel".into(),
             life: Life::Until(self.moment() + self.config.error_duration),
-        });
+        };
+        self.errors.refused(refusal, self.now.moment, self.faults);
     }
 
     /// Ends the actions of the order, as far as they can be interrupted (ORD-CANCEL-03 to ORD-CANCEL-05).
@@ -80,6 +96,7 @@ impl Agv {
                 _ => interruptible && !faults.has(F::CancelLetsRun),
             };
             match action.status {
+                _ if survives(action, faults) => {}
                 Status::Waiting if !faults.has(F::CancelLeavesWaiting) => action.end(Status::Failed),
                 status if status.is_active() && ends => action.end(interrupted(action, faults)),
                 status if status.is_active() && faults.has(F::CancelFailsEarly) => action.masked = Some(Status::Failed),
@@ -100,14 +117,22 @@ impl Agv {
             || cancel.to_node && !keeps_nodes && !self.book.nodes.is_empty()
             || self.motion.is_moving() && !self.faults.has(F::CancelFinishedMoving)
             || (self.faults.has(F::CancelDrivesOn) && self.book.nodes.iter().any(|stop| stop.node.released));
-        let unfinished = self.actions.order_unfinished()
+        let open =
+            |action: &Action| action.of_order() && !action.status.is_terminal() && !survives(action, self.faults);
+        let unfinished = self.actions.iter().any(open)
             && !self.faults.has(F::CancelFinishedEarly)
             && !self.faults.has(F::CancelLeavesWaiting);
-        if under_way || unfinished || self.persona.holds_cancel() {
+        let waits = self.holds.pause && self.faults.has(F::CancelWaitsForPause);
+        if under_way || unfinished || waits || self.persona.holds_cancel() {
             return false;
         }
         self.book.cancel = None;
         self.book.cancelled = true;
+        if self.faults.has(F::LastNodeAheadWhenCancelled)
+            && let Some(ahead) = self.book.nodes.front().filter(|_| self.book.entered)
+        {
+            (self.book.last_node, self.book.last_sequence) = (ahead.node.id.clone(), ahead.node.sequence_id);
+        }
         if !self.faults.has(F::CancelLeavesNodes) {
             self.book.drop_route();
         } else if cancel.to_node {
@@ -116,6 +141,15 @@ impl Agv {
         }
         if self.faults.has(F::CancelClearsOrderId) {
             self.book.order_id.clear();
+        }
+        if self.faults.has(F::CancelResetsUpdateId) {
+            self.book.update_id = 0;
+        }
+        if self.faults.has(F::CancelClearsLastNode) {
+            self.book.last_node.clear();
+        }
+        if self.faults.has(F::CancelForgetsLoad) {
+            self.loads.clear();
         }
         if self.faults.has(F::CancelDropsActions) {
             self.actions.retain(|action| !action.of_order());
@@ -137,7 +171,7 @@ impl Agv {
             return;
         }
         self.book.soon = None;
-        self.book.slipped = self.faults.has(F::HorizonSlippedInto);
+        self.book.slipped = self.faults.has(F::HorizonSlippedInto) || self.faults.has(F::HorizonCreptInto);
         if self.faults.has(F::CancelForgetsActions) {
             self.actions.retain(|action| !action.of_order());
         }
@@ -163,6 +197,16 @@ impl Agv {
             action.end(Status::Finished);
         }
         self.book.cancelled = self.book.has_order();
+    }
+}
+
+/// Whether a faulty vehicle misses this action when its order is cancelled.
+fn survives(action: &Action, faults: super::Faults) -> bool {
+    match action.status {
+        Status::Waiting => matches!(action.origin, Origin::Edge(_)) && faults.has(F::CancelMissesEdgeActions),
+        Status::Initializing => faults.has(F::PreparedActionsSurviveCancel),
+        Status::Paused => faults.has(F::PausedActionsSurviveCancel),
+        _ => false,
     }
 }
 

@@ -145,6 +145,7 @@ impl Agv {
         self.holds = super::Holds::default();
         self.strayed = false;
         self.locked = false;
+        self.deaf = false;
         self.mode = Mode::Automatic;
         self.charging = false;
         self.report = super::Report::default();
@@ -184,11 +185,21 @@ impl Agv {
         };
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
         let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
-        let keeps = leaves || self.faults.has(F::ManualKeepsOrder);
+        let drives = self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen);
+        let keeps = leaves || drives || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             let given_up = self.book.clone();
-            self.give_up_order();
+            if self.faults.has(F::ManualKeepsActions) {
+                self.motion.halt(self.now.moment);
+                self.book.drop_route();
+                self.book.cancelled = true;
+            } else {
+                self.give_up_order();
+            }
             self.remembered = Some(given_up).filter(|_| self.faults.has(F::OrderTakenUpAgain));
+        }
+        if mode == Mode::Semiautomatic && self.faults.has(F::SemiautomaticEndsOrder) {
+            self.give_up_order();
         }
         self.mode = mode;
         if let Some(order) = self.remembered.take_if(|_| mode.takes_orders()) {

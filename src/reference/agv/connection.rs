@@ -26,6 +26,8 @@ pub(super) struct Connection {
     header_ids: BTreeMap<&'static str, u32>,
     /// When to say ONLINE (`online-late` only).
     pub(super) online_at: Option<Moment>,
+    /// The time of the first message (`timestamp-stands-still` only).
+    first: Option<jiff::Timestamp>,
 }
 
 impl Connection {
@@ -38,6 +40,7 @@ impl Connection {
             returning: false,
             header_ids: BTreeMap::new(),
             online_at: None,
+            first: None,
         }
     }
 
@@ -147,7 +150,7 @@ impl Agv {
     /// The broker accepted: ONLINE, then the factsheet, then a state (CONN-05, CONN-11).
     pub(super) fn connected(&mut self) {
         let first = !self.connection.returning;
-        if self.takes(T::HeaderIdRestarts) {
+        if self.takes(T::HeaderIdRestarts) || self.faults.has(F::HeaderIdResetByReconnect) {
             self.connection.header_ids.clear();
         }
         self.connection.online = true;
@@ -175,6 +178,16 @@ impl Agv {
         if self.faults.has(F::OrderForgottenOnLinkLoss) {
             self.give_up_order();
             self.book.order_id.clear();
+        }
+        self.book.cut = true;
+        if self.faults.has(F::UpdateForgottenOnLinkLoss) {
+            self.book.update_id = 0;
+        }
+        if self.faults.has(F::ActionsForgottenOnLinkLoss) {
+            self.actions.retain(|action| !action.of_order());
+        }
+        if self.faults.has(F::PauseLostOnLinkLoss) {
+            self.set_holds(|holds| holds.pause = false);
         }
         self.connection.online = false;
         self.connection.online_at = None;
@@ -276,6 +289,11 @@ impl Agv {
         } else {
             topic
         };
+        let topic = if name == "state" && self.faults.has(F::StatesTopic) {
+            format!("{topic}s")
+        } else {
+            topic
+        };
         let topic = match topic
             .strip_suffix("factsheet")
             .filter(|_| self.faults.has(F::MisspelledTopic))
@@ -308,6 +326,7 @@ impl Agv {
         } else {
             json!(id)
         };
+        let timestamp = self.timestamp();
         let version = match self
             .config
             .version
@@ -325,7 +344,7 @@ impl Agv {
         };
         let mut header = Map::new();
         header.insert("headerId".into(), header_id);
-        header.insert("timestamp".into(), self.timestamp());
+        header.insert("timestamp".into(), timestamp);
         header.insert("version".into(), json!(version));
         if !(name == "state" && self.faults.has(F::HeaderWithoutManufacturer)) {
             let own = &self.config.manufacturer;
@@ -340,8 +359,15 @@ impl Agv {
         header
     }
 
-    fn timestamp(&self) -> Value {
-        let utc = self.now.utc;
+    fn timestamp(&mut self) -> Value {
+        let utc = match () {
+            () if self.faults.has(F::TimestampStandsStill) => *self.connection.first.get_or_insert(self.now.utc),
+            () if self.faults.has(F::TimestampLocalAsUtc) => {
+                let hour = jiff::SignedDuration::from_hours(1);
+                self.now.utc.checked_add(hour).unwrap_or(self.now.utc)
+            }
+            () => self.now.utc,
+        };
         let text = match () {
             () if self.takes(T::SecondsWhole) => format!("{utc:.0}"),
             () if self.takes(T::SecondsFine) => format!("{utc:.6}"),

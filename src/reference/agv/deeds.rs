@@ -1,6 +1,7 @@
 //! What actions do: their stages, their effect on the vehicle, and how a failure is reported.
 
 use std::f64::consts::PI;
+use std::time::Duration;
 
 use super::Agv;
 use super::action_kinds::Deed;
@@ -82,6 +83,9 @@ impl From<Result<(), Problem>> for Outcome {
     }
 }
 
+/// How long what was held takes to go on (`resumes-in-a-moment`).
+const RESUMING: Duration = Duration::from_millis(500);
+
 impl Agv {
     /// An action of the order begins.
     pub(super) fn begin_action(&mut self, id: &str) {
@@ -110,12 +114,17 @@ impl Agv {
         let Some(duration) = self.actions.get(id).map(|action| self.duration_of(action)) else {
             return;
         };
-        let awaits = !self.faults.has(F::TriggerNotAwaited);
+        let given_up = self.faults.has(F::TriggerGivenUp);
+        let awaits = !given_up && !self.faults.has(F::TriggerNotAwaited);
         let stuck = self.faults.has(F::InstantActionStuck);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.status = Status::Running;
         let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
-        let duration = if waits { super::cancel::MOMENT } else { duration };
+        let duration = match waits {
+            true if given_up => Duration::from_millis(1_500),
+            true => super::cancel::MOMENT,
+            false => duration,
+        };
         let awaits = awaits && waits || action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights);
         let endless = awaits || (stuck && !action.of_order());
         action.due = (!endless).then(|| moment + duration);
@@ -123,8 +132,12 @@ impl Agv {
 
     /// A stage of an action has ended.
     pub(super) fn stage_finished(&mut self, id: &str) {
+        let missed = !self.connection.online && self.faults.has(F::ActionEndMissedOffline);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.due = None;
+        if missed && action.of_order() {
+            return;
+        }
         if action.kind.is_some_and(|kind| kind.deed == Deed::DownloadMap) {
             self.download_failed(id, "the server did not deliver in time");
             return;
@@ -155,7 +168,9 @@ impl Agv {
     /// Ends an action with success.
     pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
         let stuck = self.faults.has(F::InstantActionStuck);
+        let requests_stay = self.faults.has(F::StateRequestStuck);
         if let Some(action) = self.actions.get_mut(id) {
+            let stuck = stuck || (requests_stay && action.request.action_type == "stateRequest");
             let stuck = stuck && action.origin == Origin::Instant;
             action.end(if stuck { Status::Running } else { Status::Finished });
             action.result = result;
@@ -261,6 +276,7 @@ impl Agv {
             }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
         }
+        self.pauses += u32::from(self.faults.has(F::PausesCounted));
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
         }
@@ -282,11 +298,31 @@ impl Agv {
         if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
         }
+        if !self.holds.pause && self.faults.has(F::StopPauseIdleFails) {
+            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
+        }
+        self.pauses = self.pauses.saturating_sub(1);
+        if self.pauses > 0 {
+            return Outcome::Done(None);
+        }
         if self.faults.has(F::PauseNotLifted) {
             self.set_holds(|holds| holds.stuck |= holds.pause);
         }
         self.set_holds(|holds| holds.pause = false);
+        if self.faults.has(F::PausedOrderSurvivesCancel)
+            && let Some(order) = self.remembered.take()
+        {
+            self.book = order;
+        }
         Outcome::Done(None)
+    }
+
+    /// What was held goes on at the next cycle (`resumes-in-a-moment`).
+    pub(super) fn resume_if_due(&mut self) {
+        let moment = self.moment();
+        if self.resumes_at.take_if(|at| *at <= moment).is_some() && !self.holds.any() {
+            self.actions.resume(moment);
+        }
     }
 
     /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
@@ -300,6 +336,7 @@ impl Agv {
             (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
             (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
             (false, true) => self.actions.hold(moment, self.faults),
+            (true, false) if self.takes(T::ResumesInAMoment) => self.resumes_at = Some(moment + RESUMING),
             (true, false) => self.actions.resume(moment),
             _ => {}
         }
@@ -368,6 +405,12 @@ impl Agv {
         self.maps.enable_any(map_id);
         let stale = action.of_order() && self.faults.has(F::LiftMapStale);
         let old = self.motion.pose(self.moment()).map_id;
+        let kept = self.motion.pose(self.moment());
+        let (x, y) = if self.faults.has(F::InitPositionKeepsPose) {
+            (kept.x, kept.y)
+        } else {
+            (x, y)
+        };
         self.motion.place(Pose {
             x,
             y,

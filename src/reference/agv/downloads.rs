@@ -118,6 +118,9 @@ impl Agv {
             self.renumber_if(F::DownloadRenumbers);
             self.maps
                 .store(action.text("mapId"), action.text("mapVersion"), self.faults);
+            if self.faults.has(F::DownloadNeverEnds) {
+                return;
+            }
             self.finish(action_id, None);
         }
     }

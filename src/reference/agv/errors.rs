@@ -1,5 +1,7 @@
 //! The active errors of the vehicle and how long each of them is reported.
 
+use std::time::Duration;
+
 use serde_json::{Value, json};
 
 use crate::clock::Moment;
@@ -38,7 +40,12 @@ pub(super) struct ActiveError {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Errors {
     active: Vec<ActiveError>,
+    /// What a faulty vehicle says instead of an error, from a moment on.
+    corrected: Option<(Moment, ActiveError, ActiveError)>,
 }
+
+/// How long a faulty vehicle stands by a wrong report.
+const CORRECTION: Duration = Duration::from_millis(800);
 
 impl Errors {
     /// Adds an error; one with the same type and references is replaced.
@@ -53,8 +60,27 @@ impl Errors {
         self.active.push(error);
     }
 
+    /// Reports that something was refused. A faulty vehicle does it wrong at first.
+    pub(super) fn refused(&mut self, right: ActiveError, now: Moment, faults: Faults) {
+        let mut wrong = right.clone();
+        if faults.has(F::RefusalLevelCorrected) {
+            wrong.fatal = !right.fatal;
+        } else if faults.has(F::RefusalTypeCorrected) {
+            "internalError".clone_into(&mut wrong.error_type);
+        } else if faults.has(F::RefusalReferencesCorrected) {
+            wrong.references.clear();
+        } else {
+            self.raise(right);
+            return;
+        }
+        wrong.life = Life::UntilNewOrder;
+        self.raise(wrong.clone());
+        self.corrected = Some((now + CORRECTION, wrong, right));
+    }
+
     /// A new order was accepted.
     pub(super) fn new_order(&mut self) {
+        self.corrected = None;
         self.active.retain(|error| {
             matches!(
                 error.life,
@@ -80,6 +106,10 @@ impl Errors {
 
     /// Drops what has run out.
     pub(super) fn expire(&mut self, now: Moment) {
+        if let Some((_, wrong, right)) = self.corrected.take_if(|(due, _, _)| *due <= now) {
+            self.active.retain(|error| *error != wrong);
+            self.raise(right);
+        }
         self.active
             .retain(|error| !matches!(error.life, Life::Until(end) if end <= now));
     }
@@ -90,7 +120,7 @@ impl Errors {
             Life::Until(end) => Some(end),
             _ => None,
         });
-        ends.min()
+        ends.chain(self.corrected.as_ref().map(|(due, _, _)| *due)).min()
     }
 
     /// Whether nothing is wrong.
@@ -101,6 +131,7 @@ impl Errors {
     /// Forgets everything.
     pub(super) fn clear(&mut self) {
         self.active.clear();
+        self.corrected = None;
     }
 
     /// The array of the state.

@@ -193,8 +193,10 @@ impl Agv {
             .map(|name| json!({ "parameter": name, "support": support }))
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
+        let unlisted = self.faults.has(F::StateRequestUnlisted);
         let actions: Vec<Value> = action_kinds::offered(&self.config)
             .filter(|kind| !(missing && kind.deed == Deed::CancelOrder))
+            .filter(|kind| !(unlisted && kind.deed == Deed::StateRequest))
             .map(|kind| self.action_picture(kind))
             .collect();
         let mut features = json!({ "optionalParameters": parameters, "agvActions": actions });
@@ -208,8 +210,15 @@ impl Agv {
 
     fn action_picture(&self, kind: &ActionKind) -> Value {
         let mut scopes: Vec<&str> = kind.scopes.iter().map(|scope| scope.literal()).collect();
-        if kind.deed == Deed::StartPause && self.faults.has(F::StartPauseOnNodes) {
-            scopes.push("NODE");
+        for (deed, scope, fault) in [
+            (Deed::StartPause, "NODE", F::StartPauseOnNodes),
+            (Deed::Pick, "INSTANT", F::PickAsInstantAction),
+            (Deed::FinePositioning, "INSTANT", F::PositioningAsInstantAction),
+            (Deed::StartCharging, "EDGE", F::ChargingOnEdges),
+        ] {
+            if kind.deed == deed && self.faults.has(fault) {
+                scopes.push(scope);
+            }
         }
         let lower = self.faults.has(F::FactsheetScopeLowerCase);
         let scopes: Vec<String> = scopes

@@ -20,6 +20,9 @@ macro_rules! faults {
 faults! {
     // Transport
     OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
+    UpdateForgottenOnLinkLoss "update-forgotten-on-link-loss" ["MQTT-03", "STATE-12", "STATE-MSG-13"] "Goes back to the first orderUpdateId of its order when the link breaks.";
+    ActionsForgottenOnLinkLoss "actions-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-10"] "Forgets the actions of its order when the link breaks.";
+    ActionEndMissedOffline "action-end-missed-offline" ["MQTT-04"] "Leaves an action RUNNING for ever that ends while the link is down.";
     StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
     HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07", "MQTT-04"] "Drives into the horizon while the link is down.";
     OldMqtt "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1.";
@@ -29,6 +32,7 @@ faults! {
     NeverReconnects "never-reconnects" ["MQTT-10", "STATE-02"] "Does not connect again after a broken link.";
     NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10", "STATE-02"] "Sends the terminating zero byte of its string with every periodic state.";
     MisspelledTopic "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore.";
+    StatesTopic "states-topic" ["TOPIC-01"] "Publishes its states on a topic called states.";
     OtherSerialNumber "other-serial-number" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
     NoFactsheet "no-factsheet" ["TOPIC-11", "ACT-40"] "Never publishes a factsheet.";
     OtherMajorVersion "other-major-version" ["TOPIC-03", "TOPIC-02"] "Publishes its visualization below another major version.";
@@ -46,10 +50,13 @@ faults! {
     ManufacturerWithSlash "manufacturer-with-slash" ["TOPIC-06", "TOPIC-04"] "Writes its manufacturer with a slash in the header.";
     HeaderIdConstant "header-id-constant" ["HDR-02"] "Sends every state with the same headerId.";
     HeaderIdShared "header-id-shared" ["HDR-02"] "Counts one headerId over all topics.";
+    HeaderIdResetByReconnect "header-id-reset-by-reconnect" ["HDR-02"] "Counts from 0 again after a link that was only broken.";
     HeaderIdAsText "header-id-as-text" ["JSON-06", "HDR-02"] "Sends the headerId as a string.";
     TimestampLocal "timestamp-local" ["HDR-03"] "Gives its timestamps in local time with an offset.";
     TimestampWithoutZone "timestamp-without-zone" ["HDR-03"] "Gives its timestamps without the Z.";
     TimestampUnix "timestamp-unix" ["HDR-03", "JSON-06"] "Gives its timestamps as seconds since 1970.";
+    TimestampStandsStill "timestamp-stands-still" ["HDR-03"] "Gives every message the time at which it was switched on.";
+    TimestampLocalAsUtc "timestamp-local-as-utc" ["HDR-03"] "Writes its local time with a Z.";
     VersionShort "version-short" ["HDR-04"] "Gives the protocol version without the patch number.";
     FieldMisspelled "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore.";
     ModeLowerCase "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case.";
@@ -74,6 +81,7 @@ faults! {
     ConnectionNotRetained "connection-not-retained" ["CONN-06"] "Publishes ONLINE and OFFLINE without the retain flag.";
     NoOffline "no-offline" ["CONN-07"] "Disconnects without saying OFFLINE.";
     NoDisconnect "no-disconnect" ["CONN-08"] "Closes the socket after OFFLINE without a DISCONNECT.";
+    CrashesOnMalformedOrder "crashes-on-malformed-order" ["ORD-REJ-02", "ORD-REJ-17"] "Ends its connection over an order that it cannot read, and comes back.";
     ConnectionStateUnderscore "connection-state-underscore" ["CONN-02", "CONN-10", "JSON-02"] "Spells CONNECTIONBROKEN with an underscore.";
     ConnectionStateConnected "connection-state-connected" ["CONN-10", "CONN-05", "JSON-02"] "Says CONNECTED instead of ONLINE.";
     NoOnlineAfterReconnect "no-online-after-reconnect" ["CONN-11"] "Says ONLINE only the first time it connects.";
@@ -101,6 +109,10 @@ faults! {
     VersionsNumeric "versions-numeric" ["FACT-10", "JSON-06"] "Gives its software version as a number.";
     OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
     MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
+    PickAsInstantAction "pick-as-instant-action" ["ACT-09"] "Declares pick as an instant action.";
+    PositioningAsInstantAction "positioning-as-instant-action" ["ACT-09"] "Declares finePositioning as an instant action.";
+    ChargingOnEdges "charging-on-edges" ["ACT-09"] "Declares startCharging as an action for edges.";
+    StateRequestUnlisted "state-request-unlisted" ["FACT-07"] "Offers stateRequest but does not list it.";
     StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
 
     // Order
@@ -110,11 +122,15 @@ faults! {
     StopsBeforeEndOfBase "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base.";
     HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05", "MQTT-04"] "Drives into the horizon without waiting for its release.";
     HorizonSlippedInto "horizon-slipped-into" ["ORD-07", "MQTT-04"] "Stops at the decision point and rolls on into the horizon a moment later.";
+    HorizonCreptInto "horizon-crept-into" ["ORD-UPD-01", "ORD-07"] "Waits at the decision point for a moment and creeps on into the horizon.";
     HorizonDemanded "horizon-demanded" ["ORD-10"] "Refuses new orders without a horizon.";
     GraphUnchecked "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense.";
     SingleNodeRefused "single-node-refused" ["ORD-13"] "Refuses orders with one node.";
     DrivingAtDecisionPoint "driving-at-decision-point" ["ORD-UPD-01", "STATE-MSG-08"] "Says that it drives while it waits at the decision point.";
+    DrivingWhileWaiting "driving-while-waiting" ["STATE-MSG-08"] "Says that it drives when its order is done.";
+    TurnsWithoutDriving "turns-without-driving" ["STATE-MSG-08"] "Does not say that it drives while it turns on the spot.";
     StitchingNodeOverwritten "stitching-node-overwritten" ["ORD-UPD-07"] "Takes over the actions an update brings for the stitching node.";
+    UpdateJoinedByNumber "update-joined-by-number" ["ORD-FLOW-08"] "Joins an update by its sequenceId, whatever the node.";
     HorizonAppended "horizon-appended" ["ORD-UPD-08"] "Keeps the old horizon when an update brings a new one.";
     HorizonKept "horizon-kept" ["ORD-UPD-09"] "Keeps the old horizon when an update has none.";
     HorizonActionsStay "horizon-actions-stay" ["ORD-UPD-10"] "Lets the actions of a deleted horizon wait for ever.";
@@ -122,6 +138,7 @@ faults! {
     RunningUpdateGapAccepted "running-update-gap-accepted" ["ORD-FLOW-08"] "Takes over an update that does not begin at the decision point.";
     BusyIgnored "busy-ignored" ["ORD-FLOW-01", "ORD-FLOW-03"] "Takes over a new order while another one is being driven.";
     RunningActionIgnored "running-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs.";
+    FreeActionIgnored "free-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs that does not block.";
     HorizonNotBusy "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point.";
     FarOrderAccepted "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is.";
     StartRefusalSilent "start-refusal-silent" ["ORD-REJ-17"] "Raises no error when the first node of an order is out of reach.";
@@ -130,10 +147,29 @@ faults! {
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
+    UpdateIdsComparedAcrossOrders "update-ids-compared-across-orders" ["ORD-FLOW-06", "ORD-04", "ORD-13"] "Refuses a new order whose orderUpdateId is lower than that of the last order.";
+    UpdateIdCarriedOver "update-id-carried-over" ["ORD-FLOW-06", "STATE-12"] "Reports a new order with the orderUpdateId of the last one.";
+    OnlyFirstUpdate "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before.";
+    UpdateActionsLost "update-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its nodes and edges.";
+    UpdateEdgeActionsLost "update-edge-actions-lost" ["ASTATE-01", "ACT-01"] "Takes over an update without the actions of its edges.";
+    UpdateActionsNotPerformed "update-actions-not-performed" ["ACT-01", "NODE-04"] "Lists the actions of an update and never begins them.";
+    ReleasedActionsLost "released-actions-lost" ["ASTATE-01"] "Forgets an action of its horizon when an update releases it.";
+    ReleasedActionsDoubled "released-actions-doubled" ["STATE-MSG-09", "ASTATE-01"] "Lists an action of its horizon a second time when an update releases it.";
+    HorizonActionsInherited "horizon-actions-inherited" ["ORD-UPD-08"] "Performs the actions of a horizon that was replaced on the nodes that took its place.";
+    UpdateClearsActionStates "update-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when an update comes.";
+    UpdateRepeatsActions "update-repeats-actions" ["ASTATE-06"] "Performs the actions of its last node once more when an update comes.";
+    UpdateEndsActions "update-ends-actions" ["ORD-FLOW-09"] "Breaks off its running actions when an update comes.";
+    UpdateBreaksBlocking "update-breaks-blocking" ["BLOCK-04", "BLOCK-07"] "Drives off with an update although an action that stops it still runs.";
+    UpdateRefusedWhileActing "update-refused-while-acting" ["ORD-FLOW-09"] "Refuses updates while an action of the order runs.";
+    UpdateRefusedWhilePaused "update-refused-while-paused" ["ORD-FLOW-09"] "Refuses updates while it is paused.";
+    UpdateEndsPause "update-ends-pause" ["ACT-12"] "Goes on with an update although it is paused.";
+    UpdateRefusedAfterCut "update-refused-after-cut" ["ORD-FLOW-09"] "Refuses updates of an order that it had before its link broke.";
     CompletedUpdateGapAccepted "completed-update-gap-accepted" ["ORD-FLOW-10"] "Continues a completed order from whatever node the update begins with.";
     ContinuationNotDriven "continuation-not-driven" ["ORD-06", "ORD-FLOW-11"] "Takes over an update of a completed order and does not drive it.";
     CompletedNotContinued "completed-not-continued" ["ORD-FLOW-11"] "Refuses updates of a completed order.";
     RejectionStopsOrder "rejection-stops-order" ["ORD-FLOW-12", "ORD-REJ-11"] "Stops driving when it has to refuse a message.";
+    RejectionDropsHorizon "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12", "ORD-FLOW-03"] "Forgets its horizon when it has to refuse a message.";
+    RejectionClearsActionStates "rejection-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when it has to refuse an order.";
 
     // Cancel
     CancelDrivesOn "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder.";
@@ -145,11 +181,23 @@ faults! {
     CancelForgetsActions "cancel-forgets-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Forgets the actions of a cancelled order a moment later.";
     CancelNeverFinished "cancel-never-finished" ["ORD-CANCEL-07", "IACT-04"] "Leaves cancelOrder RUNNING for ever.";
     CancelClearsOrderId "cancel-clears-order-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Empties the orderId when the order is cancelled.";
+    CancelResetsUpdateId "cancel-resets-update-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is cancelled.";
     CancelKeepsNodes "cancel-keeps-nodes" ["ORD-CANCEL-09"] "Keeps all node states while it drives to the node where it stops.";
     CancelLastNodeStale "cancel-last-node-stale" ["ORD-CANCEL-10"] "Does not report the node where it stopped after a cancellation.";
+    CancelClearsLastNode "cancel-clears-last-node" ["STATE-MSG-04"] "Empties the lastNodeId when the order is cancelled.";
+    LastNodeAheadWhenCancelled "last-node-ahead-when-cancelled" ["STATE-MSG-04"] "Names the node ahead as its last one when it is stopped between two nodes.";
     CancelLeavesNodes "cancel-leaves-nodes" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order.";
     CancelDropsActions "cancel-drops-actions" ["ORD-CANCEL-12", "STATE-MSG-10"] "Removes the action states of a cancelled order.";
     DeadAfterCancel "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation.";
+    CancelledOrderRevived "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02", "ORD-CANCEL-11"] "Goes on with a cancelled order when an update of it comes late.";
+    CancelWaitsForPause "cancel-waits-for-pause" ["ORD-CANCEL-07"] "Does not finish cancelOrder as long as it is paused.";
+    PausedOrderSurvivesCancel "paused-order-survives-cancel" ["ORD-CANCEL-02"] "Goes on with an order that was cancelled in a pause when the pause ends.";
+    PausedActionsSurviveCancel "paused-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while actions are PAUSED, and goes on with them after the pause.";
+    PreparedActionsSurviveCancel "prepared-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while it prepares an action, and performs it.";
+    SecondCancelTakesOver "second-cancel-takes-over" ["ORD-CANCEL-07", "IACT-04"] "Forgets a cancelOrder that is under way when a second one comes.";
+    CancelEndedByUpdate "cancel-ended-by-update" ["ORD-CANCEL-11", "ORD-CANCEL-02", "ORD-CANCEL-06"] "Ends a cancellation that is under way when an update comes, and drives it.";
+    CancelMissesEdgeActions "cancel-misses-edge-actions" ["ORD-CANCEL-03"] "Leaves the waiting actions of edges WAITING when the order is cancelled.";
+    CancelForgetsLoad "cancel-forgets-load" ["STATE-MSG-06"] "Shows no load any more when its order is cancelled.";
     TemporaryNodeRefused "temporary-node-refused" ["ORD-CANCEL-15"] "Refuses orders that begin at a node it has never heard of.";
     TemporaryNodeNotReached "temporary-node-not-reached" ["ORD-CANCEL-15"] "Takes over an order with one node it has never heard of, and never counts it as reached.";
     RangeNotCounted "range-not-counted" ["ORD-CANCEL-16"] "Drives to the exact place of a first node in whose range it stands.";
@@ -162,6 +210,19 @@ faults! {
     MalformedTakenOver "malformed-taken-over" ["ORD-REJ-01"] "Reports the orderId of a malformed order as its own.";
     UnreadableClearsOrder "unreadable-clears-order" ["ORD-REJ-01", "ORD-FLOW-12"] "Clears its order when it cannot read a message.";
     MissingIdTakenOver "missing-id-taken-over" ["ORD-REJ-01", "STATE-MSG-02"] "Reads a missing orderId as an empty one and reports it.";
+    ReleasedAssumed "released-assumed" ["ORD-REJ-01"] "Takes nodes and edges that do not say whether they are released for released ones.";
+    TextReadAsNumber "text-read-as-number" ["ORD-REJ-01"] "Takes numbers and Booleans that are written as text.";
+    NullReadAsDefault "null-read-as-default" ["ORD-REJ-01"] "Reads null as zero, as false or as nothing in particular.";
+    BlockingTypeUnchecked "blocking-type-unchecked" ["ORD-REJ-01"] "Takes every word it does not know for the blockingType NONE.";
+    MissingListReadAsEmpty "missing-list-read-as-empty" ["ORD-REJ-01"] "Takes a list that is missing for an empty one.";
+    NumbersWrapped "numbers-wrapped" ["ORD-REJ-01"] "Cuts numbers that are no whole numbers of 32 bits until they are.";
+    OptionalTypesUnchecked "optional-types-unchecked" ["ORD-REJ-01"] "Leaves optional members of a wrong type aside, although it supports them.";
+    EdgeEndsAssumed "edge-ends-assumed" ["ORD-11", "ORD-REJ-01"] "Lets every edge lead from the node before it to the one behind it, whatever it says.";
+    EdgeEndsUnchecked "edge-ends-unchecked" ["ORD-11"] "Takes edges that name other nodes than those around them.";
+    SequenceUnchecked "sequence-unchecked" ["ORD-11"] "Takes nodes and edges with doubled or missing sequenceIds.";
+    MalformedStopsOrder "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema.";
+    HeaderUnchecked "header-unchecked" ["ORD-REJ-01"] "Takes over orders whose header is broken.";
+    ParametersUnchecked "parameters-unchecked" ["ORD-REJ-04"] "Takes over orders whatever the parameters of their actions are.";
     ValidationErrorMisspelled "validation-error-misspelled" ["ORD-REJ-02"] "Calls a malformed order validationOrder, as an old figure does.";
     ValidationErrorFatal "validation-error-fatal" ["ORD-REJ-02"] "Reports a malformed order as FATAL.";
     ValidationErrorDroppedEarly "validation-error-dropped-early" ["ORD-REJ-03"] "Forgets the validationError after a moment.";
@@ -172,7 +233,7 @@ faults! {
     OrderErrorAsValidation "order-error-as-validation" ["ORD-REJ-06"] "Reports orders it cannot perform as malformed.";
     OrderErrorFatal "order-error-fatal" ["ORD-REJ-06"] "Reports orders it cannot perform as FATAL.";
     OrderErrorUnreferenced "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform.";
-    OrderErrorLocks "order-error-locks" ["ORD-13", "ORD-REJ-08"] "Refuses the order that follows one it could not perform.";
+    OrderErrorLocks "order-error-locks" ["ORD-FLOW-06", "ORD-REJ-08"] "Refuses the order that follows one it could not perform.";
     OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a moment.";
     OutdatedUpdateTakenOver "outdated-update-taken-over" ["ORD-REJ-10"] "Goes back to an outdated order update.";
     OutdatedUpdateDropsOrder "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives.";
@@ -183,6 +244,9 @@ faults! {
     UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
     MemoryUnchecked "memory-unchecked" ["ORD-REJ-15", "STATE-12"] "Takes over orders larger than its stated limits, cut to what fits.";
     OrientationUnchecked "orientation-unchecked" ["ORD-REJ-16"] "Accepts edges with an orientation it cannot take.";
+    RefusalLevelCorrected "refusal-level-corrected" ["ORD-REJ-12", "ORD-REJ-02", "ORD-REJ-06", "ORD-CANCEL-19"] "Reports a refusal as FATAL at first, and right a moment later.";
+    RefusalTypeCorrected "refusal-type-corrected" ["ORD-REJ-06", "ORD-REJ-02", "ORD-REJ-12"] "Reports a refusal as internalError at first, and right a moment later.";
+    RefusalReferencesCorrected "refusal-references-corrected" ["ORD-REJ-14", "ORD-REJ-07", "ORD-CANCEL-20"] "Does not say what a refusal is about at first, and says it a moment later.";
     RejectionSilent "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order.";
 
     // Motion
@@ -192,6 +256,7 @@ faults! {
     MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
     TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there.";
     AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
+    PositionFrozen "position-frozen" ["MAP-01"] "Reports the position at which it was switched on wherever it is.";
     DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05", "ORD-CANCEL-15"] "Reports its orientation in degrees.";
     VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 
@@ -231,6 +296,10 @@ faults! {
     DownloadDisablesOthers "download-disables-others" ["MAP-22"] "Disables all other maps when it downloads one.";
     DuplicateMapAccepted "duplicate-map-accepted" ["MAP-23"] "Downloads a map again that it has.";
     DuplicateMapSilent "duplicate-map-silent" ["MAP-23"] "Raises no error for a map it has already.";
+    DownloadReplacesVersion "download-replaces-version" ["MAP-22"] "Disables the version of a map that is enabled when it downloads another one of it.";
+    DownloadDropsVersion "download-drops-version" ["MAP-22", "MAP-31"] "Deletes the other versions of a map when it downloads one.";
+    DeleteTakesAllVersions "delete-takes-all-versions" ["MAP-31", "MAP-29"] "Deletes every version of a map when one is to be deleted.";
+    DownloadNeverEnds "download-never-ends" ["MAP-18"] "Leaves downloadMap RUNNING for ever, although the map is there.";
     TwoMapsEnabled "two-maps-enabled" ["MAP-14", "MAP-24"] "Leaves the old version of a map enabled beside the new one.";
     EnableDisablesOtherMaps "enable-disables-other-maps" ["MAP-24"] "Disables all other maps when one is enabled, whatever their mapId.";
     EnableWithoutEffect "enable-without-effect" ["MAP-24"] "Reports enableMap FINISHED and enables nothing.";
@@ -266,10 +335,14 @@ faults! {
     EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
     PauseTwiceFails "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused.";
+    PausesCounted "pauses-counted" ["ACT-13", "ACT-11"] "Counts its pauses, and ends them only with as many stopPause.";
+    StopPauseIdleFails "stop-pause-idle-fails" ["ACT-11"] "Fails a stopPause while it is not paused.";
     PauseDrivesOn "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses.";
     PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
+    PauseLostOnLinkLoss "pause-lost-on-link-loss" ["ACT-12", "ACT-13"] "Ends its pause when the link breaks.";
+    OrderEndsPause "order-ends-pause" ["ACT-12"] "Drives off with a new order although it is paused.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Pauses and goes on by message although a switch or the button at the vehicle forbids it.";
     BlockedPauseTaken "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot.";
     ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
@@ -284,6 +357,7 @@ faults! {
     ChargingTwiceFails "charging-twice-fails" ["ACT-11"] "Fails a startCharging while it charges.";
     ChargingShownAnyway "charging-shown-anyway" ["ACT-20"] "Reports that it charges although startCharging failed.";
     InitPositionWithoutEffect "init-position-without-effect" ["ACT-23", "ACT-24"] "Reports initPosition FINISHED and does nothing.";
+    InitPositionKeepsPose "init-position-keeps-pose" ["ACT-23"] "Takes over the last node of an initPosition, and keeps its pose.";
     InitPositionUninitialized "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose.";
     InitPositionTakenAnyway "init-position-taken-anyway" ["ACT-25"] "Changes its map although it fails an initPosition.";
     InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
@@ -303,21 +377,34 @@ faults! {
     PositioningFailureFinished "positioning-failure-finished" ["ACT-36"] "Reports finePositioning FINISHED although there is no target.";
     FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick, a drop or charging fails.";
     TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
+    TriggerGivenUp "trigger-given-up" ["ACT-37"] "Waits for a trigger for a second and a half only.";
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
     InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09", "ORD-CANCEL-18"] "Performs instant actions without an action state.";
+    StateRequestStuck "state-request-stuck" ["ACT-26", "IACT-04"] "Leaves stateRequest RUNNING for ever.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
-    UnknownInstantFinished "unknown-instant-finished" ["IACT-06"] "Reports an instant action it does not know as FINISHED.";
+    UnknownInstantFinished "unknown-instant-finished" ["IACT-04", "IACT-06"] "Reports an instant action it does not know as FINISHED.";
+    UnknownInstantWaits "unknown-instant-waits" ["IACT-06"] "Leaves an instant action it does not know WAITING for ever.";
+    UnknownInstantSilent "unknown-instant-silent" ["IACT-06"] "Fails an instant action it cannot perform, and raises no error.";
+    UnknownInstantUnreferenced "unknown-instant-unreferenced" ["BP-01"] "Raises an error without references for an instant action it cannot perform.";
+    MalformedInstantDeafens "malformed-instant-deafens" ["IACT-03"] "Takes no instant actions any more once one of them was malformed.";
+    MalformedInstantStopsOrder "malformed-instant-stops-order" ["ORD-06"] "Gives its order up when an instant action is malformed.";
+    InstantActionFadesAway "instant-action-fades-away" ["STATE-MSG-10", "STATE-MSG-11", "STATE-MSG-09"] "Removes running instant actions from its states when another one arrives.";
     OnlyFirstInstantAction "only-first-instant-action" ["IACT-07", "IACT-03"] "Performs only the first action of an instantActions message.";
 
     // State
     StateSilence "state-silence" ["STATE-02"] "Sends states only every 45 seconds when nothing happens.";
+    SilentWhileHeld "silent-while-held" ["STATE-02"] "Sends states only every 45 seconds while it waits for a release.";
+    SilentWhilePaused "silent-while-paused" ["STATE-02"] "Sends states only every 45 seconds while it is paused.";
+    SilentWhileActing "silent-while-acting" ["STATE-02"] "Sends states only every 45 seconds while an action runs.";
+    SilentByHand "silent-by-hand" ["STATE-02"] "Sends states only every 45 seconds in MANUAL.";
     StatesByClock "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens.";
     StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
     SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
     OrderWithoutState "order-without-state" ["STATE-03"] "Does not send a state when an order arrives.";
+    UpdateWithoutState "update-without-state" ["STATE-03"] "Does not send a state when an order update arrives.";
     LoadWithoutState "load-without-state" ["STATE-04", "ACT-28", "ACT-01"] "Does not send a state when its load changes.";
     ErrorWithoutState "error-without-state" ["STATE-05"] "Does not send a state when an error appears.";
     NodeWithoutState "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node.";
@@ -328,8 +415,14 @@ faults! {
     StateBursts "state-bursts" ["STATE-11"] "Sends every state five times.";
     TraversedNodesListed "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last.";
     FinishedOrderListed "finished-order-listed" ["STATE-13"] "Keeps the last node in its states when the order is complete.";
+    LastEdgeListed "last-edge-listed" ["STATE-13"] "Keeps the last edge in its states when the order is complete.";
+    LastRouteListed "last-route-listed" ["STATE-13", "NODE-03"] "Keeps the last node and the last edge in its states when the order is complete.";
     NewBaseRequestAlways "new-base-request-always" ["STATE-16"] "Asks for a new base all the time.";
+    NewBaseRequestStays "new-base-request-stays" ["STATE-16"] "Asks for a new base until its next order, once it has done so.";
     SafetyStateMissing "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states.";
+    ModeMissing "mode-missing" ["STATE-MSG-01", "STATE-01", "JSON-10"] "Leaves operatingMode out of its states.";
+    ModeNumeric "mode-numeric" ["MODE-01", "JSON-10", "JSON-06"] "Gives a number as its operating mode.";
+    EmptyListsNull "empty-lists-null" ["JSON-10", "JSON-06", "STATE-MSG-01"] "Writes null for lists of nodes, edges and actions that are empty.";
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02", "ORD-CANCEL-08"] "Empties the orderId when the order is complete.";
     UpdateIdResetWhenDone "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
@@ -339,8 +432,11 @@ faults! {
     RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
     PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06", "ORD-CANCEL-15"] "Reports its coordinates as strings.";
     LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
+    LoadForgottenWithOrder "load-forgotten-with-order" ["STATE-MSG-06", "ACT-29"] "Shows no load any more when it takes over a new order.";
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
     DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";
+    DrivingAsText "driving-as-text" ["JSON-07", "JSON-10", "STATE-MSG-08"] "Sends driving as a word in quotes.";
+    DrivingKept "driving-kept" ["STATE-MSG-08", "STATE-08"] "Says that it drives from its first order on, also when it stands.";
     DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
     FinishedInstantForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
     LastInstantActionOnly "last-instant-action-only" ["STATE-MSG-10", "STATE-MSG-09"] "Removes finished instant actions from its states when another one arrives.";
@@ -350,16 +446,20 @@ faults! {
     NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13", "STATE-12"] "Leaves the sequenceId out of its node states.";
     HorizonReportedReleased "horizon-reported-released" ["STATE-MSG-13"] "Reports the nodes and edges of the horizon as released.";
     DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
+    DistanceNotReset "distance-not-reset" ["STATE-MSG-18"] "Counts the distance since its last node from the beginning of its order.";
     StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant.";
+    StatusLowerCase "status-lower-case" ["STATE-MSG-14", "JSON-02", "JSON-10"] "Spells the statuses of actions in lower case.";
     ChargeGoodBad "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent.";
     ChargeMissing "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state.";
     EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
+    EmergencyStopNull "emergency-stop-null" ["STATE-MSG-17", "JSON-10", "JSON-02"] "Writes null where no emergency stop is active.";
     EmergencyStopUnreported "emergency-stop-unreported" ["STATE-MSG-17"] "Does not report an emergency stop.";
 
     // Traversal
     TraversalSplit "traversal-split" ["NODE-03"] "Removes the node state and updates the last node in two states.";
     LastNodeStale "last-node-stale" ["NODE-03", "STATE-MSG-04", "STATE-06"] "Reports the new lastNodeId with the old lastNodeSequenceId.";
     NodeActionsEarly "node-actions-early" ["NODE-04", "ASTATE-02"] "Begins the actions of a node when it sets out for it.";
+    LoopActionsEarly "loop-actions-early" ["ASTATE-02", "NODE-04"] "Performs the actions of a second visit of a node on the first.";
     EdgeStatesStay "edge-states-stay" ["NODE-05", "STATE-12"] "Keeps the edge it has left in its states.";
     EdgeActionsLate "edge-actions-late" ["NODE-06", "ACT-02"] "Begins the actions of an edge at its end.";
     EdgeActionsOnNode "edge-actions-on-node" ["NODE-07"] "Begins the actions of an edge while it is held on the node before.";
@@ -390,6 +490,7 @@ faults! {
     ReferenceValueNumeric "reference-value-numeric" ["ERR-05", "ORD-REJ-14"] "Gives numbers as reference values of errors.";
     ErrorsOmittedOnRequest "errors-omitted-on-request" ["ORD-REJ-03", "ORD-REJ-08", "ERR-01"] "Answers a stateRequest without its errors.";
     OwnErrorForgotten "own-error-forgotten" ["ERR-04", "ERR-01"] "Forgets an error of its own a moment later, although its cause is still there.";
+    OwnErrorClearedByOrder "own-error-cleared-by-order" ["ERR-01"] "Forgets an error of its own with the next order, although its cause is still there.";
     OwnErrorKept "own-error-kept" ["ERR-01", "ERR-04"] "Keeps its errors for a minute, also when their cause is gone.";
     FatalDrives "fatal-drives" ["ERR-04"] "Drives on with a FATAL error.";
     OwnErrorMild "own-error-mild" ["ERR-04"] "Reports defects that keep it from running as a WARNING.";
@@ -397,14 +498,22 @@ faults! {
     ReferencesAsMap "references-as-map" ["BP-04", "ERR-05", "ORD-CANCEL-20"] "Gives the references of errors as one object.";
     InfoLevelWarning "info-level-warning" ["INFO-01", "JSON-02"] "Reports an information with the level WARNING.";
     SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
+    SemiautomaticEndsOrder "semiautomatic-ends-order" ["MODE-02"] "Gives its order up when it is switched from AUTOMATIC to SEMIAUTOMATIC.";
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
     ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
+    ManualDrivesOrders "manual-drives-orders" ["MODE-02"] "Takes orders over in MANUAL, and drives them there.";
+    ManualDrivesOn "manual-drives-on" ["MODE-05", "MODE-02"] "Keeps driving its order after it was switched to MANUAL, SERVICE or TEACHIN.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
+    ManualDrivesUnseen "manual-drives-unseen" ["MODE-05"] "Clears its states in MANUAL and drives its base to the end.";
+    ManualKeepsActions "manual-keeps-actions" ["MODE-05", "MODE-02"] "Clears its way in MANUAL and goes on with its actions.";
     OrderTakenUpAgain "order-taken-up-again" ["MODE-05"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC.";
     ManualLocks "manual-locks" ["MODE-02"] "Refuses the first order after it was driven by hand.";
     ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";
     SemiautomaticFaster "semiautomatic-faster" ["MODE-03"] "Drives faster in SEMIAUTOMATIC.";
     VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";
+    VisualizationBeside "visualization-beside" ["VIS-01"] "Shows itself two metres beside where its states say it is.";
+    VisualizationMillimetres "visualization-millimetres" ["MAP-02", "VIS-01"] "Gives its position in the visualization in millimetres.";
+    VisualizationWithoutPosition "visualization-without-position" ["VIS-01"] "Leaves the position out of the visualization.";
     VisualizationMissing "visualization-missing" ["VIS-02", "TOPIC-12"] "States a visualization interval and publishes none.";
 }
 

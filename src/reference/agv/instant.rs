@@ -20,6 +20,9 @@ const MAX_REMEMBERED: usize = 500;
 impl Agv {
     /// Takes an instantActions message.
     pub(super) fn instant_actions_received(&mut self, payload: &[u8]) {
+        if self.deaf {
+            return;
+        }
         let too_long = payload.len() > self.config.max_message;
         let message = if too_long {
             None
@@ -42,6 +45,10 @@ impl Agv {
             self.actions
                 .retain(|action| action.of_order() || !action.status.is_terminal());
         }
+        if self.faults.has(F::InstantActionFadesAway) {
+            self.actions
+                .retain(|action| action.of_order() || action.status.is_terminal());
+        }
         let limit = if self.faults.has(F::OnlyFirstInstantAction) {
             1
         } else {
@@ -53,6 +60,7 @@ impl Agv {
     }
 
     fn malformed(&mut self, reason: &str) {
+        self.malformed_side_effects();
         self.errors.raise(ActiveError {
             error_type: self.config.errors.validation.clone(),
             fatal: false,
@@ -60,6 +68,14 @@ impl Agv {
             description: reason.to_owned(),
             life: Life::UntilNewOrder,
         });
+    }
+
+    /// What a faulty vehicle does beside refusing.
+    fn malformed_side_effects(&mut self) {
+        self.deaf |= self.faults.has(F::MalformedInstantDeafens);
+        if self.faults.has(F::MalformedInstantStopsOrder) {
+            self.give_up_order();
+        }
     }
 
     fn instant_action(&mut self, element: &Value) {
@@ -85,14 +101,22 @@ impl Agv {
                 action_kinds::refusal(kind, &request, false).map(|(key, reason)| format!("{key}: {reason}"))
             }
         };
+        if defect.is_some() {
+            self.malformed_side_effects();
+        }
         self.make_room();
         let action = Action::waiting(request, kind, Origin::Instant);
         self.actions.push(action.clone());
         match refusal {
-            Some(_) if self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
+            Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantWaits) => {}
+            Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
             Some(reason) => {
                 self.take_map_anyway(&action);
-                self.fail(&id, &Problem::unable(&action, &reason));
+                let mut problem = Problem::unable(&action, &reason).silent_if(self.faults.has(F::UnknownInstantSilent));
+                if self.faults.has(F::UnknownInstantUnreferenced) {
+                    problem.references.clear();
+                }
+                self.fail(&id, &problem);
             }
             None if self.faults.has(F::InstantActionDeferred) && action.request.action_type != "cancelOrder" => {}
             None => self.begin_instant(&id),

@@ -33,6 +33,10 @@ pub const LAPSES: &[(&str, &str)] = &[
         "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
     ),
     (
+        "state-request-unlisted",
+        "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
+    ),
+    (
         "min-state-interval-ignored",
         "FACT-14 contradicts the sending on events; its ruling leaves a warning.",
     ),
@@ -43,6 +47,17 @@ pub const LAPSES: &[(&str, &str)] = &[
         "validation-error-lingers",
         "That the error goes with the next order is implied only; the ruling of ORD-REJ-03 is a warning.",
     ),
+    (
+        "header-unchecked",
+        "No sentence says what becomes of an order whose header is broken; that it is malformed is a matter of reading.",
+    ),
+    (
+        "positioning-as-instant-action",
+        "The ruling of ACT-09 leaves a warning.",
+    ),
+    ("unknown-instant-waits", "It breaks a recommendation only."),
+    ("unknown-instant-silent", "It breaks a recommendation only."),
+    ("unknown-instant-unreferenced", "It breaks a recommendation only."),
     (
         "order-error-as-validation",
         "The name within the family is a preference by the ruling of ORD-REJ-06, and what follows is not reached.",
@@ -55,10 +70,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     (
         "corridor-contour-ignored",
         "CORR-03 is a recommendation, and by the kinematic centre CORR-01 is kept.",
-    ),
-    (
-        "download-failure-silent",
-        "FAILED tells it; the error beside it is a preference of MAP-19.",
     ),
     (
         "storage-full-silent",
@@ -95,10 +106,25 @@ pub const LAPSES: &[(&str, &str)] = &[
     ),
     ("state-bursts", "It breaks a recommendation only."),
     ("new-base-request-always", "It breaks a recommendation only."),
+    ("new-base-request-stays", "It breaks a recommendation only."),
     ("distance-negative", "It breaks a recommendation only."),
+    ("distance-not-reset", "It breaks a recommendation only."),
+    ("own-error-cleared-by-order", "It breaks a recommendation only."),
+    (
+        "semiautomatic-ends-order",
+        "The text says that orders are executed in both modes, and nothing about those that are switched over.",
+    ),
     (
         "traversal-split",
         "Two states of one moment are remarked on; tests that look at single states are not reached.",
+    ),
+    (
+        "visualization-without-position",
+        "The schema requires nothing; by the ruling of VIS-01 what is merely absent is a warning.",
+    ),
+    (
+        "header-id-reset-by-reconnect",
+        "The text leaves open where the count begins; the ruling of HDR-02 makes a new count after a mere reconnect a warning.",
     ),
     ("visualization-slow", "It breaks a recommendation only."),
     ("visualization-missing", "It breaks a recommendation only."),

@@ -62,6 +62,13 @@ impl Maps {
         if self.position(map_id, version).is_some() {
             return;
         }
+        if faults.has(F::DownloadDropsVersion) {
+            self.all.retain(|map| map.map_id != map_id);
+        }
+        if faults.has(F::DownloadReplacesVersion) {
+            let others = self.all.iter_mut().filter(|map| map.map_id == map_id);
+            others.for_each(|map| map.enabled = false);
+        }
         self.all.push(OnboardMap {
             map_id: map_id.to_owned(),
             map_version: version.to_owned(),
@@ -131,6 +138,9 @@ impl Maps {
         }
         if !faults.has(F::DeleteKeepsEntry) {
             self.all.remove(index);
+        }
+        if faults.has(F::DeleteTakesAllVersions) {
+            self.all.retain(|map| map.map_id != map_id);
         }
         Ok(())
     }

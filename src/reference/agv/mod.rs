@@ -23,6 +23,7 @@ mod factsheet;
 pub mod faults;
 mod instant;
 pub mod lapses;
+mod leniency;
 mod maps;
 mod motion;
 mod order_message;
@@ -36,6 +37,7 @@ mod stations;
 #[cfg(test)]
 mod tests;
 pub mod tolerances;
+mod updates;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -135,6 +137,8 @@ pub struct Agv {
     obstacles: BTreeSet<String>,
     /// It refuses the next order (`order-error-locks`, `manual-locks` only).
     locked: bool,
+    /// `malformed-instant-deafens`: no instant action is heard any more.
+    deaf: bool,
     /// It has left its corridor and was not put back yet.
     strayed: bool,
     /// Where loads are handed over, and whether one stands there.
@@ -146,6 +150,8 @@ pub struct Agv {
     undocking: Option<Moment>,
     /// A switch keeps it from pausing and from going on.
     pause_blocked: bool,
+    /// How often it was paused (`pauses-counted` only).
+    pauses: u32,
     /// Something keeps it from ending its charging.
     charger_locked: bool,
     /// The order it gave up in a mode for people (`order-taken-up-again` only).
@@ -160,6 +166,8 @@ pub struct Agv {
     inbox: VecDeque<(Moment, Input)>,
     /// It stands still on a node until then (`stops-on-nodes`, `first-node-listed` only).
     lingers_until: Option<Moment>,
+    /// When what was held goes on (`resumes-in-a-moment` only).
+    resumes_at: Option<Moment>,
     /// Counts states.
     states_sent: u64,
     /// Counts logs.
@@ -214,12 +222,14 @@ impl Agv {
             loads: Vec::new(),
             obstacles: BTreeSet::new(),
             locked: false,
+            deaf: false,
             strayed: false,
             stations: config.stations.clone(),
             shadow: None,
             charging: false,
             undocking: None,
             pause_blocked: false,
+            pauses: 0,
             charger_locked: false,
             remembered: None,
             lost: false,
@@ -228,6 +238,7 @@ impl Agv {
             report: Report::default(),
             inbox: VecDeque::new(),
             lingers_until: None,
+            resumes_at: None,
             states_sent: 0,
             logs: 0,
             pending: Vec::new(),
@@ -263,6 +274,7 @@ impl Agv {
             self.connection.online_at,
             self.book.soon,
             self.lingers_until,
+            self.resumes_at,
             self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
             self.persona.next_end(),
@@ -305,6 +317,7 @@ impl Agv {
         }
         self.shadow.take_if(|(end, _)| *end <= moment);
         self.a_moment_later();
+        self.resume_if_due();
         self.attempt_connection();
         self.settle();
         self.flush();

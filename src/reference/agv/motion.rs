@@ -111,6 +111,12 @@ impl Motion {
         self.underway.is_some()
     }
 
+    /// Whether it turns on the spot.
+    pub(super) fn is_turning(&self) -> bool {
+        let leg = self.underway.as_ref().map(|underway| &underway.leg);
+        matches!(leg, Some(Leg::Turn { .. }))
+    }
+
     /// When the present leg ends.
     pub(super) fn end(&self) -> Option<Moment> {
         self.underway.as_ref().map(|underway| underway.begun + underway.lasts)

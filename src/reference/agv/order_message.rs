@@ -48,6 +48,7 @@ impl ActionRequest {
             1 => Blocking::Soft,
             _ => Blocking::Hard,
         };
+        fields.optional("actionDescription", Fields::prose)?;
         Ok(Self {
             path: fields.at("actionType"),
             action_type: fields.id("actionType")?,

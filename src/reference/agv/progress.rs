@@ -48,6 +48,7 @@ impl Agv {
                 break;
             }
         }
+        self.book.asked |= self.book.base_runs_low();
     }
 
     /// Begins actions of the order whose turn it is. A held vehicle begins nothing.
@@ -77,7 +78,10 @@ impl Agv {
         let stuck = self.faults.has(F::StuckAfterBlocking) && self.blocking_action_ended();
         let stuck = stuck || self.faults.has(F::StuckAfterEdgeAction) && self.blocking_edge_action_ended();
         let warned = self.faults.has(F::WarningBlocks) && !self.errors.is_empty();
-        self.mode.takes_orders()
+        let by_hand = self.faults.has(F::ManualDrivesOrders)
+            || self.faults.has(F::ManualDrivesOn)
+            || self.faults.has(F::ManualDrivesUnseen);
+        (self.mode.takes_orders() || by_hand)
             && !self.persona.halted
             && !self.persona.lost
             && self.lingers_until.is_none()
@@ -86,7 +90,8 @@ impl Agv {
             && !offline
             && !stuck
             && !warned
-            && !self.actions.block_driving(self.faults)
+            && (!self.actions.block_driving(self.faults)
+                || self.book.updated && self.faults.has(F::UpdateBreaksBlocking))
     }
 
     fn blocking_action_ended(&self) -> bool {
@@ -212,6 +217,7 @@ impl Agv {
         let own = match self.mode {
             Mode::Semiautomatic if self.faults.has(F::SemiautomaticFaster) => self.config.speed * 2.0,
             Mode::Semiautomatic => self.config.speed / 2.0,
+            _ if self.book.slipped && self.faults.has(F::HorizonCreptInto) => self.config.speed / 40.0,
             _ if self.book.slipped => self.config.speed * 4.0,
             _ => self.config.speed,
         };
@@ -351,7 +357,14 @@ impl Agv {
         }
         self.update_last_node(&stop);
         if self.book.cancel.is_none() {
-            self.actions.trigger(Origin::Node(sequence_id), self.faults);
+            let of_update = sequence_id > self.book.first_end;
+            if !(of_update && self.faults.has(F::UpdateActionsNotPerformed)) {
+                self.actions.trigger(Origin::Node(sequence_id), self.faults);
+            }
+            let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == stop.node.id);
+            for ahead in again.filter(|_| self.faults.has(F::LoopActionsEarly)) {
+                self.actions.trigger(Origin::Node(ahead.node.sequence_id), self.faults);
+            }
             let ahead = self.book.edge_ahead().map(|edge| edge.sequence_id);
             if let Some(ahead) = ahead.filter(|_| self.faults.has(F::EdgeActionsOnNode)) {
                 self.actions.trigger(Origin::Edge(ahead), self.faults);
@@ -370,7 +383,7 @@ impl Agv {
             self.actions
                 .trigger(Origin::Node(planned.node.sequence_id), self.faults);
         }
-        if self.faults.has(F::HorizonSlippedInto) {
+        if self.faults.has(F::HorizonSlippedInto) || self.faults.has(F::HorizonCreptInto) {
             self.book.soon = Some(self.now.moment + super::cancel::MOMENT);
         }
     }

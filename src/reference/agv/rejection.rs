@@ -42,6 +42,10 @@ impl Refusal {
         }
     }
 
+    pub(super) fn is_malformed(&self) -> bool {
+        self.rule == Rule::Malformed
+    }
+
     pub(super) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
         self.culprits.push((key.to_owned(), value.into()));
         self
@@ -123,7 +127,7 @@ impl Agv {
             description: refusal.reason,
             life,
         };
-        self.errors.raise(error);
+        self.errors.refused(error, self.now.moment, self.faults);
     }
 
     /// What a faulty vehicle changes when it refuses an order.
@@ -134,6 +138,9 @@ impl Agv {
             id.clone_into(&mut self.book.order_id);
         }
         if rule == Rule::Malformed {
+            if message.is_object() && self.faults.has(F::MalformedStopsOrder) {
+                self.give_up_order();
+            }
             let without_id = message.is_object() && message.get("orderId").is_none();
             if without_id && self.faults.has(F::MissingIdTakenOver) {
                 self.book.order_id.clear();
@@ -152,6 +159,13 @@ impl Agv {
                 action.end(Status::Failed);
                 self.actions.push(action);
             }
+        }
+        if self.faults.has(F::RejectionDropsHorizon) {
+            self.book.drop_horizon();
+        }
+        if self.faults.has(F::RejectionClearsActionStates) {
+            self.actions
+                .retain(|action| !action.of_order() || !action.status.is_terminal());
         }
         if self.faults.has(F::RejectionStopsOrder)
             || (rule == Rule::Outdated && self.faults.has(F::OutdatedUpdateDropsOrder))

@@ -20,6 +20,8 @@ use super::tolerances::ToleranceName as T;
 pub(super) struct Report {
     /// An order message arrived (STATE-03).
     pub(super) order_received: bool,
+    /// It was an update, and it was taken over (`update-without-state` only).
+    pub(super) update_received: bool,
     /// A state was asked for (ACT-26).
     pub(super) requested: bool,
     /// No state before the next periodic one (`state-request-unanswered`).
@@ -37,9 +39,10 @@ pub(super) struct Report {
 const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
 
 /// Faults that keep events from the state.
-const KEPT_EVENTS: [F; 9] = [
+const KEPT_EVENTS: [F; 10] = [
     F::StatesByClock,
     F::OrderWithoutState,
+    F::UpdateWithoutState,
     F::LoadWithoutState,
     F::ErrorWithoutState,
     F::ModeWithoutState,
@@ -120,13 +123,27 @@ impl Agv {
     }
 
     fn usual_interval(&self) -> Duration {
-        if self.faults.has(F::StateSilence) {
+        if self.faults.has(F::StateSilence) || self.is_silent_now() {
             Duration::from_secs(45)
         } else if self.faults.has(F::StateIntervalExceeded) {
             self.stated_interval() * 2 + Duration::from_secs(2)
         } else {
             self.stated_interval()
         }
+    }
+
+    /// Whether a faulty vehicle is too busy with what it does to send states.
+    fn is_silent_now(&self) -> bool {
+        let held = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
+        let acts = || {
+            self.actions
+                .iter()
+                .any(|action| action.of_order() && action.status.is_active())
+        };
+        (held && self.faults.has(F::SilentWhileHeld))
+            || (self.holds.pause && self.faults.has(F::SilentWhilePaused))
+            || (self.mode == super::Mode::Manual && self.faults.has(F::SilentByHand))
+            || (self.faults.has(F::SilentWhileActing) && acts())
     }
 
     /// The interval the factsheet promises. A faulty vehicle that keeps events to itself has a long one, so that
@@ -228,6 +245,13 @@ impl Agv {
 
     /// Whether a faulty vehicle keeps an event to itself. What it swallows is never told on its own.
     fn suppressed(&mut self, changes: Changes, requested: bool, body: &Map<String, Value>) -> bool {
+        if std::mem::take(&mut self.report.update_received) && self.faults.has(F::UpdateWithoutState) {
+            self.report.order_received = false;
+            if let Some((_, last)) = &mut self.report.last {
+                last.clone_from(body);
+            }
+            return true;
+        }
         let event = |change: bool, fault: F| change && self.faults.has(fault);
         let held = self.report.silenced
             || (self.faults.has(F::StatesByClock) && !requested)
@@ -305,7 +329,22 @@ impl Agv {
         }
         let mut body = Map::new();
         if !self.config.line_guided() {
-            body.insert("agvPosition".into(), self.position_picture());
+            let mut position = self.position_picture();
+            let mut change = |key: &str, change: fn(f64) -> f64| {
+                if let Some(value) = position.get(key).and_then(Value::as_f64) {
+                    position[key] = json!(change(value));
+                }
+            };
+            if self.faults.has(F::VisualizationBeside) {
+                change("x", |x| x + 2.0);
+            }
+            if self.faults.has(F::VisualizationMillimetres) {
+                change("x", |x| x * 1000.0);
+                change("y", |y| y * 1000.0);
+            }
+            if !self.faults.has(F::VisualizationWithoutPosition) {
+                body.insert("agvPosition".into(), position);
+            }
         }
         body.insert("velocity".into(), self.velocity_picture());
         let body = self.shown_visualization(body);

@@ -5,6 +5,7 @@ mod cancelling;
 mod curves;
 mod driving;
 mod faulty;
+mod guesses;
 mod hostile;
 mod link;
 mod maps;

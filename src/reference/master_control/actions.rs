@@ -96,7 +96,8 @@ impl Site {
         }
         let devices = vehicle.factsheet.as_ref().map_or(&[][..], |sheet| &sheet.devices);
         if matches!(kind, "pick" | "drop") && devices.len() > 1 && !parameters.contains_key("lhd") {
-            parameters.insert("lhd".into(), json!(devices[0]));
+            let habit = self.faults.has(F::DeviceByHabit);
+            parameters.insert("lhd".into(), if habit { json!("LHD1") } else { json!(devices[0]) });
         }
         let vendor = SCOPES.iter().all(|(name, _)| *name != kind);
         if vendor && self.faults.has(F::R1VendorParametersDropped) {

@@ -3,8 +3,9 @@
 use serde_json::{Value, json};
 
 use super::Site;
-use super::faults::FaultName as F;
+use super::faults::{FaultName as F, Faults};
 use super::instant::ended;
+use super::seen::State;
 use super::vehicle::{Cancel, Presence, Transport, Vehicle};
 
 impl Site {
@@ -80,10 +81,13 @@ fn stop_by_order(vehicle: &mut Vehicle) {
 }
 
 /// Goes on when the cancellation has ended and the order is over (ORD-CANCEL-01).
-pub(super) fn watch_cancel(vehicle: &mut Vehicle) {
+pub(super) fn watch_cancel(vehicle: &mut Vehicle, faults: Faults) {
     let Some(cancel) = vehicle.cancel.clone() else { return };
-    let Some(finished) = ended(vehicle, &cancel.action_id) else {
-        return;
+    let cleared = vehicle.state.as_ref().is_some_and(State::route_empty);
+    let finished = match ended(vehicle, &cancel.action_id) {
+        Some(finished) => finished,
+        None if cleared && faults.has(F::CancelEndsWithRoute) => true,
+        None => return,
     };
     let Some(state) = &vehicle.state else { return };
     let order_id = vehicle.running.as_ref().map(|running| running.id.as_str());

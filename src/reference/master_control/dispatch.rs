@@ -172,10 +172,13 @@ impl Site {
         let hasty = [F::OrderInsteadOfCancel, F::CancelNotAwaited, F::BrokenIsDead];
         let hasty = hasty.iter().any(|fault| self.faults.has(*fault));
         let busy = !state.route_empty() && !hasty && !vehicle.r1_hasty;
+        if vehicle.shunned {
+            return false;
+        }
         if vehicle.r1_moving || (state.informs() && self.faults.has(F::R1InformationHoldsDispatch)) {
             return false;
         }
-        let fit = state.is_fit(self.config.low_battery) || self.faults.has(F::OnlineIsHealthy);
+        let fit = state.is_fit(self.config.low_battery) || vehicle.absolved || self.takes(T::OrdersToFaulted);
         let manual = !state.takes_orders();
         let fit = fit || (manual && self.faults.has(F::OrdersInManual));
         if !fit || busy || self.localization_shunned(vehicle) {
@@ -241,7 +244,7 @@ impl Site {
             way.stops.remove(0);
             way.legs.remove(0);
         }
-        self.names_fit(vehicle, &way).then_some(way)
+        (self.names_fit(vehicle, &way) && self.actions_fit(vehicle, &way)).then_some(way)
     }
 
     /// The first node of a new order, and from which node of the layout the way goes on (ORD-03).
@@ -467,7 +470,9 @@ impl Site {
     /// An action at the end of a way, in a scope the vehicle offers it in.
     fn perform(&mut self, vehicle: &Vehicle, way: &mut Way, kind: &str, given: &Value) {
         let sheet = vehicle.factsheet.as_ref();
-        let room = |name: &str, taken: usize| taken < sheet.map_or(usize::MAX, |sheet| sheet.limit(&[name]));
+        let heedless = self.faults.has(F::NodeActionsIgnored);
+        let room =
+            |name: &str, taken: usize| heedless || taken < sheet.map_or(usize::MAX, |sheet| sheet.limit(&[name]));
         let on_node = self.offers(sheet, kind, "NODE");
         let on_edge = self.offers(sheet, kind, "EDGE");
         let led = kind == "waitForTrigger" && self.faults.has(F::R1TriggerOnEdge);
@@ -505,6 +510,22 @@ impl Site {
             |id: &str| id.chars().count() <= longest && (!digits || id.chars().all(|letter| letter.is_ascii_digit()));
         let nodes = way.stops.iter().map(|stop| stop.id.as_str());
         nodes.chain(way.legs.iter().map(|leg| leg.id.as_str())).all(fits)
+    }
+
+    /// Whether the vehicle takes as many actions on one node, and as many parameters of one action, as the way has.
+    fn actions_fit(&self, vehicle: &Vehicle, way: &Way) -> bool {
+        let Some(sheet) = &vehicle.factsheet else { return true };
+        let limit = |name: &str, ignored: F| {
+            let limit = sheet.limit(&[name]);
+            if self.faults.has(ignored) { usize::MAX } else { limit }
+        };
+        let actions = || way.stops.iter().flat_map(|stop| &stop.actions);
+        let parameters = |action: &Value| action["actionParameters"].as_array().map_or(0, Vec::len);
+        let most = actions().map(parameters).max().unwrap_or_default();
+        let zero = sheet.has_zeros && self.faults.has(F::ZeroIsALimit);
+        !zero
+            && Running::busiest(&way.stops) <= limit("node.actions", F::NodeActionsIgnored)
+            && most <= limit("actions.actionsParameters", F::ParametersIgnored)
     }
 }
 

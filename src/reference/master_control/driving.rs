@@ -37,12 +37,17 @@ impl Site {
         if self.r1_resent_in_service(vehicle) {
             return;
         }
+        if vehicle.cancel.is_some() && self.faults.has(F::UpdatedWhileCancelled) {
+            self.extend_all_the_same(vehicle);
+            return;
+        }
         let manual = vehicle
             .state
             .as_ref()
             .is_some_and(|state| state.operating_mode == "MANUAL");
-        let despite = manual && self.reachable(vehicle) && self.faults.has(F::R1UpdatesInManual);
-        if vehicle.cancel.is_some() || !(self.commandable(vehicle) || despite) {
+        let stubborn = self.faults.has(F::UpdatesInService) || (manual && self.faults.has(F::R1UpdatesInManual));
+        let stubborn = stubborn && self.reachable(vehicle);
+        if vehicle.cancel.is_some() || !(self.commandable(vehicle) || stubborn) {
             return;
         }
         let Some(mut running) = vehicle.running.take() else {
@@ -93,6 +98,16 @@ impl Site {
         }
     }
 
+    /// `updated-while-cancelled`: as if nobody had called the order off.
+    fn extend_all_the_same(&mut self, vehicle: &mut Vehicle) {
+        if let Some(mut running) = vehicle.running.take() {
+            if running.confirmed {
+                self.extend_base(vehicle, &mut running);
+            }
+            vehicle.running = Some(running);
+        }
+    }
+
     fn fate(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
         let shown = state.order_id == running.id;
         if shown {
@@ -120,11 +135,27 @@ impl Site {
         if !running.accepted {
             return Fate::Runs;
         }
+        if running.cleared && !self.faults.has(F::ClearedOrderUpdated) {
+            return Fate::Again;
+        }
         let alien = self.faults.has(F::OrderIdPerUpdate) || self.faults.has(F::OrderIdReused);
         if !shown && !alien {
             return Fate::Again;
         }
-        progress(running, state)
+        let fate = progress(running, state);
+        let driven = state.route_empty() && running.is_whole() && running.confirmed;
+        match fate {
+            Fate::Runs if driven && self.faults.has(F::ActionNotAwaited) => Fate::Over,
+            Fate::CalledOff if running.refused && self.faults.has(F::RefusedUpdateExtended) => {
+                (running.refused, running.confirmed) = (false, true);
+                Fate::Runs
+            }
+            Fate::Again if running.confirmed && self.faults.has(F::ClearedOrderUpdated) => {
+                running.changed = true;
+                Fate::Runs
+            }
+            fate => fate,
+        }
     }
 
     /// Sends the unchanged message again when it was not seen in time; false when that was done often enough.
@@ -326,10 +357,10 @@ impl Site {
         } else {
             window
         };
+        let stuck = (running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats))
+            || (running.changed && self.faults.has(F::R1UpdateIdKeptOnReroute));
         let before = running.update_id;
-        if !(running.changed && self.faults.has(F::R1UpdateIdKeptOnReroute)) {
-            running.update_id += 1;
-        }
+        running.update_id += u32::from(!stuck);
         match self.order_message(vehicle, running, window) {
             Some((message, window)) if window.released > running.released || running.changed => {
                 running.released = window.released;

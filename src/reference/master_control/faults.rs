@@ -22,6 +22,8 @@ faults! {
     OldMqtt "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1.";
     NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10"] "Sends the terminating zero byte of its string with every message.";
     OrderQosOne "order-qos-1" ["MQTT-06"] "Publishes orders with QoS 1.";
+    OrdersRetained "orders-retained" ["MQTT-06"] "Publishes orders with RETAIN, so that a vehicle that is new to the broker drives off.";
+    InstantActionsRetained "instant-actions-retained" ["MQTT-06"] "Publishes instant actions with RETAIN.";
     InstantActionsQosTwo "instant-actions-qos-2" ["MQTT-06"] "Publishes instant actions with QoS 2.";
     NeverReconnects "never-reconnects" ["MQTT-10"] "Does not connect again after a broken link.";
     NotSubscribedAgain "not-subscribed-again" ["TOPIC-14", "MQTT-10", "MODE-04", "ORD-03", "CONN-12"] "Does not subscribe again when it reconnects.";
@@ -35,9 +37,23 @@ faults! {
     ManufacturerWithSlash "manufacturer-with-slash" ["TOPIC-06", "HDR-05"] "Writes the manufacturer with a slash in the header.";
     DollarInTopic "dollar-in-topic" ["TOPIC-13", "TOPIC-07"] "Sends orders on a topic with a dollar sign in it.";
     InstantActionsAsOrders "instant-actions-as-orders" ["TOPIC-13", "IACT-01"] "Sends instant actions on the order topic.";
+    EmptyLastNodeShunned "empty-last-node-shunned" ["TOPIC-13"] "Serves a vehicle no more that once knew no last node.";
+    ForeignActionShunned "foreign-action-shunned" ["TOPIC-13"] "Serves a vehicle no more that has listed an action nobody sent.";
+    NamelessActionShunned "nameless-action-shunned" ["TOPIC-13"] "Serves a vehicle no more that has listed an action without its type.";
+    PauseShunned "pause-shunned" ["TOPIC-13"] "Serves a vehicle no more that was paused for more than one state.";
+    NonAsciiShunned "non-ascii-shunned" ["TOPIC-13"] "Serves a vehicle no more that has sent a letter beyond ASCII.";
+    ExponentShunned "exponent-shunned" ["TOPIC-13"] "Serves a vehicle no more that has written a number with an exponent.";
+    GapShunned "gap-shunned" ["TOPIC-13"] "Serves a vehicle no more that has left a headerId out.";
+    EmptyPayloadShunned "empty-payload-shunned" ["TOPIC-13"] "Serves a vehicle no more after a message of no bytes.";
+    MinimalFactsheetShunned "minimal-factsheet-shunned" ["TOPIC-13"] "Serves a vehicle no more whose factsheet has left optional members out.";
+    WrongTypeShunned "wrong-type-shunned" ["TOPIC-13"] "Serves a vehicle no more that has written a number as text.";
+    ZeroIsALimit "zero-is-a-limit" ["TOPIC-13"] "Takes a limit of 0 in a factsheet for one.";
     OrdersNotSent "orders-not-sent" ["TOPIC-13"] "Plans its orders and never sends them.";
     StateNotSubscribed "state-not-subscribed" ["TOPIC-14"] "Does not subscribe to the state.";
     ConnectionNotSubscribed "connection-not-subscribed" ["TOPIC-14", "CONN-12"] "Does not subscribe to the connection topic.";
+    ConnectionQosZero "connection-with-qos-0" ["TOPIC-14"] "Subscribes to the connection topic with QoS 0.";
+    DiesOfNull "dies-of-null" ["TOPIC-14"] "Ends when a member of a state is null.";
+    DiesOfEmptyLastNode "dies-of-empty-last-node" ["TOPIC-14"] "Ends when a vehicle knows no last node.";
     FactsheetNotSubscribed "factsheet-not-subscribed" ["TOPIC-14"] "Does not subscribe to the factsheet.";
     PublishesConnection "publishes-connection" ["TOPIC-15"] "Sets the connection of a vehicle it has lost to OFFLINE by itself.";
 
@@ -113,8 +129,10 @@ faults! {
     BaseReplaced "base-replaced" ["ORD-UPD-03", "ORD-CANCEL-01"] "Changes the base by an update when the destination changes.";
     OrderIdPerUpdate "order-id-per-update" ["ORD-UPD-04"] "Gives every update an orderId of its own.";
     UpdateIdKept "update-id-kept" ["ORD-UPD-04"] "Does not raise orderUpdateId.";
+    SecondUpdateRepeats "second-update-repeats" ["ORD-UPD-04"] "Gives every update the number of the first one.";
     UpdateIdFalls "update-id-falls" ["ORD-UPD-04"] "Counts orderUpdateId down.";
     StitchingMissing "stitching-missing" ["ORD-UPD-05"] "Begins updates with the first new node.";
+    RefusedUpdateExtended "refused-update-extended" ["ORD-UPD-05"] "Goes on from the end of an update that was refused.";
     StitchingMoved "stitching-moved" ["ORD-UPD-06"] "Rounds the position of the stitching node to decimetres, and shifts it.";
     StitchingActionAdded "stitching-action-added" ["ORD-UPD-06"] "Adds an action to the stitching node.";
     SequenceFromOne "sequence-from-one" ["ORD-UPD-11"] "Numbers nodes and edges from 1.";
@@ -125,6 +143,9 @@ faults! {
 
     // Cancelling
     OrderInsteadOfCancel "order-instead-of-cancel" ["ORD-CANCEL-01"] "Sends a new order without calling the old one off.";
+    UpdatedWhileCancelled "updated-while-cancelled" ["ORD-CANCEL-01"] "Extends the base of an order it is calling off.";
+    CancelEndsWithRoute "cancel-ends-with-route" ["ORD-CANCEL-01"] "Takes empty nodeStates for the end of cancelOrder.";
+    ActionNotAwaited "action-not-awaited" ["ORD-CANCEL-01"] "Sends the next order while an action of the last one still runs.";
     CancelNotAwaited "cancel-not-awaited" ["ORD-CANCEL-01"] "Sends the new order right behind cancelOrder.";
     NextOrderFromOldStart "next-order-from-old-start" ["ORD-CANCEL-14", "ORD-03"] "Begins the order behind a cancelled one where that had begun.";
     NextOrderAhead "next-order-ahead" ["ORD-CANCEL-17", "ORD-03"] "Begins the order behind a cancelled one at the node the vehicle has not reached.";
@@ -139,6 +160,7 @@ faults! {
     LoadTypeMissing "load-type-missing" ["ACT-31", "FACT-15"] "Sends pick without loadType.";
     PoseAsText "pose-as-text" ["ACT-31", "BP-05"] "Sends the coordinates of initPosition as strings.";
     DeviceMissing "lhd-missing" ["ACT-32"] "Does not say which load handling device picks.";
+    DeviceByHabit "lhd-by-habit" ["ACT-32"] "Calls the first load handling device LHD1, whatever the factsheet says.";
     DeviceUnknown "lhd-unknown" ["ACT-32"] "Counts load handling devices instead of naming them.";
     TriggerUnsupervised "trigger-unsupervised" ["ACT-39"] "Waits for a trigger without end.";
     ParametersAsObject "parameters-as-object" ["BP-04"] "Writes the parameters of an action as one object.";
@@ -152,6 +174,10 @@ faults! {
 
     // Limits
     ArrayLimitIgnored "array-limit-ignored" ["FACT-12"] "Sends more nodes than the vehicle takes.";
+    NodeActionsIgnored "node-actions-limit-ignored" ["FACT-12"] "Gives a node more actions than the vehicle takes.";
+    ParametersIgnored "parameter-limit-ignored" ["FACT-12"] "Gives an action more parameters than the vehicle takes.";
+    InstantActionsIgnored "instant-actions-limit-ignored" ["FACT-12"] "Sends more instant actions at once than the vehicle takes.";
+    NodeStatesIgnored "node-states-limit-ignored" ["FACT-12"] "Sends orders with more nodes than the vehicle can list in its states.";
     MessageLimitIgnored "message-limit-ignored" ["FACT-12"] "Sends longer messages than the vehicle takes.";
     IdLimitIgnored "id-limit-ignored" ["FACT-12"] "Sends longer ids than the vehicle takes.";
     NumericalIdsIgnored "numerical-ids-ignored" ["FACT-12"] "Sends ids with letters to a vehicle that takes digits only.";
@@ -160,6 +186,7 @@ faults! {
 
     // Maps
     MapNotEnabled "map-not-enabled" ["MAP-09"] "Sends orders on maps that are not enabled.";
+    MapEnabledBlindly "map-enabled-blindly" ["MAP-09"] "Takes a map for enabled once it has sent enableMap.";
     MapNotPreloaded "map-not-preloaded" ["MAP-10"] "Rolls a map out when an order needs it.";
     DownloadWithoutLink "download-without-link" ["MAP-16", "ACT-31"] "Sends downloadMap without mapDownloadLink.";
     DownloadWithoutId "download-without-id" ["MAP-16", "ACT-31"] "Sends downloadMap without mapId.";
@@ -170,9 +197,11 @@ faults! {
     // Modes and what must not matter
     OrdersInManual "orders-in-manual" ["MODE-04"] "Sends orders to vehicles in MANUAL, SERVICE and TEACHIN.";
     ActionsInService "actions-in-service" ["MODE-04"] "Sends instant actions to vehicles in SERVICE and TEACHIN.";
+    UpdatesInService "updates-in-service" ["MODE-04"] "Extends the order of a vehicle that keeps it in SERVICE or TEACHIN.";
+    ClearedOrderUpdated "cleared-order-updated" ["ORD-MSG-02"] "Goes on with the order a vehicle has given up in MANUAL.";
     OrdersToOffline "orders-to-offline" ["CONN-12"] "Sends orders to vehicles that are offline.";
     OldWillIgnored "old-will-ignored" ["CONN-13", "CONN-12"] "Ignores a connection message with an old timestamp.";
-    OnlineIsHealthy "online-is-healthy" ["CONN-14"] "Begins orders on every vehicle that is ONLINE, whatever its errors.";
+    OnlineIsHealthy "online-is-healthy" ["CONN-14"] "Takes a vehicle that comes ONLINE for healthy, whatever its errors.";
     BrokenIsDead "broken-is-dead" ["CONN-14", "ORD-CANCEL-01"] "Throws the order of a vehicle away when its connection breaks.";
     InformationObeyed "information-obeyed" ["INFO-02"] "Pauses vehicles that report an information.";
     LocalizationObeyed "localization-obeyed" ["INFO-03"] "Gives no work to vehicles with a low localizationScore.";

@@ -21,6 +21,11 @@ impl MasterControl {
         if payload.len() > MAX_MESSAGE {
             return;
         }
+        self.site.take_odd(vehicle, name, payload);
+        if self.site.dead {
+            self.shut_down();
+            return;
+        }
         let Ok(message) = serde_json::from_slice::<Value>(payload) else {
             return;
         };
@@ -116,6 +121,7 @@ impl Site {
         }
         if presence == Presence::Online && vehicle.presence != Presence::Online {
             vehicle.give_time(self.now.moment);
+            vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
         }
         vehicle.presence = presence;
         if presence == Presence::Away {
@@ -158,6 +164,9 @@ impl Site {
         if let Some((index, _)) = near.next_back() {
             let sequence = u32::try_from(2 * index).unwrap_or(u32::MAX);
             state.last_node_sequence_id = state.last_node_sequence_id.max(sequence);
+            state
+                .node_states
+                .retain(|node| node.sequence_id.is_some_and(|id| id > sequence));
         }
     }
 
@@ -172,6 +181,13 @@ impl Site {
         {
             vehicle.r1_before_manual = Some((before.last_node_id.clone(), before.agv_position.clone()));
         }
+        if let Some(running) = vehicle.running.as_mut().filter(|running| running.accepted)
+            && state.operating_mode == "MANUAL"
+            && !self.faults.has(F::R1UpdatesInManual)
+        {
+            running.cleared = true;
+        }
+        vehicle.absolved &= !state.is_fit(self.config.low_battery);
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
         if self.faults.has(F::R1LowScoreRelocated) {

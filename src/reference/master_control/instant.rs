@@ -65,7 +65,11 @@ impl Site {
             return;
         }
         let now = self.now.moment;
-        let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| {
+        let limit = vehicle
+            .factsheet
+            .as_ref()
+            .filter(|_| !self.faults.has(F::InstantActionsIgnored));
+        let limit = limit.map_or(usize::MAX, |sheet| {
             sheet.limit(&["instantActions", "instantActions.actions", "actions"])
         });
         let limit = match () {

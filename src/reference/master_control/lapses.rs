@@ -14,6 +14,18 @@ pub const LAPSES: &[(&str, &str)] = &[
         "A higher QoS delivers the actions as well; the ruling of MQTT-06 is a warning.",
     ),
     (
+        "orders-retained",
+        "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning.",
+    ),
+    (
+        "instant-actions-retained",
+        "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning.",
+    ),
+    (
+        "connection-with-qos-0",
+        "The QoS is asked of whoever publishes; the ruling of TOPIC-14 is a warning.",
+    ),
+    (
         "never-reconnects",
         "MQTT-10 is a recommendation and never more than a warning.",
     ),

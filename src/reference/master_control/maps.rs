@@ -136,6 +136,10 @@ impl Site {
         let mut ready = true;
         for map_id in maps {
             let Some(state) = &vehicle.state else { return false };
+            let sent = self.faults.has(F::MapEnabledBlindly) && vehicle.enabling.contains_key(map_id);
+            if sent {
+                continue;
+            }
             if state.map_enabled(map_id) {
                 vehicle.enabling.remove(map_id);
                 continue;

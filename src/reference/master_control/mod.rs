@@ -18,6 +18,7 @@ mod instant;
 pub mod lapses;
 mod layout;
 mod maps;
+mod odd;
 mod order;
 mod publish;
 mod seen;
@@ -60,6 +61,8 @@ struct Site {
     online: bool,
     /// Tells the ids of one session from those of another; 0 until the first input.
     session: u64,
+    /// It has ended because of what a vehicle said (`dies-of-…`).
+    dead: bool,
     /// Counts ids.
     ids: u64,
     /// What was decided and is still to be handed to the driver.
@@ -179,6 +182,7 @@ impl MasterControl {
                 },
                 online: false,
                 session: 0,
+                dead: false,
                 ids: 0,
                 pending: Vec::new(),
                 r1_resending: false,
@@ -231,7 +235,7 @@ impl Site {
         self.miss_factsheet(vehicle);
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);
-        cancel::watch_cancel(vehicle);
+        cancel::watch_cancel(vehicle, self.faults);
         self.watch_order(vehicle);
         self.repeat_for_ever(vehicle);
         self.ask_when_quiet(vehicle);

@@ -35,7 +35,13 @@ impl Site {
         if let Some(sheet) = sheet.filter(|_| !self.faults.has(F::ArrayLimitIgnored) && !later) {
             let nodes = sheet.limit(&["order.nodes", "nodes"]);
             let nodes = nodes.min(sheet.limit(&["order.edges", "edges"]).saturating_add(1));
-            let end = window.first.saturating_add(nodes);
+            let listed = sheet.limit(&["state.nodeStates"]);
+            let listed = if self.faults.has(F::NodeStatesIgnored) {
+                usize::MAX
+            } else {
+                listed.saturating_add(1)
+            };
+            let end = window.first.saturating_add(nodes.min(listed));
             window.end = window.end.min(end);
             window.released = window.released.min(end);
         }
@@ -174,7 +180,10 @@ impl Site {
         if let Some(text) = field("nodePosition.mapDescription", None, json!(stop.map_id)) {
             position["mapDescription"] = text;
         }
-        node["nodePosition"] = position;
+        let listed = sheet.is_none_or(Factsheet::knows_positions);
+        if listed || !self.takes(T::PositionWhereListed) {
+            node["nodePosition"] = position;
+        }
         node["actions"] = json!(stop.actions);
         node
     }

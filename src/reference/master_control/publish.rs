@@ -64,7 +64,8 @@ impl MasterControl {
                 } else {
                     topic.to_owned()
                 };
-                let qos = u8::from(*name == "connection" || site.takes(T::SubscribesWithQosOne));
+                let reliably = *name == "connection" && !site.faults.has(F::ConnectionQosZero);
+                let qos = u8::from(reliably || site.takes(T::SubscribesWithQosOne));
                 if !subscriptions.iter().any(|(known, _)| *known == topic) {
                     subscriptions.push((topic, qos));
                 }
@@ -264,7 +265,10 @@ impl Site {
             topic: self.misdirected(vehicle, name, topic),
             payload,
             qos,
-            retain: false,
+            retain: match name {
+                "order" => self.faults.has(F::OrdersRetained),
+                _ => self.faults.has(F::InstantActionsRetained),
+            },
         }));
         if name == "order" && self.faults.has(F::R1PathOnVisualization) {
             self.r1_show_path(vehicle, body);

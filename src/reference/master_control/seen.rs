@@ -41,6 +41,8 @@ pub(super) struct Header {
 #[serde(rename_all = "camelCase")]
 pub(super) struct ElementState {
     #[serde(default)]
+    pub(super) sequence_id: Option<u32>,
+    #[serde(default)]
     pub(super) released: bool,
 }
 
@@ -197,6 +199,12 @@ impl State {
         self.node_states.is_empty() && self.edge_states.is_empty()
     }
 
+    /// The sequenceId of a node that is passed cannot be higher than this.
+    pub(super) fn before_next_node(&self) -> u32 {
+        let ahead = self.node_states.iter().filter_map(|node| node.sequence_id).min();
+        ahead.map_or(u32::MAX, |next| next.saturating_sub(2))
+    }
+
     /// Whether something keeps the vehicle from being given new work.
     pub(super) fn is_fit(&self, low_battery: f64) -> bool {
         let fatal = self.errors.iter().any(|error| error.error_level == "FATAL");
@@ -270,6 +278,8 @@ pub(super) struct Factsheet {
     pub(super) devices: Vec<String>,
     /// Types of loads.
     pub(super) load_types: Vec<String>,
+    /// Whether a limit is 0 (`zero-is-a-limit`).
+    pub(super) has_zeros: bool,
 }
 
 impl Factsheet {
@@ -315,12 +325,18 @@ impl Factsheet {
                 .map_or(0.0, |seconds| seconds.clamp(0.0, 3600.0)),
             devices: texts(list("/loadSpecification/loadPositions")),
             load_types: load_types.map(str::to_owned).collect(),
+            has_zeros: at("/protocolLimits/maxArrayLens").is_some_and(|limits| limits["order.nodes"] == 0),
         }
     }
 
     /// What the vehicle says to an optional parameter, such as `order.edges.maxSpeed`.
     pub(super) fn support(&self, parameter: &str) -> Option<&str> {
         self.optional.get(parameter).map(String::as_str)
+    }
+
+    /// Whether a list of what it supports, if there is one, has the positions of nodes in it.
+    pub(super) fn knows_positions(&self) -> bool {
+        self.optional.is_empty() || self.optional.keys().any(|name| name.contains("nodePosition"))
     }
 
     /// The smaller of the limits of these names.

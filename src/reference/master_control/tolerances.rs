@@ -45,6 +45,8 @@ tolerances! {
     NewestMqtt "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5.";
     AsksForStates "asks-for-states" ["ACT-08"] "Asks for a state when it has begun an order.";
     AsksForFactsheet "asks-for-factsheet" ["ACT-08"] "Asks for the factsheet although it has one.";
+    PositionWhereListed "position-where-listed" ["ORD-MSG-08", "OPT-03"] "Leaves nodePosition out for a vehicle whose factsheet lists what it supports, and not this.";
+    OrdersToFaulted "orders-to-faulted" ["CONN-14"] "Begins what it is asked for on a vehicle with a FATAL error.";
     SoftActions "soft-actions" ["FACT-15"] "Uses the blocking type SOFT where the vehicle allows it.";
 
 R1UuidIds "r1-uuid-ids" ["ORD-MSG-17", "JSON-04"] "Ids of orders, actions and temporary elements look like UUIDs where the vehicle allows their length.";

@@ -91,6 +91,8 @@ pub(super) struct Running {
     pub(super) accepted: bool,
     /// The vehicle does not take updates of this order.
     pub(super) refused: bool,
+    /// The vehicle has given it up: it was in MANUAL with it.
+    pub(super) cleared: bool,
     /// The way behind the base has changed and is not sent yet.
     pub(super) changed: bool,
     /// actionId of the running waitForTrigger, and since when.
@@ -118,8 +120,9 @@ impl Running {
     /// Index of the node the vehicle has reached.
     pub(super) fn reached(&self, state: Option<&State>) -> usize {
         let sequence = state.filter(|state| state.order_id == self.id);
+        // A vehicle that has just taken the order over may still name the last node of the one before.
         let sequence = sequence.map_or(self.r1_offset, |state| {
-            usize::try_from(state.last_node_sequence_id).unwrap_or(usize::MAX)
+            usize::try_from(state.last_node_sequence_id.min(state.before_next_node())).unwrap_or(usize::MAX)
         });
         let place = sequence.saturating_sub(self.r1_offset);
         let place = match self.r1_gap {
@@ -136,6 +139,11 @@ impl Running {
             _ => 0,
         };
         self.r1_offset + place + skipped
+    }
+
+    /// What is done at a node.
+    pub(super) fn busiest(stops: &[Stop]) -> usize {
+        stops.iter().map(|stop| stop.actions.len()).max().unwrap_or_default()
     }
 
     /// Whether every node of the way is released.
@@ -216,6 +224,12 @@ pub(super) struct Vehicle {
     pub(super) last_order_at: Option<Moment>,
     /// When it wants to be looked at next.
     pub(super) wake: Option<Moment>,
+    /// It is given no work any more, for something it has said (`…-shunned`).
+    pub(super) shunned: bool,
+    /// It was ONLINE again since its last errors (`online-is-healthy`).
+    pub(super) absolved: bool,
+    /// What a faulty master control makes of its messages.
+    pub(super) manner: super::odd::Manner,
     /// The node and place where the visualization shows it (`visualization-obeyed`).
     pub(super) shown_at: Option<(String, Position)>,
     /// The order given up last: its message (`refused-order-repeated`, `next-order-starts-elsewhere`).

@@ -29,6 +29,8 @@ pub struct RequirementView {
     pub how: &'static str,
     /// Tests and monitors, with the ids they have in the page.
     pub deciders: Vec<(String, Option<String>)>,
+    /// Every verdict and how many gave it, where they disagree.
+    pub verdicts: Option<String>,
     /// Why nothing decided it.
     pub gap: Option<String>,
     pub interpretation: Option<String>,
@@ -69,6 +71,16 @@ fn group(id: &str) -> String {
     }
 }
 
+/// `warning in 1, inconclusive in 2, pass in 60`, where not all say the same.
+fn disagreement(requirement: &RequirementResult) -> Option<String> {
+    let words = requirement.verdicts.iter().map(|given| match given.by.as_slice() {
+        [one] if given.verdict != Verdict::Pass => format!("{} in {one}", given.verdict),
+        by => format!("{} in {}", given.verdict, by.len()),
+    });
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| words.join(", "))
+}
+
 fn row(
     requirement: &RequirementResult,
     known: Option<&RequirementText>,
@@ -105,6 +117,7 @@ fn row(
             .iter()
             .map(|id| (id.clone(), anchors.decider(id)))
             .collect(),
+        verdicts: disagreement(requirement),
         gap: reason.or_else(|| requirement.verdict.is_none().then(|| "no reason given".to_owned())),
         interpretation: known.and_then(|known| known.interpretation.clone()),
         deviation: result.deviations.get(&requirement.id).cloned(),

@@ -51,7 +51,7 @@ pub fn source_view(source: &TestSource, test: &TestResult) -> SourceView {
         notes
             .entry(lines.0)
             .or_default()
-            .push((Badge::of(Some(decision.verdict)), decision.requirement.clone()));
+            .push((Badge::of(Some(decision.verdict())), decision.requirement.clone()));
     }
     let lines = source
         .text

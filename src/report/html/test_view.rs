@@ -27,8 +27,12 @@ pub struct TestView {
     pub title: String,
     pub why: String,
     pub reason: Option<String>,
+    /// What was read over, and what else was done to get here.
+    pub allowances: Vec<String>,
     pub not_applicable: bool,
     pub watchlist: bool,
+    pub maturity_note: Option<String>,
+    pub reviewed: bool,
     pub seconds: String,
     /// Whether there is something to look at.
     pub finding: bool,
@@ -152,8 +156,11 @@ fn view(
                 .then(|| "the test decided nothing".to_owned())
                 .filter(|_| test.decisions.is_empty())
         }),
+        allowances: test.allowances.clone(),
         not_applicable: verdict.is_none(),
         watchlist: test.maturity == "watchlist",
+        maturity_note: test.maturity_note.clone(),
+        reviewed: test.maturity == "reviewed",
         seconds: seconds(test.seconds),
         finding,
         decisions,
@@ -191,8 +198,8 @@ fn marked(test: &TestResult) -> BTreeMap<u64, String> {
             marked.insert(nearest.seq, "nearest miss".to_owned());
         }
         if let Some(witness) = decision.witness {
-            let entry = worst.entry(witness).or_insert(decision.verdict);
-            *entry = entry.join(decision.verdict);
+            let entry = worst.entry(witness).or_insert(decision.verdict());
+            *entry = entry.join(decision.verdict());
         }
     }
     marked.extend(worst.into_iter().map(|(seq, verdict)| (seq, verdict.word().to_owned())));
@@ -203,7 +210,7 @@ fn marked(test: &TestResult) -> BTreeMap<u64, String> {
 pub fn findings(test: &TestResult) -> impl Iterator<Item = &Decision> {
     test.decisions
         .iter()
-        .filter(|decision| decision.verdict != Verdict::Pass)
+        .filter(|decision| decision.verdict() != Verdict::Pass)
 }
 
 /// Asks for the messages of a test: those that decided, the nearest misses, the stimuli around them. Says what
@@ -294,7 +301,7 @@ fn decision_view(
     let known = sources.requirement(&decision.requirement);
     let see = |seq: u64| reference(gallery.entry(seq), seq);
     DecisionView {
-        badge: Badge::of(Some(decision.verdict)),
+        badge: Badge::of(Some(decision.verdict())),
         full: decision.is_finding(),
         requirement: decision.requirement.clone(),
         link: anchors.requirement(&decision.requirement),

@@ -227,6 +227,7 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
                 StepEnd::Deadline => ("time is up".to_owned(), text(path)),
                 StepEnd::Interrupted => ("interrupted".to_owned(), text(path)),
                 StepEnd::Broken(why) => ("the harness broke".to_owned(), text(why)),
+                StepEnd::Refused(why) => ("the device does not do it".to_owned(), text(why)),
             };
             let mut row = plain(entry, What::Box(Harness), title, detail);
             row.class = "trouble";
@@ -270,6 +271,7 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
         }
         Event::Answer { answer, .. } => plain(entry, What::Box(Harness), "the operator answers", text(answer)),
         Event::Note { text: note } => plain(entry, What::Box(Harness), "note", text(note)),
+        Event::Waived { waiver } => plain(entry, What::Box(Harness), "from here on", text(&waiver.why)),
         Event::Trouble { text: trouble } => {
             let mut row = plain(entry, What::Box(Harness), "trouble", text(trouble));
             row.class = "trouble";
@@ -282,6 +284,7 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
         | Event::TestEnded { .. }
         | Event::Bound { .. }
         | Event::RetainedEnd { .. }
+        | Event::Lag { .. }
         | Event::ProbeSent { .. }
         | Event::ProbeReceived { .. } => return None,
     };

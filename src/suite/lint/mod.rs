@@ -18,10 +18,10 @@ use self::paths::Topic;
 use self::scope::Scope;
 use super::CheckInfo;
 use super::fields::Problems;
-use super::model::{Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
+use super::model::{About, Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
 use crate::course::is_station;
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
-use crate::pack::{RequirementId, Role, VersionRange};
+use crate::pack::{RequirementId, Role, Version, VersionRange};
 use crate::pattern::Pattern;
 use crate::profile::{FOUND, SAMPLE_ACTIONS, STATEMENTS};
 
@@ -67,7 +67,7 @@ pub(super) fn test(
         role: Some(test.device),
         problems,
     };
-    linter.header(&test.needs, places);
+    linter.header(&test.spec, &test.needs, places);
     if linter.packs.is_empty() {
         return;
     }
@@ -119,7 +119,7 @@ pub(super) fn monitor(
         role: monitor.device,
         problems,
     };
-    linter.header(&monitor.needs, places);
+    linter.header(&monitor.spec, &monitor.needs, places);
     let packs = linter.packs.clone();
     if packs.is_empty() {
         return;
@@ -129,6 +129,9 @@ pub(super) fn monitor(
     }
     let required = linter.requirements(&monitor.checks, &packs);
     let scope = Scope::of_monitor(vocabulary);
+    for about in &monitor.about {
+        linter.about(about, monitor, &scope, &packs);
+    }
     let (name, patterns) = match &monitor.rule {
         Rule::Check(check) => {
             check.visit_terms(&mut |term| scope.check(term, &packs, linter.problems));
@@ -182,14 +185,45 @@ impl Linter<'_> {
         );
     }
 
-    fn header(&mut self, needs: &[Need], places: &HeaderPlaces) {
+    fn header(&mut self, spec: &VersionRange, needs: &[Need], places: &HeaderPlaces) {
         if self.packs.is_empty() {
             let at = places.spec.as_ref().unwrap_or(&places.start).clone();
             self.no_version(&at, "no known version lies in this range");
             return;
         }
+        self.claims_no_more(spec, places);
         for (need, at) in needs.iter().zip(&places.needs) {
             self.need(need, at);
+        }
+    }
+
+    /// A major version without a pack cannot have been looked at: nothing of it is checked here, and nothing is proven.
+    fn claims_no_more(&mut self, spec: &VersionRange, places: &HeaderPlaces) {
+        let newest = self
+            .vocabulary
+            .versions()
+            .into_iter()
+            .map(|version| version.major)
+            .max();
+        let Some(next) = newest.map(|major| major + 1) else {
+            return;
+        };
+        let unknown = Version {
+            major: next,
+            minor: 0,
+            patch: None,
+        };
+        if spec.contains(unknown) {
+            let at = places.spec.as_ref().unwrap_or(&places.start).clone();
+            self.problems.add(
+                Diagnostic::new(
+                    "version-unknown-yet",
+                    at,
+                    "this claims versions that are not known yet",
+                    format!("there is no pack for {next}.0"),
+                )
+                .hint(format!("end the range with `<{next}`")),
+            );
         }
     }
 
@@ -347,6 +381,23 @@ impl Linter<'_> {
             );
         }
         having
+    }
+
+    /// Checks what a requirement of a monitor is about.
+    fn about(&mut self, about: &About, monitor: &Monitor, scope: &Scope<'_>, packs: &[usize]) {
+        let Binding { requirement, span } = &about.requirement;
+        if !monitor.checks.iter().any(|binding| binding.requirement == *requirement) {
+            let title = format!("the monitor does not decide `{requirement}`");
+            self.problems.at("about-undecided", span, title, "not under `checks:`");
+            return;
+        }
+        let having = self.requirement(requirement, span, packs);
+        if self.observed_topic(&about.topic, packs, span) {
+            about
+                .pattern
+                .visit_terms(&mut |term| scope.check(term, packs, self.problems));
+            self.pattern(&about.pattern, &about.topic, packs, Some(&having));
+        }
     }
 
     /// Checks a selection and its requirements.

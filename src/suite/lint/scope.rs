@@ -12,7 +12,7 @@ use crate::suite::grammar::is_course_name;
 use crate::suite::model::{Step, Verb};
 
 /// The names of `time.`.
-const TIMES: [&str; 13] = [
+const TIMES: [&str; 14] = [
     "react",
     "slow",
     "event",
@@ -25,6 +25,7 @@ const TIMES: [&str; 13] = [
     "broker",
     "statePeriod",
     "settle",
+    "notice",
     "look",
 ];
 

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use serde_json::Value;
 
-use crate::pack::{Catalogue, Packs, Role, Shape, Version};
+use crate::pack::{Breakage, Catalogue, Ground, Packs, Role, Shape, Version};
 
 /// What the catalogue says about one requirement.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub trait Vocabulary {
     fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Rc<Shape>>;
     /// The members below a path.
     fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String>;
+    /// Every way to break a message of a topic; `None` if there is no such topic.
+    fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>>;
     /// A word of the vocabulary: `error.outdatedUpdate`.
     fn word(&self, pack: usize, path: &str) -> Option<Value>;
     /// A requirement.
@@ -105,6 +107,11 @@ impl Vocabulary for PackVocabulary<'_> {
     fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String> {
         let schema = self.packs.all().get(pack).and_then(|pack| pack.schema(topic));
         schema.map(|schema| schema.members(path)).unwrap_or_default()
+    }
+
+    fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>> {
+        let schema = self.packs.all().get(pack)?.schema(topic)?;
+        Some(schema.breakages(ground))
     }
 
     fn word(&self, pack: usize, path: &str) -> Option<Value> {

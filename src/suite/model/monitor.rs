@@ -22,6 +22,8 @@ pub struct Monitor {
     pub needs: Vec<Need>,
     /// What it decides.
     pub checks: Vec<Binding>,
+    /// What must have come by for a requirement to be decided; one that is not listed is decided by anything judged.
+    pub about: Vec<About>,
     /// Why anybody cares.
     pub why: String,
     /// The rule.
@@ -31,6 +33,17 @@ pub struct Monitor {
     pub hides: Vec<String>,
     /// The file.
     pub source: Arc<Source>,
+}
+
+/// What a requirement is about: without such a message nothing is known of it.
+#[derive(Clone, Debug)]
+pub struct About {
+    /// The requirement.
+    pub requirement: Binding,
+    /// Topic name or `mqtt/…`.
+    pub topic: String,
+    /// What a message must show.
+    pub pattern: Pattern,
 }
 
 /// What a monitor holds true.

@@ -98,33 +98,31 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
     });
     let last = record.end(HOSTILE, StepEnd::Broken(evil()));
 
-    let decide = |verdict| Decision {
-        requirement: evil(),
-        verdict,
-        clause: evil(),
-        place: format!("{HOSTILE}:3"),
-        witness: Some(witness),
-        message: evil(),
-        expected: Some(evil()),
-        nearest: Some(NearestMiss {
+    let decide = |verdict| {
+        let mut decision = Decision::new(&evil(), verdict, evil(), format!("{HOSTILE}:3"), evil());
+        decision.witness = Some(witness);
+        decision.expected = Some(evil());
+        decision.nearest = Some(NearestMiss {
             seq: witness,
             path: evil(),
             found: evil(),
             expected: evil(),
-        }),
-        waited: Some(Waited {
+        });
+        decision.waited = Some(Waited {
             seconds: 1.0,
             since: first,
             messages: 1,
-        }),
-        explanation: Some(format!("{HOSTILE}\n | {HOSTILE}\n | ^^^ {HOSTILE}")),
-        interpretation: Some(evil()),
+        });
+        decision.explanation = Some(format!("{HOSTILE}\n | {HOSTILE}\n | ^^^ {HOSTILE}"));
+        decision.interpretation = Some(evil());
+        decision
     };
     let tests = Verdict::ALL
         .into_iter()
         .map(Some)
         .chain([None])
         .map(|verdict| TestResult {
+            allowances: Vec::new(),
             id: format!("{HOSTILE}/{}", verdict.map_or("none", Verdict::word)),
             title: evil(),
             verdict,
@@ -132,6 +130,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             seconds: f64::MAX,
             reason: Some(evil()),
             maturity: "watchlist".to_owned(),
+            maturity_note: Some(evil()),
             journal: Some((first, last)),
             decisions: verdict.map(decide).into_iter().collect(),
             steps: vec![StepResult {
@@ -144,6 +143,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
                 took: Some(witness),
                 seconds: -1.0,
             }],
+            allowances: vec![evil()],
         })
         .collect::<Vec<_>>();
     let monitors = vec![MonitorResult {
@@ -182,12 +182,14 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
                 id: evil(),
                 verdict: Some(Verdict::Fail),
                 decided_by: vec![evil()],
+                verdicts: Vec::new(),
                 not_decided: None,
             },
             RequirementResult {
                 id: "X Y".to_owned(),
                 verdict: None,
                 decided_by: Vec::new(),
+                verdicts: Vec::new(),
                 not_decided: Some(evil()),
             },
         ],

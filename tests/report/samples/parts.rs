@@ -20,19 +20,10 @@ pub fn decision(
     witness: Option<u64>,
     message: &str,
 ) -> Decision {
-    Decision {
-        requirement: requirement.to_owned(),
-        verdict,
-        clause: clause.to_owned(),
-        place: format!("{TEST_FILE}:{line}"),
-        witness,
-        message: message.to_owned(),
-        expected: None,
-        nearest: None,
-        waited: None,
-        explanation: None,
-        interpretation: None,
-    }
+    let (clause, place) = (clause.to_owned(), format!("{TEST_FILE}:{line}"));
+    let mut decision = Decision::new(requirement, verdict, clause, place, message.to_owned());
+    decision.witness = witness;
+    decision
 }
 
 pub fn step(
@@ -58,6 +49,7 @@ pub fn step(
 
 pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Vec<Decision>) -> TestResult {
     TestResult {
+        allowances: Vec::new(),
         id: id.to_owned(),
         title: title.to_owned(),
         verdict: Some(verdict),
@@ -65,9 +57,11 @@ pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Ve
         seconds,
         reason: None,
         maturity: "reviewed".to_owned(),
+        maturity_note: Some("2026-11-22, section 6.6.4".to_owned()),
         journal: None,
         decisions,
         steps: Vec::new(),
+        allowances: Vec::new(),
     }
 }
 
@@ -92,7 +86,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
     for test in &tests {
         for decision in &test.decisions {
             let entry = decided.entry(&decision.requirement).or_default();
-            entry.0.add(decision.verdict);
+            entry.0.add(decision.verdict());
             entry.1.push(test.id.clone());
         }
     }
@@ -117,6 +111,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
                     (None, Some(_)) => vec!["header/id-rises".to_owned()],
                     (None, None) => Vec::new(),
                 },
+                verdicts: Vec::new(),
                 not_decided: match (found, passive, *how) {
                     (Some(_), _, _) | (_, Some(_), _) => None,
                     (_, _, "none") => {

@@ -148,42 +148,46 @@ pub fn fail() -> (RunResult, Journal) {
                 Some(refusal),
                 "a new error came 0.413 s after the late update",
             ),
-            Decision {
-                expected: Some(
-                    "errors: { $hasNew: { errorType: \"orderUpdateError\", errorLevel: \"WARNING\" } }".to_owned(),
-                ),
-                nearest: nearest("errors[0].errorType", "\"orderError\"", "\"orderUpdateError\""),
-                waited: Some(Waited {
-                    seconds: 31.0,
-                    since: late,
-                    messages: 4,
-                }),
-                explanation: Some(EXPLANATION.to_owned()),
-                interpretation: Some("The table of error types is read as binding.".to_owned()),
-                ..decision(
+            with(
+                decision(
                     "ORD-REJ-12",
                     Verdict::Fail,
                     "steps[4].assert",
                     33,
                     Some(refusal),
                     "no new error has errorType \"orderUpdateError\"",
-                )
-            },
-            Decision {
-                nearest: nearest(
-                    "errors[0].errorReferences",
-                    "[]",
-                    "an element with referenceKey \"orderUpdateId\"",
                 ),
-                ..decision(
+                |decision| {
+                    decision.expected = Some(
+                        "errors: { $hasNew: { errorType: \"orderUpdateError\", errorLevel: \"WARNING\" } }".to_owned(),
+                    );
+                    decision.nearest = nearest("errors[0].errorType", "\"orderError\"", "\"orderUpdateError\"");
+                    decision.waited = Some(Waited {
+                        seconds: 31.0,
+                        since: late,
+                        messages: 4,
+                    });
+                    decision.explanation = Some(EXPLANATION.to_owned());
+                    decision.interpretation = Some("The table of error types is read as binding.".to_owned());
+                },
+            ),
+            with(
+                decision(
                     "ORD-REJ-14",
                     Verdict::Warning,
                     "steps[4].assert",
                     35,
                     Some(refusal),
                     "the new error does not name the orderUpdateId",
-                )
-            },
+                ),
+                |decision| {
+                    decision.nearest = nearest(
+                        "errors[0].errorReferences",
+                        "[]",
+                        "an element with referenceKey \"orderUpdateId\"",
+                    );
+                },
+            ),
             decision(
                 "ORD-REJ-10",
                 Verdict::Pass,
@@ -289,4 +293,9 @@ pub fn fail() -> (RunResult, Journal) {
         "Firmware 4.2 reports orderError for every refusal; fixed in 4.3.".to_owned(),
     )]);
     (result, record.journal)
+}
+
+fn with(mut decision: Decision, shows: impl FnOnce(&mut Decision)) -> Decision {
+    shows(&mut decision);
+    decision
 }

@@ -17,8 +17,8 @@ fn nothing_is_sent_to_people() {
         );
         trace.judge("commands/modes").summary()
     };
-    assert_eq!(in_manual(1.0, "startPause"), Vec::<String>::new());
-    assert_eq!(in_manual(10.0, "startPause"), ["MODE-04"]);
+    assert_eq!(in_manual(0.5, "startPause"), Vec::<String>::new());
+    assert_eq!(in_manual(2.0, "startPause"), ["MODE-04"]);
     assert_eq!(in_manual(10.0, "stateRequest"), ["MODE-04 warning"]);
 }
 
@@ -114,8 +114,8 @@ fn a_factsheet_that_has_just_changed_is_not_held_against_anybody() {
         trace.commands("order", &order("o1", 0, 0, 2, 4));
         trace.judge("commands/limits").summary()
     };
-    assert_eq!(changed(1.0), Vec::<String>::new());
-    assert_eq!(changed(10.0), ["FACT-12"]);
+    assert_eq!(changed(0.5), Vec::<String>::new());
+    assert_eq!(changed(2.0), ["FACT-12"]);
 }
 
 #[test]

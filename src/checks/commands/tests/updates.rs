@@ -142,3 +142,72 @@ fn a_vehicle_between_nodes_goes_on_from_there() {
     assert_eq!(begins(Some(0.1), 0), ["ORD-CANCEL-17"]);
     assert_eq!(begins(Some(0.2), 1), ["ORD-CANCEL-17"]);
 }
+
+#[test]
+fn the_end_of_a_refused_update_is_no_stitching_node() {
+    let next = |refused: bool| {
+        let mut trace = begun();
+        trace.commands("order", &order("o1", 0, 0, 2, 4)).wait(2.0);
+        trace.shows(&under_way("o1", 0, 2)).wait(2.0);
+        trace.commands("order", &order("o1", 1, 2, 3, 5)).wait(0.2);
+        let mut state = under_way("o1", 0, 2);
+        if refused {
+            let reference = |key: &str, value: &str| json!({ "referenceKey": key, "referenceValue": value });
+            state["errors"] = json!([{
+                "errorType": "orderError", "errorLevel": "WARNING",
+                "errorReferences": [reference("orderId", "o1"), reference("orderUpdateId", "1")],
+            }]);
+        }
+        trace.shows(&state).wait(2.0);
+        trace.commands("order", &order("o1", 2, 3, 4, 5));
+        trace.judge("commands/updates").summary()
+    };
+    assert_eq!(next(true), ["ORD-UPD-05"]);
+    assert_eq!(next(false), Vec::<String>::new());
+}
+
+#[test]
+fn an_order_that_is_called_off_is_not_extended_unless_that_has_failed() {
+    let extended = |status: &str, later: f64| {
+        let mut trace = begun();
+        trace.commands("order", &order("o1", 0, 0, 2, 4)).wait(2.0);
+        trace.shows(&under_way("o1", 0, 2)).wait(2.0);
+        trace.commands(
+            "instantActions",
+            &json!({ "actions": [action("cancelOrder", "c1", &json!([]))] }),
+        );
+        let cancel =
+            json!({ "actionStates": [{ "actionId": "c1", "actionType": "cancelOrder", "actionStatus": status }] });
+        trace
+            .wait(later)
+            .shows(&merged(under_way("o1", 0, 2), &cancel))
+            .commands("order", &order("o1", 1, 2, 4, 5));
+        trace.judge("commands/base-kept").summary()
+    };
+    assert_eq!(extended("RUNNING", 1.0), ["ORD-CANCEL-01"]);
+    assert_eq!(extended("FAILED", 1.0), Vec::<String>::new());
+    // It was decided before.
+    assert_eq!(extended("RUNNING", 0.01), Vec::<String>::new());
+}
+
+#[test]
+fn an_order_is_not_over_while_one_of_its_actions_runs() {
+    let next = |status: &str| {
+        let mut trace = begun();
+        let mut first = order("o1", 0, 0, 2, 2);
+        first["nodes"][2]["actions"] = json!([action("pick", "a1", &pick())]);
+        trace.commands("order", &first).wait(2.0);
+        let done = json!({
+            "orderId": "o1", "lastNodeId": "n3", "lastNodeSequenceId": 4,
+            "actionStates": [
+                { "actionId": "a1", "actionType": "pick", "actionStatus": status },
+                { "actionId": "somebody-elses", "actionType": "beep", "actionStatus": "RUNNING" },
+            ],
+        });
+        trace.shows(&done).wait(2.0);
+        trace.commands("order", &order("o2", 0, 2, 3, 4));
+        trace.judge("commands/base-kept").summary()
+    };
+    assert_eq!(next("RUNNING"), ["ORD-CANCEL-01"]);
+    assert_eq!(next("FINISHED"), Vec::<String>::new());
+}

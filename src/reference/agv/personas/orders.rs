@@ -12,7 +12,6 @@ use crate::reference::agv::rejection::message_references;
 #[derive(Clone, Debug)]
 pub(in crate::reference::agv) struct Rejection {
     error_type: String,
-    fatal: bool,
     references: bool,
     left: u64,
 }
@@ -21,7 +20,6 @@ impl Rejection {
     pub(super) fn told(told: &Told<'_>) -> Option<Self> {
         Some(Self {
             error_type: told.text("errorType")?,
-            fatal: told.text("errorLevel").as_deref() == Some("FATAL"),
             references: told.flag("references").unwrap_or(true),
             left: told.count(u64::MAX),
         })
@@ -59,7 +57,8 @@ impl Agv {
         };
         self.errors.raise(ActiveError {
             error_type: rejection.error_type,
-            fatal: rejection.fatal,
+            // A refusal is a WARNING, whatever its type.
+            fatal: false,
             references: if rejection.references {
                 message_references(message)
             } else {

@@ -39,6 +39,12 @@ impl Agv {
         if self.config.line_guided() {
             set("distanceSinceLastNode", json!(self.distance_made()));
         }
+        if let Some((x, y)) = self.book.begun_at.filter(|_| has(F::DistanceNotReset)) {
+            set(
+                "distanceSinceLastNode",
+                json!(self.motion.pose(self.moment()).distance(x, y)),
+            );
+        }
         if has(F::DistanceNegative) {
             set("distanceSinceLastNode", json!(-1.0));
         }
@@ -51,14 +57,22 @@ impl Agv {
         }
         set("velocity", self.velocity_picture());
         set("loads", self.loads_picture());
-        set("driving", json!(self.shows_driving()));
+        set(
+            "driving",
+            if has(F::DrivingAsText) {
+                json!(self.shows_driving().to_string())
+            } else {
+                json!(self.shows_driving())
+            },
+        );
         if !has(F::PauseFlagMissing) {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             set("paused", json!(self.holds.pause || button || self.holds.emergency));
         }
+        let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
         set(
             "newBaseRequest",
-            json!(self.book.base_runs_low() || self.persona.wants_base || has(F::NewBaseRequestAlways)),
+            json!(self.book.base_runs_low() || self.persona.wants_base || always),
         );
         set(
             "actionStates",
@@ -77,7 +91,11 @@ impl Agv {
         } else {
             "operatingMode"
         };
-        set(key, json!(self.mode_literal()));
+        if has(F::ModeNumeric) {
+            set(key, json!(self.mode as u8));
+        } else if !has(F::ModeMissing) {
+            set(key, json!(self.mode_literal()));
+        }
         if !(has(F::ErrorsOmitted) && self.errors.is_empty()) {
             set("errors", self.errors.picture(self.faults));
         }
@@ -97,6 +115,13 @@ impl Agv {
         if !has(F::SafetyStateMissing) {
             set("safetyState", self.safety());
         }
+        if has(F::EmptyListsNull) {
+            let lists = ["nodeStates", "edgeStates", "actionStates"];
+            let empty = |state: &Map<String, Value>, list: &str| state.get(list) == Some(&json!([]));
+            for list in lists.into_iter().filter(|list| empty(&state, list)).collect::<Vec<_>>() {
+                state.insert(list.to_owned(), Value::Null);
+            }
+        }
         state
     }
 
@@ -109,15 +134,27 @@ impl Agv {
 
     fn shows_driving(&self) -> bool {
         let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
-        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported))
+        let turning = self.motion.is_turning() && self.faults.has(F::TurnsWithoutDriving);
+        let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
+        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning)
+            || idle
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
+            || (self.book.has_order() && self.faults.has(F::DrivingKept))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
     }
 
+    /// `manual-drives-unseen`: drives a way it does not show.
+    fn hides_route(&self) -> bool {
+        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen)
+    }
+
     fn node_states(&self, complete: bool) -> Value {
+        if self.hides_route() {
+            return json!([]);
+        }
         let left = self.book.left.0.as_ref().filter(|_| {
             (!complete && self.faults.has(F::TraversedNodesListed))
-                || (complete && self.book.has_order() && self.faults.has(F::FinishedOrderListed))
+                || (complete && self.book.has_order() && self.keeps_last_node())
         });
         let shown = self
             .book
@@ -128,6 +165,10 @@ impl Agv {
             .chain(shown)
             .map(|stop| self.node_state(stop))
             .collect()
+    }
+
+    fn keeps_last_node(&self) -> bool {
+        self.faults.has(F::FinishedOrderListed) || self.faults.has(F::LastRouteListed)
     }
 
     /// The node traversed last, as if it were still ahead (`route-repeated-on-request`).
@@ -155,7 +196,11 @@ impl Agv {
     }
 
     fn edge_states(&self, complete: bool) -> Value {
-        let stays = self.faults.has(F::EdgeStatesStay) && !complete;
+        if self.hides_route() {
+            return json!([]);
+        }
+        let kept = self.faults.has(F::LastEdgeListed) || self.faults.has(F::LastRouteListed);
+        let stays = (self.faults.has(F::EdgeStatesStay) && !complete) || (kept && complete && self.book.has_order());
         let left = self.book.left.1.as_ref().filter(|_| stays);
         let shown = self
             .book
@@ -201,6 +246,12 @@ impl Agv {
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
             status => status.literal(),
         };
+        let lower = self.faults.has(F::StatusLowerCase);
+        let status = if lower {
+            status.to_ascii_lowercase()
+        } else {
+            status.to_owned()
+        };
         let mut picture = json!({
             "actionId": action.request.id,
             "actionType": action.request.action_type,
@@ -214,7 +265,14 @@ impl Agv {
 
     /// agvPosition, also for the visualization (STATE-MSG-05).
     pub(super) fn position_picture(&self) -> Value {
-        let pose = self.motion.pose(self.moment());
+        let mut pose = self.motion.pose(self.moment());
+        if let Some(start) = self
+            .config
+            .node(&self.config.start_node)
+            .filter(|_| self.faults.has(F::PositionFrozen))
+        {
+            (pose.x, pose.y) = (start.x, start.y);
+        }
         let theta = if self.faults.has(F::DegreesReported) {
             pose.theta.to_degrees() + 180.0
         } else {
@@ -335,6 +393,9 @@ impl Agv {
             () if stopped => "MANUAL",
             () if self.holds.field => "AUTOACK",
             () if self.faults.has(F::EmergencyStopSpelled) => "Off",
+            () if self.faults.has(F::EmergencyStopNull) => {
+                return json!({ "eStop": null, "fieldViolation": self.holds.field });
+            }
             () => "NONE",
         };
         json!({ "eStop": emergency_stop, "fieldViolation": self.holds.field })

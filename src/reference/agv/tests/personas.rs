@@ -135,7 +135,7 @@ fn orders_are_ignored_and_rejected_as_told() {
     assert!(bench.error_types().is_empty());
     bench.command(
         "reject-updates",
-        json!({ "errorType": "orderUpdateError", "errorLevel": "FATAL", "references": false }),
+        json!({ "errorType": "orderUpdateError", "references": false }),
     );
     bench.order(order("o3", 1, 2, "n2 n3"));
     let state = bench.state();
@@ -144,7 +144,7 @@ fn orders_are_ignored_and_rejected_as_told() {
             &state["errors"][0]["errorLevel"],
             &state["errors"][0]["errorReferences"]
         ),
-        (&json!("FATAL"), &json!([]))
+        (&json!("WARNING"), &json!([]))
     );
     assert_eq!(state["orderUpdateId"], 0);
     bench.command("well-behaved", json!({}));

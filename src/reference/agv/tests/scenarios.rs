@@ -1,7 +1,7 @@
 //! Short scripts that between them make every fault show.
 
 use super::*;
-use crate::reference::agv::tests::curves;
+use crate::reference::agv::tests::{curves, guesses};
 
 type Scenario = (AgvConfig, fn(&mut Bench));
 
@@ -34,6 +34,9 @@ pub(super) fn all() -> Vec<Scenario> {
         (config(), busy_vehicle),
         (config(), refused_orders),
         (small, refused_orders),
+        (config(), guesses::broken_orders),
+        (config(), guesses::broken_instant_actions),
+        (many_maps(), guesses::another_version),
         (config(), orders_at_the_start),
         (config(), cancelled_order),
         (bound, cancelled_order),

@@ -25,6 +25,9 @@ pub(in crate::reference::agv) fn reworded(
     if name == "state" {
         state(tolerances, &mut message, even);
     }
+    if has(T::SinglePrecision) && matches!(name, "state" | "visualization") {
+        in_single_precision(&mut message);
+    }
     if has(T::VendorFields) {
         with_vendor_fields(&mut message);
     }
@@ -86,6 +89,20 @@ fn add_optional(state: &mut Map<String, Value>) {
     if let Some(Value::Object(battery)) = state.get_mut("batteryState") {
         battery.insert("batteryVoltage".into(), json!(48.2));
         battery.insert("batteryHealth".into(), json!(98));
+    }
+}
+
+/// Where the vehicle is, as a 32-bit float holds it: pi is a little more than pi.
+fn in_single_precision(message: &mut Map<String, Value>) {
+    let Some(Value::Object(position)) = message.get_mut("agvPosition") else {
+        return;
+    };
+    for name in ["x", "y", "theta"] {
+        let Some(value) = position.get_mut(name) else { continue };
+        let Some(number) = value.as_f64() else { continue };
+        #[expect(clippy::cast_possible_truncation, reason = "that is what it is about")]
+        let single = number as f32;
+        *value = json!(f64::from(single));
     }
 }
 

@@ -1,0 +1,155 @@
+//! Order updates: whether one continues the order, and taking it over (rows 8 and 10 of figure 8).
+
+use super::Agv;
+use super::actions::{Action, Origin, Status};
+use super::faults::FaultName as F;
+use super::order_message::{Node, Order};
+use super::rejection::{Refusal, Rule};
+
+impl Agv {
+    /// Rows 8 and 10: whether the update continues the order.
+    pub(super) fn check_update(&self, order: &mut Order) -> Result<(), Refusal> {
+        let busy = self.is_busy();
+        let cancelled = self.book.cancel.is_some() || self.book.cancelled;
+        let ended = self.book.cancel.is_some() && self.faults.has(F::CancelEndedByUpdate);
+        if cancelled && !ended && !self.faults.has(F::CancelledOrderRevived) {
+            return Err(Refusal::new(Rule::BrokenUpdate, "the order was cancelled"));
+        }
+        if self.refuses_updates_now() {
+            return Err(Refusal::new(Rule::BrokenUpdate, "no update is taken now"));
+        }
+        if self.faults.has(F::CompletedNotContinued) && !busy {
+            return Err(Refusal::new(Rule::BrokenUpdate, "the order is complete"));
+        }
+        let first = &order.nodes[0];
+        let joins = if busy || cancelled {
+            (&first.id, first.sequence_id) == (&self.book.base_end.0, self.book.base_end.1)
+                || self.faults.has(F::RunningUpdateGapAccepted)
+                || (self.faults.has(F::UpdateJoinedByNumber) && first.sequence_id == self.book.base_end.1)
+                || self.faults.has(F::OutdatedUpdateTakenOver)
+        } else {
+            (&first.id, first.sequence_id) == (&self.book.last_node, self.book.last_sequence)
+                || self.faults.has(F::CompletedUpdateGapAccepted)
+        };
+        if !joins {
+            let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
+            return Err(refusal.naming("nodeId", &first.id));
+        }
+        self.check_ability(order, 1)
+    }
+
+    /// Whether a faulty vehicle does not take an update that continues its order.
+    fn refuses_updates_now(&self) -> bool {
+        let acting = || {
+            self.actions
+                .iter()
+                .any(|action| action.of_order() && action.status.is_active())
+        };
+        (self.faults.has(F::OnlyFirstUpdate) && self.book.updated)
+            || (self.faults.has(F::UpdateRefusedWhileActing) && acting())
+            || (self.faults.has(F::UpdateRefusedWhilePaused) && self.holds.pause)
+            || (self.faults.has(F::UpdateRefusedAfterCut) && self.book.cut)
+    }
+
+    /// Rows 8 and 10: takes over an update.
+    pub(super) fn continue_with(&mut self, mut order: Order) {
+        self.book.continued |= !self.is_busy();
+        self.book.cancelled = false;
+        if let Some(cancel) = self.book.cancel.take()
+            && let Some(action) = self.actions.get_mut(&cancel.action_id)
+        {
+            action.end(Status::Finished);
+        }
+        self.book.updated = true;
+        self.report.update_received = true;
+        let keep = if order.nodes.iter().any(|node| !node.released) {
+            self.faults.has(F::HorizonAppended)
+        } else {
+            self.faults.has(F::HorizonKept)
+        };
+        if !keep {
+            self.drop_horizon();
+        }
+        if self.faults.has(F::UpdateReplacesBase) {
+            while self.book.nodes.len() > 1 {
+                self.book.nodes.pop_front();
+                self.book.edges.pop_front();
+            }
+        }
+        if !self.faults.has(F::UpdateIdKept) {
+            self.book.update_id = order.update_id;
+        }
+        self.continue_actions_wrongly(&mut order);
+        let mut nodes = order.nodes.into_iter();
+        let joint = nodes.next();
+        if let Some(joint) = joint.filter(|_| self.faults.has(F::StitchingNodeOverwritten)) {
+            self.overwrite_joint(joint);
+        }
+        self.append(nodes.collect(), order.edges);
+        self.book.dropped.clear();
+    }
+
+    /// The horizon goes, and the actions that wait there.
+    fn drop_horizon(&mut self) {
+        let gone = self.book.drop_horizon();
+        let of_horizon = |action: &Action| match action.origin {
+            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => gone.contains(&sequence_id),
+            Origin::Instant => false,
+        };
+        let waiting = self.actions.iter().filter(|action| of_horizon(action));
+        self.book.dropped = waiting.map(|action| action.request.id.clone()).collect();
+        if self.faults.has(F::HorizonActionsStay) {
+            // Nothing ever triggers them.
+            let stranded = self.actions.iter_mut().filter(|action| of_horizon(action));
+            stranded.for_each(|action| action.origin = Origin::Node(u32::MAX));
+        } else if !self.faults.has(F::HorizonActionsInherited) && !self.faults.has(F::ReleasedActionsDoubled) {
+            self.actions.retain(|action| !of_horizon(action));
+        }
+    }
+
+    /// What a faulty vehicle does to its actions, or to those of an update, when it takes the update over.
+    fn continue_actions_wrongly(&mut self, order: &mut Order) {
+        if self.faults.has(F::UpdateEdgeActionsLost) {
+            order.edges.iter_mut().for_each(|edge| edge.actions.clear());
+        }
+        if self.faults.has(F::UpdateActionsLost) {
+            order.nodes.iter_mut().skip(1).for_each(|node| node.actions.clear());
+            order.edges.iter_mut().for_each(|edge| edge.actions.clear());
+        }
+        if self.faults.has(F::UpdateClearsActionStates) {
+            self.actions
+                .retain(|action| !action.of_order() || !action.status.is_terminal());
+        }
+        let here = Origin::Node(self.book.last_sequence);
+        for action in self.actions.iter_mut().filter(|action| action.of_order()) {
+            if self.faults.has(F::UpdateEndsActions) && action.status.is_active() {
+                action.end(Status::Failed);
+            }
+            if self.faults.has(F::UpdateRepeatsActions) && action.origin == here && action.status.is_terminal() {
+                action.end(Status::Waiting);
+            }
+        }
+        if self.faults.has(F::UpdateRepeatsActions) {
+            self.actions.trigger(here, self.faults);
+        }
+        if self.faults.has(F::UpdateEndsPause) {
+            self.set_holds(|holds| holds.pause = false);
+        }
+    }
+
+    /// `stitching-node-overwritten`: what the first transmission said is forgotten.
+    fn overwrite_joint(&mut self, joint: Node) {
+        let origin = Origin::Node(joint.sequence_id);
+        let open = self
+            .book
+            .nodes
+            .iter()
+            .any(|stop| stop.node.sequence_id == joint.sequence_id);
+        self.actions
+            .retain(|action| action.origin != origin || action.status.is_terminal());
+        self.push_actions(joint.actions, origin);
+        if !open {
+            self.actions.trigger(origin, self.faults);
+        }
+    }
+}

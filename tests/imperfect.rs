@@ -1,0 +1,141 @@
+//! A vehicle with one lasting mistake is judged all the same: every test that is not about the mistake is decided as
+//! without it.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use vda5050_tck::pack::Pack;
+use vda5050_tck::reference::agv::FAULTS;
+use vda5050_tck::report::result::RunResult;
+use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::verdict::Verdict;
+
+/// Mistakes that show in every state from some moment on.
+const LASTING: [&str; 19] = [
+    "cancel-leaves-nodes",
+    "cancel-leaves-waiting",
+    "cancel-never-finished",
+    "driving-as-text",
+    "driving-at-decision-point",
+    "driving-kept",
+    "edge-states-stay",
+    "emergency-stop-null",
+    "emergency-stop-spelled",
+    "empty-lists-null",
+    "finished-order-listed",
+    "last-edge-listed",
+    "last-route-listed",
+    "mode-lower-case",
+    "mode-missing",
+    "mode-numeric",
+    "safety-state-missing",
+    "state-request-stuck",
+    "traversed-nodes-listed",
+];
+
+/// Tests that depend on what is wrong, with the reason: fault, test (a `*` at its end stands for anything), reason.
+const DEPENDENT: &str = include_str!("imperfect/dependent.tsv");
+
+fn run_all(library: &Library, pack: &Pack, requests: &[VirtualRun]) -> Vec<RunResult> {
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(BTreeMap::new());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let at = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(request) = requests.get(at) else { break };
+                    let finished = run_silently(library, pack, request.clone()).unwrap();
+                    results.lock().unwrap().insert(at, finished.result);
+                }
+            });
+        }
+    });
+    results.into_inner().unwrap().into_values().collect()
+}
+
+fn verdicts(result: &RunResult) -> BTreeMap<&str, Option<Verdict>> {
+    let tests = result.tests.iter();
+    tests.map(|test| (test.id.as_str(), test.verdict)).collect()
+}
+
+/// Whether everything a test found is what the fault is about.
+fn is_about(result: &RunResult, test: &str, breaks: &[&str]) -> bool {
+    let found = result.tests.iter().find(|result| result.id == test);
+    found.is_some_and(|found| {
+        let mut bad = found
+            .decisions
+            .iter()
+            .filter(|decision| decision.verdict() > Verdict::Inconclusive);
+        let first = bad.next();
+        first.is_some()
+            && first
+                .into_iter()
+                .chain(bad)
+                .all(|one| breaks.contains(&one.requirement.as_str()))
+    })
+}
+
+#[test]
+fn every_test_that_is_not_about_a_lasting_mistake_is_decided_as_without_it() {
+    let library = Library::load(None).unwrap_or_else(|all| panic!("{all:?}"));
+    let pack = library.rules.packs.get("2.1.0").unwrap();
+    let mut requests = vec![VirtualRun::of(&library, pack)];
+    requests.extend(LASTING.iter().map(|fault| VirtualRun {
+        faults: vec![(*fault).to_owned()],
+        ..VirtualRun::of(&library, pack)
+    }));
+    let results = run_all(&library, pack, &requests);
+    let without = verdicts(&results[0]);
+    let rows: Vec<Vec<&str>> = DEPENDENT
+        .lines()
+        .filter(|line| !line.starts_with('#') && !line.is_empty())
+        .map(|line| line.split('\t').collect())
+        .collect();
+    let mut needed = BTreeSet::new();
+    let mut wrong = String::new();
+    for (fault, result) in LASTING.iter().zip(&results[1..]) {
+        let breaks = FAULTS.iter().find(|one| one.name == *fault).unwrap().breaks;
+        for (test, verdict) in verdicts(result) {
+            if without.get(test) == Some(&verdict) || is_about(result, test, breaks) {
+                continue;
+            }
+            let depends = |row: &Vec<&str>| {
+                row[0] == *fault
+                    && row[1]
+                        .strip_suffix('*')
+                        .map_or(row[1] == test, |start| test.starts_with(start))
+            };
+            match rows.iter().position(depends) {
+                Some(row) => _ = needed.insert(row),
+                None => wrong.push_str(&format!("{fault}\t{test}\t{verdict:?}\n")),
+            }
+        }
+    }
+    let stale = (0..rows.len()).filter(|row| !needed.contains(row));
+    wrong.extend(stale.map(|row| format!("not needed: {}\n", rows[row].join("\t"))));
+    assert!(wrong.is_empty(), "decided otherwise:\n{wrong}");
+}
+
+#[test]
+fn what_was_read_over_stands_at_the_test() {
+    let library = Library::load(None).unwrap_or_else(|all| panic!("{all:?}"));
+    let pack = library.rules.packs.get("2.1.0").unwrap();
+    let request = VirtualRun {
+        faults: vec!["finished-order-listed".to_owned()],
+        ..VirtualRun::of(&library, pack)
+    };
+    let finished = run_silently(&library, pack, request).unwrap();
+    let told = finished
+        .result
+        .tests
+        .iter()
+        .filter(|test| !test.allowances.is_empty())
+        .count();
+    assert!(told > 50, "{told}");
+    let entries = finished.recorder.journal().entries();
+    let again = vda5050_tck::judge::judge(&library.rules, entries).unwrap();
+    assert_eq!(again, finished.result, "judged again, it comes to the same");
+}

@@ -1,0 +1,116 @@
+//! Journals that must be judged the same for ever.
+//!
+//! Every folder of `fixtures/journals/` holds what happened in `journal.jsonl`, and in `expected.json` why it is kept and
+//! what has to come out. A false accusation that was mended, or a fault that was missed once, ends up here: no reference
+//! device has to be able to do it again. `DEVELOPING.md` says how a case is added.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test may fail by panicking"
+)]
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Deserialize;
+use vda5050_tck::judge::judge;
+use vda5050_tck::report::result::RunResult;
+use vda5050_tck::run::{Library, decided};
+use vda5050_tck::verdict::{Accumulated, Verdict};
+
+/// Requirement id to verdict; nothing means that it must not be decided.
+type Verdicts = BTreeMap<String, Option<Verdict>>;
+
+/// What has to come out. What is not mentioned may come out one way or the other.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Expected {
+    /// What the case is about, and why it must be judged so.
+    why: String,
+    /// By test or monitor: the worst that it decides about a requirement.
+    #[serde(default)]
+    by: BTreeMap<String, Verdicts>,
+    /// The worst that is decided about a requirement by anything.
+    #[serde(default)]
+    requirements: Verdicts,
+    /// Whether nothing at all may be found to be broken, which the rest of the file then need not repeat.
+    #[serde(default)]
+    accuses_nobody: bool,
+}
+
+fn worst(result: &RunResult, requirement: &str, by: Option<&str>) -> Option<Verdict> {
+    let all = decided(result).into_iter();
+    let own = all.filter(|(decider, _)| {
+        let place = decider.place.split(' ').next();
+        decider.requirement == requirement && by.is_none_or(|by| place == Some(by))
+    });
+    own.map(|(_, verdict)| verdict).collect::<Accumulated>().get()
+}
+
+fn differences(result: &RunResult, expected: &Expected) -> String {
+    let mut text = String::new();
+    let mut hold = |by: Option<&str>, verdicts: &Verdicts| {
+        for (requirement, wanted) in verdicts {
+            let found = worst(result, requirement, by);
+            if found != *wanted {
+                let word = |verdict: Option<Verdict>| verdict.map_or("not decided", Verdict::word);
+                let by = by.map(|by| format!(" by {by}")).unwrap_or_default();
+                let _ = writeln!(text, "  {requirement}{by}: {}, expected {}", word(found), word(*wanted));
+            }
+        }
+    };
+    for (by, verdicts) in &expected.by {
+        hold(Some(by), verdicts);
+    }
+    hold(None, &expected.requirements);
+    if expected.accuses_nobody {
+        for (decider, verdict) in decided(result) {
+            if matches!(verdict, Verdict::Fail | Verdict::Warning) {
+                let _ = writeln!(
+                    text,
+                    "  {} by {}: {}",
+                    decider.requirement,
+                    decider.place,
+                    verdict.word()
+                );
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn journals_are_judged_as_they_always_were() {
+    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/journals");
+    let mut cases: Vec<_> = std::fs::read_dir(&folder)
+        .expect("fixtures/journals")
+        .map(|entry| entry.expect("a folder").path())
+        .filter(|path| path.is_dir())
+        .collect();
+    cases.sort();
+    assert!(!cases.is_empty());
+    let mut wrong = String::new();
+    for case in cases {
+        let name = case.file_name().unwrap().to_string_lossy().into_owned();
+        let expected = std::fs::read_to_string(case.join("expected.json")).expect("expected.json");
+        let expected: Expected = serde_json::from_str(&expected).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(expected.why.len() > 30, "{name} does not say why");
+        assert!(
+            expected.accuses_nobody || !expected.by.is_empty() || !expected.requirements.is_empty(),
+            "{name} expects nothing"
+        );
+        let saved = vda5050_tck::journal::file::read(&case.join("journal.jsonl")).expect("a journal");
+        let result = judge(&library.rules, saved.journal.entries()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let found = differences(&result, &expected);
+        if !found.is_empty() {
+            let _ = write!(wrong, "{name}: {}\n{found}", expected.why);
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "these are judged otherwise than they have to be:\n{wrong}"
+    );
+}
