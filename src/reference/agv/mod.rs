@@ -7,6 +7,8 @@
 //! liberty a good vehicle may take in `tolerances`; both are found in the code by name. As a mock vehicle before a
 //! master control it also has `personas`: deviations a test switches on and off while it runs.
 
+#[macro_use]
+mod blind_faults;
 mod ability;
 mod acceptance;
 mod action_kinds;
@@ -47,9 +49,9 @@ use crate::reference::{ConnectOptions, Device, Input, Output};
 
 pub use commands::COMMANDS;
 pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
-pub use faults::{FAULTS, FaultName, find};
+pub use faults::{BLIND_FAULTS, FAULTS, FaultName, find};
 pub use lapses::{LAPSES, lapse};
-pub use tolerances::{TOLERANCES, Tolerance, ToleranceName};
+pub use tolerances::{BLIND_TOLERANCES, TOLERANCES, Tolerance, ToleranceName};
 
 use actions::Actions;
 use book::Book;

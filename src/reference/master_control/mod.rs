@@ -6,6 +6,8 @@
 //! made in `actions`, and `maps` rolls maps out; `commands` is what people ask for; `publish` and `wording` speak to
 //! the broker. Every deviation from good behaviour is declared in `faults`, every liberty in `tolerances`.
 
+#[macro_use]
+mod blind_faults;
 mod actions;
 mod cancel;
 mod commands;
@@ -35,9 +37,9 @@ use crate::reference::{ConnectOptions, Device, Input, Output};
 
 pub use commands::COMMANDS;
 pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig};
-pub use faults::{FAULTS, FaultName, find};
+pub use faults::{BLIND_FAULTS, FAULTS, FaultName, find};
 pub use lapses::{LAPSES, lapse};
-pub use tolerances::{TOLERANCES, ToleranceName};
+pub use tolerances::{BLIND_TOLERANCES, TOLERANCES, ToleranceName};
 
 use faults::Faults;
 use publish::Connection;
