@@ -7,6 +7,7 @@ use super::device::check_faults;
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::pack::Role;
+use crate::reference::Fault;
 use crate::run::{BuiltIn, Library, Qualification, qualify_tests};
 
 /// `qualify`.
@@ -18,7 +19,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
     };
     // A fault or a test belongs to one side; the other one is left out without a word.
     let known = |role: Role| {
-        let of_role = |name: &String| BuiltIn::faults(role).iter().any(|fault| fault.name == name);
+        let of_role = |name: &String| every_fault(role).any(|fault| fault.name == name);
         arguments.fault.iter().all(of_role)
     };
     let with_faults: Vec<Role> = roles.iter().copied().filter(|role| known(*role)).collect();
@@ -29,18 +30,21 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         Some(wanted) => vec![super::pack(&library, Some(wanted))?],
         None => library.rules.packs.all().to_vec(),
     };
-    let whole = arguments.tests.is_empty() && arguments.fault.is_empty();
+    let whole = arguments.tests.is_empty() && arguments.fault.is_empty() && !arguments.blind;
     let mut refused = None;
     let mut jobs = Vec::new();
     for (role, pack) in with_faults
         .iter()
         .flat_map(|role| packs.iter().map(move |pack| (*role, pack)))
     {
-        let faults: Vec<_> = BuiltIn::faults(role)
-            .iter()
-            .filter(|fault| arguments.fault.is_empty() || arguments.fault.iter().any(|name| name == fault.name))
-            .copied()
-            .collect();
+        let faults: Vec<_> = match (arguments.blind, arguments.fault.as_slice()) {
+            (true, []) => BuiltIn::blind_faults(role).to_vec(),
+            (false, []) => BuiltIn::faults(role).to_vec(),
+            (_, named) => {
+                let is_named = |fault: &&Fault| named.iter().any(|name| name == fault.name);
+                every_fault(role).filter(is_named).copied().collect()
+            }
+        };
         let all = library.tests(role, &pack.id);
         match super::select::select(&all, &arguments.tests) {
             Ok(tests) => jobs.push((role, pack, tests, faults)),
@@ -83,6 +87,11 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         Some(problem) if !any => Err(problem.into()),
         _ => Ok(exit),
     }
+}
+
+/// All faults of a reference device, those of blind rounds included.
+fn every_fault(role: Role) -> impl Iterator<Item = &'static Fault> {
+    BuiltIn::faults(role).iter().chain(BuiltIn::blind_faults(role))
 }
 
 fn page(outcome: &Qualification, complete: bool) -> String {

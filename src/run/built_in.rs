@@ -126,6 +126,15 @@ impl BuiltIn {
         }
     }
 
+    /// Its faults of blind rounds, which the suites need not find yet.
+    #[must_use]
+    pub fn blind_faults(role: Role) -> &'static [Fault] {
+        match role {
+            Role::Agv => crate::reference::agv::BLIND_FAULTS,
+            Role::MasterControl => crate::reference::master_control::BLIND_FAULTS,
+        }
+    }
+
     /// The liberties it can take.
     #[must_use]
     pub fn tolerances(role: Role) -> &'static [Tolerance] {

@@ -130,6 +130,10 @@ pub struct Qualify {
     /// Only this side's [agv, master-control]; both unless said
     #[arg(long, value_name = "ROLE", value_parser = super::inspect::parse_role)]
     pub role: Option<crate::pack::Role>,
+    /// The faults of blind rounds that the suites need not find yet, instead of the proven ones
+    #[arg(long)]
+    pub blind: bool,
+
     /// Only these faults; may be repeated
     #[arg(long, value_name = "NAME")]
     pub fault: Vec<String>,

@@ -93,6 +93,12 @@ impl Agv {
             self.book.nodes.iter().filter(|stop| stop.node.released).count()
         };
         let too_many_nodes = left + order.nodes.len() > limit;
+        let too_many_actions = too_many_actions && !self.faults.has(F::R1SurplusActionsDropped);
+        if self.faults.has(F::R1SurplusActionsDropped) {
+            let most = self.config.max_actions;
+            order.nodes.iter_mut().for_each(|node| node.actions.truncate(most));
+            order.edges.iter_mut().for_each(|edge| edge.actions.truncate(most));
+        }
         if self.faults.has(F::MemoryUnchecked) {
             order.nodes.truncate(limit);
             order.edges.truncate(limit.saturating_sub(1));
@@ -195,8 +201,10 @@ impl Agv {
             if listed_refused || (!kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked)) {
                 return unable("the action is not possible here", &request.path);
             }
-            let refusal = action_kinds::refusal(kind, request, true);
-            if let Some((key, reason)) = refusal.filter(|_| !self.faults.has(F::ParametersUnchecked)) {
+            let found = action_kinds::refusal(kind, request, true)
+                .filter(|(_, reason)| !(reason.ends_with("missing") && self.faults.has(F::R1MissingParameterTaken)))
+                .filter(|_| !self.faults.has(F::ParametersUnchecked));
+            if let Some((key, reason)) = found {
                 let refusal = Refusal::at_field(Rule::Unable, reason, &request.path).naming("actionParameter", key);
                 return Err(refusal.naming("actionId", &request.id));
             }

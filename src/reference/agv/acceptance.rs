@@ -12,6 +12,7 @@ use super::faults::FaultName as F;
 use super::order_message::{ActionRequest, Edge, Node, Order};
 use super::read::Defect;
 use super::rejection::{Refusal, Rule};
+use super::tolerances::ToleranceName as T;
 use crate::reference::Output;
 
 /// What to do with an order.
@@ -38,6 +39,9 @@ impl Agv {
             serde_json::from_slice::<Value>(payload)
                 .map_err(|_| Refusal::new(Rule::Malformed, "the message is not JSON"))
         };
+        if message.is_err() && self.faults.has(F::R1UnreadableOrderDropped) {
+            return;
+        }
         let result = match &message {
             Err(refusal) => Err(refusal.clone()),
             Ok(message) => self.order_decided(message),
@@ -57,7 +61,8 @@ impl Agv {
 
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
         let taken = super::leniency::taken(message, self.faults);
-        let mut order = Order::read(&taken)?;
+        let mended = self.mended(&taken);
+        let mut order = Order::read(mended.as_ref().unwrap_or(&taken))?;
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
@@ -67,7 +72,9 @@ impl Agv {
                 Some("startNodeId" | "endNodeId") => self.faults.has(F::EdgeEndsUnchecked),
                 _ => false,
             };
-            unchecked || (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
+            unchecked
+                || (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
+                || (self.faults.has(F::R1SplitBaseTaken) && defect.reason == "is true behind the horizon's begin")
         };
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
@@ -79,12 +86,75 @@ impl Agv {
         match self.decide(&mut order)? {
             Decision::Begin => self.begin(order),
             Decision::Continue => self.continue_with(order),
-            Decision::Discard => return Ok(()),
+            Decision::Discard => {
+                self.seen_again();
+                return Ok(());
+            }
         }
         if self.faults.has(F::EchoesOrder) {
             self.echo_order(message);
         }
         Ok(())
+    }
+
+    /// A malformed order as a faulty vehicle reads it all the same.
+    fn mended(&self, message: &Value) -> Option<Value> {
+        let (numbers, blocking) = (
+            self.faults.has(F::R1NumbersReadFromText),
+            self.faults.has(F::R1BlockingTypeAssumed),
+        );
+        if !numbers && !blocking {
+            return None;
+        }
+        let mut message = message.clone();
+        if numbers {
+            number_from_text(&mut message, "orderUpdateId");
+        }
+        for list in ["nodes", "edges"] {
+            for element in message
+                .get_mut(list)
+                .and_then(Value::as_array_mut)
+                .into_iter()
+                .flatten()
+            {
+                if numbers {
+                    number_from_text(element, "sequenceId");
+                }
+                let actions = element.get_mut("actions").and_then(Value::as_array_mut);
+                for action in actions.into_iter().flatten().filter_map(Value::as_object_mut) {
+                    if blocking {
+                        action.entry("blockingType").or_insert_with(|| Value::from("NONE"));
+                    }
+                }
+            }
+        }
+        Some(message)
+    }
+
+    /// What a faulty vehicle does with an order it knows already.
+    fn seen_again(&mut self) {
+        if self.faults.has(F::R1DuplicateClearsErrors) {
+            self.errors.new_order();
+        }
+        if self.is_busy() && self.faults.has(F::R1DuplicateRepeatsActions) {
+            self.repeat_actions(self.book.last_sequence);
+        }
+    }
+
+    /// Does the ended actions of a node once more.
+    pub(super) fn repeat_actions(&mut self, sequence_id: u32) {
+        let origin = Origin::Node(sequence_id);
+        let mut repeated = false;
+        for action in self.actions.iter_mut().filter(|action| action.origin == origin) {
+            if action.status == super::actions::Status::Finished {
+                action.status = super::actions::Status::Waiting;
+                action.result = None;
+                repeated = true;
+            }
+        }
+        if repeated {
+            self.actions.trigger(origin, self.faults);
+        }
     }
 
     /// The decision table of figure 8, with the gates it leaves out.
@@ -97,7 +167,8 @@ impl Agv {
             let again = self.faults.has(F::DuplicateExecuted) && !self.is_busy();
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
-        let compared = !new || self.faults.has(F::UpdateIdsComparedAcrossOrders);
+        let late = self.faults.has(F::R1OutdatedContinuesCompleted) && !self.is_busy();
+        let compared = (!new && !late) || (new && self.faults.has(F::UpdateIdsComparedAcrossOrders));
         if compared && order.update_id < self.book.update_id && !self.faults.has(F::OutdatedUpdateTakenOver) {
             return Err(Refusal::new(
                 Rule::Outdated,
@@ -133,7 +204,8 @@ impl Agv {
     }
 
     fn check_new(&self, order: &mut Order) -> Result<(), Refusal> {
-        if self.is_busy() {
+        let replaced = self.holds.pause && self.faults.has(F::R1NewOrderTakenInPause);
+        if self.is_busy() && !replaced {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
         if self.faults.has(F::DeadAfterCancel) && self.book.cancelled {
@@ -155,7 +227,8 @@ impl Agv {
             return Err(Refusal::new(Rule::Unable, "the order is too short"));
         }
         self.check_ability(order, 0)?;
-        if self.near(&order.nodes[0]) || self.faults.has(F::FarOrderAccepted) {
+        let stranded = self.book.cancelled && self.faults.has(F::R1FarOrderTakenAfterCancel);
+        if self.near(&order.nodes[0]) || stranded || self.faults.has(F::FarOrderAccepted) {
             return Ok(());
         }
         Err(Refusal::new(Rule::StartOutOfRange, "the first node is out of reach").naming("nodeId", &order.nodes[0].id))
@@ -193,6 +266,8 @@ impl Agv {
             .unwrap_or(0.0);
         let allowed = if self.faults.has(F::DeviationIgnored) {
             0.0
+        } else if self.faults.has(F::R1DeviationAsDiameter) {
+            allowed / 2.0
         } else {
             allowed
         };
@@ -203,17 +278,23 @@ impl Agv {
 
     /// Row 4: takes over a new order.
     fn begin(&mut self, order: Order) {
-        if !self.faults.has(F::ValidationErrorLingers) {
+        if self.faults.has(F::R1OwnErrorGoneByOrder) {
+            self.errors.clear();
+        } else if !self.faults.has(F::ValidationErrorLingers) {
             self.errors.new_order();
         }
+        self.latched = false;
         self.actions.drop_lists();
         if self.faults.has(F::OldActionStatesKept) {
             let ids: Vec<&str> = order.actions().map(|action| action.id.as_str()).collect();
             self.actions.retain(|action| !ids.contains(&action.request.id.as_str()));
         } else {
             let dropped = self.faults.has(F::RunningInstantDropped);
-            self.actions
-                .retain(|action| !action.of_order() && !action.status.is_terminal() && !dropped);
+            let cancel_stays = self.faults.has(F::R1CancelOutlivesOrder);
+            self.actions.retain(|action| {
+                let stays = cancel_stays && action.request.action_type == "cancelOrder";
+                !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
+            });
         }
         let moment = self.moment();
         self.motion.halt(moment);
@@ -231,7 +312,11 @@ impl Agv {
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
         let carried = last_update.filter(|_| self.faults.has(F::UpdateIdCarriedOver));
-        self.book.update_id = carried.unwrap_or(order.update_id);
+        self.book.update_id = if self.faults.has(F::R1FirstUpdateIdZeroed) {
+            0
+        } else {
+            carried.unwrap_or(order.update_id)
+        };
         self.book.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
         self.book.first_end = self.book.nodes.back().map_or(0, |stop| stop.node.sequence_id);
@@ -247,6 +332,9 @@ impl Agv {
             self.set_holds(|holds| holds.pause = false);
         }
         self.linger_on_first_node();
+        if self.takes(T::R1SetsOutLate) {
+            self.lingers_until = Some(self.moment() + std::time::Duration::from_millis(700));
+        }
     }
 
     pub(super) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
@@ -287,5 +375,16 @@ impl Agv {
             self.actions.retain(|action| action.request.id != request.id || doubled);
             self.actions.push(Action::waiting(request, kind, origin));
         }
+    }
+}
+
+/// Makes a number of a text that is one.
+fn number_from_text(object: &mut Value, key: &str) {
+    let number = object
+        .get(key)
+        .and_then(Value::as_str)
+        .and_then(|text| text.parse::<u32>().ok());
+    if let Some(number) = number {
+        object[key] = Value::from(number);
     }
 }

@@ -118,7 +118,10 @@ impl Action {
         }
     }
 
-    fn resume(&mut self, now: Moment) {
+    fn resume(&mut self, now: Moment, faults: Faults) {
+        if faults.has(F::R1PausedActionsFail) && self.held.is_some() {
+            self.end(Status::Failed);
+        }
         if let Some((status, left)) = self.held.take() {
             self.status = status;
             self.due = left.map(|left| now + left);
@@ -220,6 +223,14 @@ impl Actions {
             triggered.sort_by_key(|action| action.request.blocking != Blocking::Hard);
         }
         for action in triggered {
+            if action.request.blocking == Blocking::None
+                && parallel.is_empty()
+                && faults.has(F::R1NoneJoinsHard)
+                && let Some(phase) = phases.back_mut()
+            {
+                phase.push(action.request.id.clone());
+                continue;
+            }
             let alone = action.request.blocking == Blocking::Hard && !faults.has(F::HardOverlaps);
             if alone {
                 phases.extend((!parallel.is_empty()).then(|| std::mem::take(&mut parallel)));
@@ -273,6 +284,7 @@ impl Actions {
     /// Whether the actions forbid driving (BLOCK-03, BLOCK-04, BLOCK-07).
     pub(super) fn block_driving(&self, faults: Faults) -> bool {
         let stops = |action: &Action| match action.request.blocking {
+            _ if action.status == Status::Initializing && faults.has(F::R1PreparesWhileDriving) => false,
             Blocking::None => false,
             Blocking::Soft => !faults.has(F::SoftDrives),
             Blocking::Hard => !faults.has(F::HardDrives),
@@ -292,7 +304,7 @@ impl Actions {
     }
 
     /// The vehicle leaves the edge: its actions end (NODE-05).
-    pub(super) fn leave_edge(&mut self, sequence_id: u32, faults: Faults) {
+    pub(super) fn leave_edge(&mut self, sequence_id: u32, faults: Faults, cut: Status) {
         let origin = Origin::Edge(sequence_id);
         self.lists.retain(|list| list.origin != origin);
         let ended = if faults.has(F::LastEdgeActionOutlivesEdge) {
@@ -304,7 +316,7 @@ impl Actions {
         for action in of_edge.take(ended) {
             match action.status {
                 Status::Waiting => action.end(Status::Failed),
-                status if status.is_active() => action.end(Status::Finished),
+                status if status.is_active() => action.end(cut),
                 _ => {}
             }
         }
@@ -326,8 +338,8 @@ impl Actions {
     }
 
     /// Lets held actions go on.
-    pub(super) fn resume(&mut self, now: Moment) {
-        self.all.iter_mut().for_each(|action| action.resume(now));
+    pub(super) fn resume(&mut self, now: Moment, faults: Faults) {
+        self.all.iter_mut().for_each(|action| action.resume(now, faults));
     }
 
     /// When the next stage of an action ends.

@@ -72,6 +72,18 @@ pub(super) struct Book {
     pub(super) slipped: bool,
     /// The order names a zone set (`zone-set-invented` only).
     pub(super) zoned: bool,
+    /// It drives as if the horizon were released (`r1-horizon-…` only).
+    pub(super) unbound: bool,
+    /// Where it ends its way (`r1-stops-at-stitch` only).
+    pub(super) stuck_at: Option<u32>,
+    /// It does not drive any more (`r1-outdated-halts-driving` only).
+    pub(super) stunned: bool,
+    /// It drives although it is paused (`r1-update-drives-in-pause` only).
+    pub(super) heedless: bool,
+    /// It went on after a pause on this edge (`r1-max-speed-forgotten-in-pause` only).
+    pub(super) hurried: bool,
+    /// lastNodeId and lastNodeSequenceId before the present ones (`r1-last-node-after-actions` only).
+    pub(super) previous: (String, u32),
 }
 
 impl Book {
@@ -100,6 +112,12 @@ impl Book {
             soon: None,
             slipped: false,
             zoned: false,
+            unbound: false,
+            stuck_at: None,
+            stunned: false,
+            heedless: false,
+            hurried: false,
+            previous: (String::new(), 0),
         }
     }
 

@@ -8,9 +8,13 @@ use super::actions::{Action, Origin, Status};
 use super::book::Cancel;
 use super::errors::{ActiveError, Life};
 use super::faults::FaultName as F;
+use super::tolerances::ToleranceName as T;
 
 /// How long a faulty vehicle waits before it does what it should not.
 pub(super) const MOMENT: Duration = Duration::from_millis(50);
+
+/// How long a cancellation takes at least for a vehicle that may take its time.
+const CANCELLING: Duration = Duration::from_millis(400);
 
 impl Agv {
     /// A cancelOrder action begins.
@@ -43,6 +47,9 @@ impl Agv {
         }
         let moment = self.moment();
         self.persona.cancel_begins(moment);
+        if self.takes(T::R1CancelTakesTime) && self.persona.cancel_held_until.is_none() {
+            self.persona.cancel_held_until = Some(moment + CANCELLING);
+        }
         self.book.cancel = Some(Cancel {
             action_id: action_id.to_owned(),
             to_node,
@@ -57,7 +64,8 @@ impl Agv {
 
     /// No order, or one that was cancelled before (ORD-CANCEL-18 to ORD-CANCEL-20).
     fn nothing_to_cancel(&mut self, action_id: &str) {
-        let status = if self.faults.has(F::IdleCancelFinished) {
+        let again = self.book.cancelled && self.faults.has(F::R1SecondCancelFinished);
+        let status = if again || self.faults.has(F::IdleCancelFinished) {
             Status::Finished
         } else {
             Status::Failed
@@ -76,11 +84,17 @@ impl Agv {
             error_type: self.config.errors.no_order_to_cancel.clone(),
             fatal: self.faults.has(F::IdleCancelFatal),
             references: referenced
-                .then(|| ("actionId".to_owned(), action_id.to_owned()))
+                .then(|| match self.faults.has(F::R1IdleCancelNamesType) {
+                    true => ("actionType".to_owned(), "cancelOrder".to_owned()),
+                    false => ("actionId".to_owned(), action_id.to_owned()),
+                })
                 .into_iter()
                 .collect(),
             description: "there is no order to cancel".into(),
-            life: Life::Until(self.moment() + self.config.error_duration),
+            life: Life::Until(match self.takes(T::R1IdleCancelErrorBrief) {
+                true => self.moment() + self.brief(),
+                false => self.moment() + self.config.error_duration,
+            }),
         };
         self.errors.refused(refusal, self.now.moment, self.faults);
     }
@@ -88,14 +102,22 @@ impl Agv {
     /// Ends the actions of the order, as far as they can be interrupted (ORD-CANCEL-03 to ORD-CANCEL-05).
     fn stop_actions(&mut self) {
         let (faults, interruptible) = (self.faults, self.config.interruptible);
+        let base_end = self.book.base_end.1;
         for action in self.actions.iter_mut().filter(|action| action.of_order()) {
             let deed = action.kind.map(|kind| kind.deed);
             let ends = match deed {
-                Some(Deed::WaitForTrigger) => true,
+                Some(Deed::WaitForTrigger) => !faults.has(F::R1TriggerHoldsCancel),
                 Some(Deed::Calibrate) => false,
                 _ => interruptible && !faults.has(F::CancelLetsRun),
             };
+            let planned = match action.origin {
+                super::actions::Origin::Node(id) | super::actions::Origin::Edge(id) => id > base_end,
+                super::actions::Origin::Instant => false,
+            };
             match action.status {
+                Status::Waiting if planned && faults.has(F::R1CancelFinishesHorizonActions) => {
+                    action.end(Status::Finished)
+                }
                 _ if survives(action, faults) => {}
                 Status::Waiting if !faults.has(F::CancelLeavesWaiting) => action.end(Status::Failed),
                 status if status.is_active() && ends => action.end(interrupted(action, faults)),
@@ -112,6 +134,9 @@ impl Agv {
         let Some(cancel) = self.book.cancel.clone() else {
             return false;
         };
+        if self.holds.pause && self.faults.has(F::R1CancelWaitsForPause) {
+            return false;
+        }
         let keeps_nodes = self.faults.has(F::CancelKeepsNodes);
         let under_way = cancel.to_node && self.book.entered && !self.book.nodes.is_empty()
             || cancel.to_node && !keeps_nodes && !self.book.nodes.is_empty()
@@ -133,11 +158,18 @@ impl Agv {
         {
             (self.book.last_node, self.book.last_sequence) = (ahead.node.id.clone(), ahead.node.sequence_id);
         }
-        if !self.faults.has(F::CancelLeavesNodes) {
+        if self.faults.has(F::R1CancelKeepsCurrentEdge) && self.book.entered {
+            let current = self.book.edges.front().cloned();
+            self.book.drop_route();
+            self.book.edges.extend(current);
+        } else if !self.faults.has(F::CancelLeavesNodes) {
             self.book.drop_route();
         } else if cancel.to_node {
             // All that was left was this node.
             self.book.nodes.extend(self.book.left.0.clone());
+        }
+        if self.faults.has(F::R1CancelResetsUpdateId) {
+            self.book.update_id = 0;
         }
         if self.faults.has(F::CancelClearsOrderId) {
             self.book.order_id.clear();
@@ -212,7 +244,7 @@ fn survives(action: &Action, faults: super::Faults) -> bool {
 
 fn interrupted(action: &Action, faults: super::Faults) -> Status {
     let trigger = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
-    if trigger && faults.has(F::TriggerSurvivesCancel) {
+    if !trigger && faults.has(F::R1CancelledActionFinished) || trigger && faults.has(F::TriggerSurvivesCancel) {
         Status::Finished
     } else {
         Status::Failed

@@ -107,6 +107,7 @@ impl Agv {
             "clear-error" => self.clear_error(),
             "emergency-stop" => self.emergency_stop(),
             "release-emergency-stop" => {
+                self.latched = self.holds.emergency && self.faults.has(F::R1EStopLatched);
                 self.errors.released();
                 self.set_holds(|holds| holds.emergency = false);
             }
@@ -138,7 +139,12 @@ impl Agv {
         self.motion.halt(moment);
         self.motion.reached = false;
         let last_node = std::mem::take(&mut self.book.last_node);
+        let known = (std::mem::take(&mut self.book.order_id), self.book.update_id);
         self.book = Book::empty(last_node);
+        if self.takes(super::tolerances::ToleranceName::R1OrderIdSurvivesPowerCycle) {
+            (self.book.order_id, self.book.update_id) = known;
+            self.book.cancelled = self.book.has_order();
+        }
         self.actions.clear();
         self.errors.clear();
         self.downloads.clear();
@@ -189,12 +195,25 @@ impl Agv {
         let keeps = leaves || drives || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             let given_up = self.book.clone();
+            if self.faults.has(F::R1ManualFinishesActions) {
+                for action in self.actions.iter_mut() {
+                    if action.of_order() && action.status.is_active() {
+                        action.end(Status::Finished);
+                    }
+                }
+            }
             if self.faults.has(F::ManualKeepsActions) {
                 self.motion.halt(self.now.moment);
                 self.book.drop_route();
                 self.book.cancelled = true;
             } else {
                 self.give_up_order();
+            }
+            if self.faults.has(F::R1ManualKeepsHorizon) {
+                let planned = given_up.nodes.iter().filter(|stop| !stop.node.released);
+                self.book.nodes.extend(planned.cloned());
+                let planned = given_up.edges.iter().filter(|edge| !edge.released);
+                self.book.edges.extend(planned.cloned());
             }
             self.remembered = Some(given_up).filter(|_| self.faults.has(F::OrderTakenUpAgain));
         }
@@ -287,7 +306,11 @@ impl Agv {
     fn emergency_stop(&mut self) {
         self.set_holds(|holds| holds.emergency = true);
         self.errors.raise(ActiveError {
-            error_type: self.config.errors.emergency_stop.clone(),
+            error_type: if self.faults.has(F::R1EmergencyStopUntyped) {
+                String::new()
+            } else {
+                self.config.errors.emergency_stop.clone()
+            },
             fatal: !self.faults.has(F::EmergencyStopWarning),
             references: Vec::new(),
             description: "the emergency stop is pressed".into(),

@@ -22,8 +22,12 @@ pub(super) struct Connection {
     shut_down: bool,
     /// It was online before.
     returning: bool,
+    /// How often it was online.
+    sessions: u32,
     /// The next headerId by topic name (HDR-02).
     header_ids: BTreeMap<&'static str, u32>,
+    /// The factsheet that is published now was asked for.
+    pub(super) factsheet_asked: bool,
     /// When to say ONLINE (`online-late` only).
     pub(super) online_at: Option<Moment>,
     /// The time of the first message (`timestamp-stands-still` only).
@@ -38,7 +42,9 @@ impl Connection {
             attempt_at: Some(Moment::START),
             shut_down: false,
             returning: false,
+            sessions: 0,
             header_ids: BTreeMap::new(),
+            factsheet_asked: false,
             online_at: None,
             first: None,
         }
@@ -91,7 +97,8 @@ impl Agv {
             .config
             .topic(will_topic)
             .map(str::to_owned)
-            .filter(|_| !self.faults.has(F::NoWill));
+            .filter(|_| !self.faults.has(F::NoWill))
+            .filter(|_| !(self.connection.returning && self.faults.has(F::R1WillForgottenOnReconnect)));
         let state = match () {
             () if self.faults.has(F::WillOffline) => "OFFLINE",
             () if self.faults.has(F::ConnectionStateUnderscore) => "CONNECTION_BROKEN",
@@ -124,6 +131,8 @@ impl Agv {
         };
         let wanted: &[&str] = if self.connection.returning && self.faults.has(F::NotSubscribedAgain) {
             &[]
+        } else if self.connection.returning && self.faults.has(F::R1InstantActionsNotSubscribedAgain) {
+            &["order"]
         } else if self.faults.has(F::InstantActionsNotSubscribed) {
             &["order"]
         } else {
@@ -155,6 +164,10 @@ impl Agv {
         }
         self.connection.online = true;
         self.connection.returning = true;
+        self.connection.sessions = self.connection.sessions.saturating_add(1);
+        if !first && self.faults.has(F::R1WarningsGoneByReconnect) {
+            self.errors.clear();
+        }
         self.connection.attempt_at = None;
         self.connection.shut_down = false;
         if !first && self.faults.has(F::OnlineLate) {
@@ -169,7 +182,9 @@ impl Agv {
                 self.publish_connection(online);
             }
         }
-        self.publish_factsheet();
+        if !self.takes(T::R1FactsheetOnRequestOnly) {
+            self.publish_factsheet();
+        }
         self.start_reporting(first);
     }
 
@@ -178,6 +193,16 @@ impl Agv {
         if self.faults.has(F::OrderForgottenOnLinkLoss) {
             self.give_up_order();
             self.book.order_id.clear();
+        }
+        if self.faults.has(F::R1HorizonLostWithLink) {
+            let gone = self.book.drop_horizon();
+            self.actions.retain(|action| match action.origin {
+                super::actions::Origin::Node(id) | super::actions::Origin::Edge(id) => !gone.contains(&id),
+                super::actions::Origin::Instant => true,
+            });
+        }
+        if self.faults.has(F::R1EndedActionsLostWithLink) {
+            self.actions.retain(|action| !action.status.is_terminal());
         }
         self.book.cut = true;
         if self.faults.has(F::UpdateForgottenOnLinkLoss) {
@@ -212,7 +237,12 @@ impl Agv {
     /// Goes offline in good order (CONN-07, CONN-08).
     pub(super) fn shut_down(&mut self) {
         if self.connection.online {
-            if !self.faults.has(F::NoOffline) {
+            if self.takes(T::R1LastStateBeforeOffline) {
+                self.report.requested = true;
+                self.flush();
+            }
+            let mid_order = self.is_busy() && self.faults.has(F::R1OfflineSkippedMidOrder);
+            if !self.faults.has(F::NoOffline) && !mid_order {
                 self.publish_connection("OFFLINE");
             }
             if self.faults.has(F::OfflineThenBroken) {
@@ -272,7 +302,16 @@ impl Agv {
         for (text, bytes) in mangle {
             payload = replaced(&payload, text.as_bytes(), bytes);
         }
+        let offline = message_says(&payload, b"\"OFFLINE\"");
+        let again = !offline && self.connection.sessions > 1;
         let (qos, retain) = match name {
+            "connection" if offline && self.faults.has(F::R1OfflineQosZero) => (0, true),
+            "connection" if offline && self.faults.has(F::R1OfflineNotRetained) => (1, false),
+            "connection" if again && self.faults.has(F::R1OnlineNotRetainedAgain) => (1, false),
+            "visualization" if self.faults.has(F::R1VisualizationQosOne) => (1, false),
+            "factsheet" if self.connection.factsheet_asked && self.faults.has(F::R1FactsheetAnswerNotRetained) => {
+                (0, false)
+            }
             "connection" => (
                 u8::from(!self.faults.has(F::ConnectionQosZero)),
                 !self.faults.has(F::ConnectionNotRetained),
@@ -316,7 +355,16 @@ impl Agv {
         } else {
             name
         };
-        let next = self.connection.header_ids.entry(counter).or_insert(0);
+        let start = if self.takes(T::R1HeaderIdStartsHigh) { 70_000 } else { 0 };
+        let next = self.connection.header_ids.entry(counter).or_insert(start);
+        let repeated = name == "state"
+            && counts
+            && *next > 0
+            && self.report.answers_request()
+            && self.faults.has(F::R1AnswerRepeatsHeaderId);
+        if repeated {
+            *next -= 1;
+        }
         let id = *next;
         if counts && !(name == "state" && self.faults.has(F::HeaderIdConstant)) {
             *next = next.wrapping_add(1);
@@ -336,14 +384,26 @@ impl Agv {
             Some((short, _)) => short,
             None => self.persona.version.as_ref().unwrap_or(&self.config.version),
         };
+        let version = if name == "factsheet" && self.faults.has(F::R1FactsheetVersionPrefixed) {
+            format!("V{version}")
+        } else {
+            version.to_owned()
+        };
         let serial = &self.config.serial_number;
         let serial_number = match () {
+            () if name == "visualization" && self.faults.has(F::R1VisualizationNamesComputer) => "localhost".to_owned(),
             () if self.faults.has(F::OtherSerialNumber) => format!("{serial}0"),
             () if self.faults.has(F::SerialNumberWithSpace) => format!("No. {serial}"),
             () => serial.clone(),
         };
         let mut header = Map::new();
         header.insert("headerId".into(), header_id);
+        let timestamp = match timestamp {
+            Value::String(text) if name == "factsheet" && self.faults.has(F::R1FactsheetDated) => {
+                json!(text.split('T').next().unwrap_or_default())
+            }
+            timestamp => timestamp,
+        };
         header.insert("timestamp".into(), timestamp);
         header.insert("version".into(), json!(version));
         if !(name == "state" && self.faults.has(F::HeaderWithoutManufacturer)) {
@@ -383,6 +443,11 @@ impl Agv {
             () => json!(text),
         }
     }
+}
+
+/// Whether a text stands somewhere in a message.
+fn message_says(payload: &[u8], text: &[u8]) -> bool {
+    payload.windows(text.len().max(1)).any(|window| window == text)
 }
 
 /// `bytes` with the first occurrence of `from` replaced.

@@ -100,7 +100,10 @@ impl Agv {
                 action.end(Status::Finished);
             }
             None => action.end(Status::Failed),
-            Some(kind) if kind.prepares || self.config.tolerances.has(T::PreparesEverything) => {
+            Some(kind)
+                if kind.prepares && !self.config.tolerances.has(T::R1NeverPrepares)
+                    || self.config.tolerances.has(T::PreparesEverything) =>
+            {
                 action.status = Status::Initializing;
                 action.due = Some(moment + duration / 3);
             }
@@ -115,13 +118,15 @@ impl Agv {
             return;
         };
         let given_up = self.faults.has(F::TriggerGivenUp);
-        let awaits = !given_up && !self.faults.has(F::TriggerNotAwaited);
+        let times_out = self.faults.has(F::R1TriggerTimesOut);
+        let awaits = !given_up && !times_out && !self.faults.has(F::TriggerNotAwaited);
         let stuck = self.faults.has(F::InstantActionStuck);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.status = Status::Running;
         let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
         let duration = match waits {
             true if given_up => Duration::from_millis(1_500),
+            true if times_out => Duration::from_secs(5),
             true => super::cancel::MOMENT,
             false => duration,
         };
@@ -226,14 +231,33 @@ impl Agv {
             Deed::StopCharging => self.stop_charging(action).into(),
             Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
+                let (id, version) = (action.text("mapId"), action.text("mapVersion"));
+                if self.maps.has_version(id, version) && self.faults.has(F::R1EnableInTwoStates) {
+                    self.maps.disable_all(id);
+                    self.flush();
+                }
                 let result = self
                     .maps
                     .enable(action.text("mapId"), action.text("mapVersion"), self.faults);
                 result.map_err(|reason| Problem::map(action, reason)).into()
             }
+            Deed::DeleteMap if self.takes(T::R1MapDelistedNext) => {
+                let before = self.maps.clone();
+                match self.delete_map(action) {
+                    Ok(()) => {
+                        let after = std::mem::replace(&mut self.maps, before);
+                        self.finish(&action.request.id, None);
+                        self.flush();
+                        self.maps = after;
+                        Outcome::Open
+                    }
+                    refused => refused.into(),
+                }
+            }
             Deed::DeleteMap => self.delete_map(action).into(),
             Deed::StateRequest => {
-                self.report.requested = !self.faults.has(F::StateRequestUnanswered);
+                let paused = self.holds.pause && self.faults.has(F::R1StateRequestUnansweredInPause);
+                self.report.requested = !paused && !self.faults.has(F::StateRequestUnanswered);
                 self.report.silenced = !self.report.requested;
                 Outcome::Done(None)
             }
@@ -247,8 +271,11 @@ impl Agv {
             Deed::DetectObject => self.detect(action),
             Deed::FinePositioning => self.align(action).into(),
             Deed::FactsheetRequest => {
-                if !self.faults.has(F::FactsheetRequestUnanswered) {
+                let mid_order = self.is_busy() && self.faults.has(F::R1FactsheetNotMidOrder);
+                if !self.faults.has(F::FactsheetRequestUnanswered) && !mid_order {
+                    self.connection.factsheet_asked = true;
                     self.publish_factsheet();
+                    self.connection.factsheet_asked = false;
                 }
                 Outcome::Done(None)
             }
@@ -280,6 +307,13 @@ impl Agv {
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
         }
+        if self.faults.has(F::R1PauseCutsHorizon) {
+            let gone = self.book.drop_horizon();
+            self.actions.retain(|action| match action.origin {
+                Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
+                Origin::Instant => true,
+            });
+        }
         if self.faults.has(F::PauseDropsOrder) {
             self.give_up_order();
         }
@@ -295,6 +329,9 @@ impl Agv {
             }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle paused"));
         }
+        if !self.holds.pause && self.faults.has(F::R1StopPauseTwiceFails) {
+            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
+        }
         if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
         }
@@ -308,6 +345,10 @@ impl Agv {
         if self.faults.has(F::PauseNotLifted) {
             self.set_holds(|holds| holds.stuck |= holds.pause);
         }
+        let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
+        self.book.unbound |= waits && self.holds.pause && self.faults.has(F::R1HorizonDrivenAfterPause);
+        self.book.hurried |= self.book.entered && self.holds.pause && self.faults.has(F::R1MaxSpeedForgottenInPause);
+        self.book.heedless = false;
         self.set_holds(|holds| holds.pause = false);
         if self.faults.has(F::PausedOrderSurvivesCancel)
             && let Some(order) = self.remembered.take()
@@ -321,7 +362,7 @@ impl Agv {
     pub(super) fn resume_if_due(&mut self) {
         let moment = self.moment();
         if self.resumes_at.take_if(|at| *at <= moment).is_some() && !self.holds.any() {
-            self.actions.resume(moment);
+            self.actions.resume(moment, self.faults);
         }
     }
 
@@ -331,13 +372,15 @@ impl Agv {
         let field = self.holds.field;
         change(&mut self.holds);
         let moment = self.moment();
+        let by_message = self.holds.pause && !self.holds.button && !self.holds.emergency && !self.holds.field;
         let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
         match (before, self.holds.any()) {
             (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
             (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
+            (false, true) if by_message && self.takes(T::R1ActionsRunOnInPause) => {}
             (false, true) => self.actions.hold(moment, self.faults),
             (true, false) if self.takes(T::ResumesInAMoment) => self.resumes_at = Some(moment + RESUMING),
-            (true, false) => self.actions.resume(moment),
+            (true, false) => self.actions.resume(moment, self.faults),
             _ => {}
         }
     }
@@ -356,6 +399,9 @@ impl Agv {
             self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
         }
         let toggled = !self.charging && self.faults.has(F::ChargingEndToggled);
+        if action.of_order() && self.faults.has(F::R1NodeStopChargingUnreported) {
+            return Ok(());
+        }
         self.charging = toggled || self.charging && self.faults.has(F::ChargingEndUnreported);
         Ok(())
     }
@@ -403,6 +449,9 @@ impl Agv {
         self.lost = self.faults.has(F::InitPositionUninitialized);
         self.persona.lost = false;
         self.maps.enable_any(map_id);
+        if self.faults.has(F::R1InitPositionEnablesAll) {
+            self.maps.enable_all(map_id);
+        }
         let stale = action.of_order() && self.faults.has(F::LiftMapStale);
         let old = self.motion.pose(self.moment()).map_id;
         let kept = self.motion.pose(self.moment());
@@ -414,11 +463,18 @@ impl Agv {
         self.motion.place(Pose {
             x,
             y,
-            theta: theta.clamp(-PI, PI),
+            theta: if self.faults.has(F::R1InitPositionThetaLost) {
+                0.0
+            } else {
+                theta.clamp(-PI, PI)
+            },
             map_id: if stale { old } else { map_id.to_owned() },
         });
         if !self.faults.has(F::InitPositionKeepsNode) {
             action.text("lastNodeId").clone_into(&mut self.book.last_node);
+        }
+        if !action.of_order() && self.takes(T::R1InitPositionResetsSequence) {
+            self.book.last_sequence = 0;
         }
         Ok(())
     }
@@ -434,7 +490,8 @@ impl Agv {
     fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
         let here = self.motion.pose(self.moment()).map_id;
         let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
-        let used = |map_id: &str| here == map_id || needed.iter().any(|needed| needed == map_id);
+        let ahead = !self.faults.has(F::R1MapOfOrderDeleted);
+        let used = |map_id: &str| here == map_id || ahead && needed.iter().any(|needed| needed == map_id);
         let result = self
             .maps
             .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);

@@ -9,6 +9,7 @@ use super::actions::Status;
 use super::deeds::Problem;
 use super::faults::FaultName as F;
 use super::maps;
+use super::tolerances::ToleranceName as T;
 
 /// Downloads under way: actionId by token.
 #[derive(Clone, Debug, Default)]
@@ -78,8 +79,9 @@ impl Agv {
             self.maps.store(map_id, version, self.faults);
         }
         let due = self.moment() + self.config.download_timeout;
+        let at_once = self.takes(T::R1DownloadRunsAtOnce);
         if let Some(action) = self.actions.get_mut(action_id) {
-            action.status = Status::Initializing;
+            action.status = if at_once { Status::Running } else { Status::Initializing };
             action.due = Some(due);
         }
     }
@@ -116,6 +118,10 @@ impl Agv {
         } else {
             self.downloads.forget(action_id);
             self.renumber_if(F::DownloadRenumbers);
+            if self.takes(T::R1MapListedNext) {
+                self.finish(action_id, None);
+                self.flush();
+            }
             self.maps
                 .store(action.text("mapId"), action.text("mapVersion"), self.faults);
             if self.faults.has(F::DownloadNeverEnds) {
@@ -128,12 +134,21 @@ impl Agv {
     /// The map did not arrive; all else stays as it was (MAP-19, MAP-22).
     pub(super) fn download_failed(&mut self, action_id: &str, reason: &str) {
         self.downloads.forget(action_id);
+        if self.faults.has(F::R1DownloadFailureHangs) {
+            if let Some(action) = self.actions.get_mut(action_id) {
+                action.due = None;
+            }
+            return;
+        }
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
         if self.faults.has(F::DownloadFailureFinished) {
             self.finish(action_id, None);
             return;
+        }
+        if self.faults.has(F::R1FailedDownloadPurges) {
+            self.maps.purge(action.text("mapId"));
         }
         let silent = self.faults.has(F::DownloadFailureSilent);
         self.fail(action_id, &Problem::map(&action, reason).silent_if(silent));

@@ -136,7 +136,12 @@ impl Errors {
 
     /// The array of the state.
     pub(super) fn picture(&self, faults: Faults) -> Value {
-        self.active.iter().map(|error| picture_of(error, faults)).collect()
+        let hidden = match faults.has(F::R1NewestErrorOnly) {
+            true => self.active.len().saturating_sub(1),
+            false => 0,
+        };
+        let shown = self.active.iter().skip(hidden);
+        shown.map(|error| picture_of(error, faults)).collect()
     }
 }
 
@@ -150,7 +155,11 @@ fn picture_of(error: &ActiveError, faults: Faults) -> Value {
                 .ok()
                 .filter(|_| faults.has(F::ReferenceValueNumeric));
             let value = number.map_or_else(|| json!(value), |number| json!(number));
-            json!({ "referenceKey": key, "referenceValue": value })
+            if faults.has(F::R1ReferencesNamedKeyValue) {
+                json!({ "key": key, "value": value })
+            } else {
+                json!({ "referenceKey": key, "referenceValue": value })
+            }
         })
         .collect();
     let level = match error.fatal {

@@ -81,7 +81,11 @@ impl Agv {
             } else {
                 json!(env!("CARGO_PKG_VERSION"))
             };
-            factsheet["vehicleConfig"] = json!({ "versions": [{ "key": "softwareVersion", "value": version }] });
+            factsheet["vehicleConfig"] = if self.faults.has(F::R1VersionsAsMap) {
+                json!({ "versions": { "softwareVersion": version } })
+            } else {
+                json!({ "versions": [{ "key": "softwareVersion", "value": version }] })
+            };
         }
         factsheet
     }
@@ -96,7 +100,7 @@ impl Agv {
             "seriesName": "Reference AGV",
             "seriesDescription": "A simulated vehicle with two driven wheels and a lift",
             "agvKinematic": if self.faults.has(F::FactsheetKinematicsUnknown) { "DIFFERENTIAL" } else { "DIFF" },
-            "agvClass": "CARRIER",
+            "agvClass": if self.faults.has(F::R1ClassUnknown) { "AMR" } else { "CARRIER" },
             "maxLoadMass": 500.0,
             "localizationTypes": [if self.config.line_guided() { "RFID" } else { "NATURAL" }],
             "navigationTypes": [navigation],
@@ -155,6 +159,15 @@ impl Agv {
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },
         });
+        if self.faults.has(F::R1ActionStatesLimitExceeded) {
+            limits["maxArrayLens"]["state.actionStates"] = json!(1);
+        }
+        if self.faults.has(F::R1ArrayLimitsNested) {
+            limits["maxArrayLens"] = json!({
+                "order": { "nodes": nodes, "edges": nodes.saturating_sub(1) },
+                "instantActions": MAX_INSTANT_ACTIONS,
+            });
+        }
         if let Some(interval) = self.config.visualization_interval {
             limits["timing"]["visualizationInterval"] = json!(interval.as_secs_f64());
         }
@@ -200,6 +213,15 @@ impl Agv {
             .filter(|kind| !(unlisted && kind.deed == Deed::StateRequest))
             .map(|kind| self.action_picture(kind))
             .collect();
+        let reversed = self.takes(super::tolerances::ToleranceName::R1FactsheetListsReversed);
+        let (parameters, actions): (Vec<Value>, Vec<Value>) = if reversed {
+            (
+                parameters.into_iter().rev().collect(),
+                actions.into_iter().rev().collect(),
+            )
+        } else {
+            (parameters, actions)
+        };
         let mut features = json!({ "optionalParameters": parameters, "agvActions": actions });
         if self.faults.has(F::OptionalParametersMissing)
             && let Some(fields) = features.as_object_mut()
@@ -214,6 +236,7 @@ impl Agv {
         for (deed, scope, fault) in [
             (Deed::StartPause, "NODE", F::StartPauseOnNodes),
             (Deed::Pick, "INSTANT", F::PickAsInstantAction),
+            (Deed::Pick, "INSTANT", F::R1PickListedInstant),
             (Deed::FinePositioning, "INSTANT", F::PositioningAsInstantAction),
             (Deed::StartCharging, "EDGE", F::ChargingOnEdges),
         ] {
@@ -243,7 +266,11 @@ impl Agv {
         };
         picture.insert("actionType".into(), json!(name));
         picture.insert("actionDescription".into(), json!(kind.description));
-        picture.insert("actionScopes".into(), json!(scopes));
+        if self.faults.has(F::R1ScopesInOneText) {
+            picture.insert("actionScopes".into(), json!(scopes.join(",")));
+        } else {
+            picture.insert("actionScopes".into(), json!(scopes));
+        }
         if !kind.parameters.is_empty() {
             let parameters = kind.parameters.iter().map(|parameter| {
                 json!({
@@ -294,7 +321,11 @@ impl Agv {
         }
         json!({
             "wheelDefinitions": [wheel(0.35), wheel(-0.35)],
-            "envelopes2d": [{ "set": "contour", "polygonPoints": contour }],
+            "envelopes2d": if self.faults.has(F::R1EnvelopeUnnamed) {
+                json!([{ "polygonPoints": contour }])
+            } else {
+                json!([{ "set": "contour", "polygonPoints": contour }])
+            },
         })
     }
 

@@ -56,6 +56,14 @@ impl Agv {
         };
         for element in elements.iter().take(limit) {
             self.instant_action(element);
+            let id = element.get("actionId").and_then(Value::as_str).unwrap_or_default();
+            let failed = self
+                .actions
+                .get(id)
+                .is_some_and(|action| action.status == Status::Failed);
+            if failed && self.faults.has(F::R1BatchEndsAtFailure) {
+                break;
+            }
         }
     }
 
@@ -93,7 +101,10 @@ impl Agv {
         }
         let (request, defect) = read_leniently(&fields, id.clone());
         let kind = action_kinds::find(&self.config, &request.action_type);
-        let fit = kind.filter(|kind| kind.scopes.contains(&Scope::Instant));
+        let anywhere = self.faults.has(F::R1InstantScopeUnchecked);
+        let fit = kind.filter(|kind| kind.scopes.contains(&Scope::Instant) || anywhere);
+        let by_hand = self.mode == super::Mode::Semiautomatic && self.faults.has(F::R1SemiautomaticInstantRefused);
+        let fit = fit.filter(|_| !by_hand);
         let refusal = match (&defect, fit) {
             (Some(defect), _) => Some(format!("{} {}", defect.path, defect.reason)),
             (None, None) => Some("the vehicle does not offer the action as an instant action".to_owned()),
@@ -110,9 +121,18 @@ impl Agv {
         match refusal {
             Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantWaits) => {}
             Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
+            Some(_) if kind.is_none() && self.faults.has(F::R1UnknownInstantWaits) => {}
+            None if self.holds.pause
+                && self.faults.has(F::R1InstantActionsWaitForPause)
+                && !matches!(
+                    action.request.action_type.as_str(),
+                    "startPause" | "stopPause" | "cancelOrder"
+                ) => {}
             Some(reason) => {
                 self.take_map_anyway(&action);
-                let mut problem = Problem::unable(&action, &reason).silent_if(self.faults.has(F::UnknownInstantSilent));
+                let silent = self.faults.has(F::UnknownInstantSilent)
+                    || self.takes(super::tolerances::ToleranceName::R1RefusedInstantWithoutError);
+                let mut problem = Problem::unable(&action, &reason).silent_if(silent);
                 if self.faults.has(F::UnknownInstantUnreferenced) {
                     problem.references.clear();
                 }
@@ -158,7 +178,9 @@ impl Agv {
 
     /// `instant-action-deferred`: begins what had to wait for the end of the order.
     pub(super) fn begin_deferred(&mut self) -> bool {
-        if !self.faults.has(F::InstantActionDeferred) || self.is_busy() {
+        let after_pause = self.faults.has(F::R1InstantActionsWaitForPause) && !self.holds.pause;
+        let after_order = self.faults.has(F::InstantActionDeferred) && !self.is_busy();
+        if !after_pause && !after_order {
             return false;
         }
         let waits = |action: &&Action| !action.of_order() && action.status == Status::Waiting;

@@ -42,6 +42,9 @@ impl Maps {
         if self.position(map_id, version).is_some() && !faults.has(F::DuplicateMapAccepted) {
             return Err("the map is on board already");
         }
+        if self.on_board(map_id) && faults.has(F::R1OtherVersionRefused) {
+            return Err("the map is on board already");
+        }
         if self.all.len() < self.capacity {
             return Ok(());
         }
@@ -108,6 +111,30 @@ impl Maps {
         Ok(())
     }
 
+    /// `r1-init-position-enables-all`: enables all versions of a mapId.
+    pub(super) fn enable_all(&mut self, map_id: &str) {
+        for map in self.all.iter_mut().filter(|map| map.map_id == map_id) {
+            map.enabled = true;
+        }
+    }
+
+    /// `r1-enable-in-two-states`: disables all versions of a mapId.
+    pub(super) fn disable_all(&mut self, map_id: &str) {
+        for map in self.all.iter_mut().filter(|map| map.map_id == map_id) {
+            map.enabled = false;
+        }
+    }
+
+    /// Whether exactly this version is on board.
+    pub(super) fn has_version(&self, map_id: &str, version: &str) -> bool {
+        self.position(map_id, version).is_some()
+    }
+
+    /// `r1-failed-download-purges`: removes what is not enabled of a mapId.
+    pub(super) fn purge(&mut self, map_id: &str) {
+        self.all.retain(|map| map.map_id != map_id || map.enabled);
+    }
+
     /// Enables some version of a mapId if none is (for a new pose on it).
     pub(super) fn enable_any(&mut self, map_id: &str) {
         if !self.enabled(map_id)
@@ -125,6 +152,13 @@ impl Maps {
         used: impl Fn(&str) -> bool,
         faults: Faults,
     ) -> Result<(), Refusal> {
+        // A version that does not exist stands for the newest one.
+        let newest = self.all.iter().rev().find(|map| map.map_id == map_id && !map.enabled);
+        let newest = newest.map(|map| map.map_version.clone());
+        let version = match newest.as_deref() {
+            Some(newest) if !self.has_version(map_id, version) && faults.has(F::R1DeleteTakesNewest) => newest,
+            _ => version,
+        };
         let Some(index) = self.position(map_id, version) else {
             return if faults.has(F::DeleteUnknownFinished) {
                 Ok(())
@@ -138,6 +172,9 @@ impl Maps {
         }
         if !faults.has(F::DeleteKeepsEntry) {
             self.all.remove(index);
+        }
+        if faults.has(F::R1DeleteTakesAllVersions) {
+            self.purge(map_id);
         }
         if faults.has(F::DeleteTakesAllVersions) {
             self.all.retain(|map| map.map_id != map_id);

@@ -7,6 +7,8 @@
 //! liberty a good vehicle may take in `tolerances`; both are found in the code by name. As a mock vehicle before a
 //! master control it also has `personas`: deviations a test switches on and off while it runs.
 
+#[macro_use]
+mod blind_faults;
 mod ability;
 mod acceptance;
 mod action_kinds;
@@ -47,9 +49,9 @@ use crate::reference::{ConnectOptions, Device, Input, Output};
 
 pub use commands::COMMANDS;
 pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
-pub use faults::{FAULTS, FaultName, find};
+pub use faults::{BLIND_FAULTS, FAULTS, FaultName, find};
 pub use lapses::{LAPSES, lapse};
-pub use tolerances::{TOLERANCES, Tolerance, ToleranceName};
+pub use tolerances::{BLIND_TOLERANCES, TOLERANCES, Tolerance, ToleranceName};
 
 use actions::Actions;
 use book::Book;
@@ -175,6 +177,10 @@ pub struct Agv {
     states_sent: u64,
     /// Counts logs.
     logs: u32,
+    /// A load that was picked is not shown before (`r1-pick-reported-late` only).
+    hidden_load: Option<Moment>,
+    /// The e-stop is shown until the next order (`r1-e-stop-latched` only).
+    latched: bool,
     /// What was decided and is still to be handed to the driver.
     pending: Vec<Output>,
     /// How a test told it to behave.
@@ -245,6 +251,8 @@ impl Agv {
             resumes_at: None,
             states_sent: 0,
             logs: 0,
+            hidden_load: None,
+            latched: false,
             pending: Vec::new(),
             persona: Persona::default(),
             config,
@@ -281,6 +289,7 @@ impl Agv {
             self.resumes_at,
             self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
+            self.hidden_load,
             self.persona.next_end(),
             self.next_report(),
         ];
@@ -320,6 +329,7 @@ impl Agv {
             }
         }
         self.shadow.take_if(|(end, _)| *end <= moment);
+        self.hidden_load = self.hidden_load.filter(|end| *end > moment);
         self.a_moment_later();
         self.resume_if_due();
         self.attempt_connection();

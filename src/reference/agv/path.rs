@@ -106,6 +106,9 @@ impl Agv {
         let Some(beside) = trajectory.path.beside(pose.x, pose.y) else {
             return false;
         };
+        if beside.left && self.faults.has(F::R1CorridorLeftUnwatched) {
+            return false;
+        }
         let width = if beside.left { corridor.left } else { corridor.right };
         let taken = if corridor.contour { HALF_WIDTH } else { 0.0 };
         if beside.distance + taken <= width + OUTSIDE {
@@ -223,7 +226,9 @@ impl Agv {
             return Some(json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0] }));
         }
         let unplanned = !edge.released && self.faults.has(F::PlannedPathOfBaseOnly);
-        if !self.config.plans || unplanned || self.faults.has(F::PlannedPathMissing) {
+        let plans = self.config.plans
+            || self.takes(super::tolerances::ToleranceName::R1PathsReported) && !self.config.line_guided();
+        if !plans || unplanned || self.faults.has(F::PlannedPathMissing) {
             return None;
         }
         if let Some(trajectory) = &edge.trajectory {

@@ -28,6 +28,9 @@ const LINGERING: Duration = Duration::from_millis(100);
 /// How fast the vehicle ends a way it has reported already, in metres per second.
 const CREEPING: f64 = 0.5;
 
+/// How far from a node it stops that allows that, in metres.
+const SHORT: f64 = 0.08;
+
 impl Agv {
     /// Stands on the first node of a new order for a moment (`first-node-listed` only).
     pub(super) fn linger_on_first_node(&mut self) {
@@ -53,7 +56,8 @@ impl Agv {
 
     /// Begins actions of the order whose turn it is. A held vehicle begins nothing.
     fn begin_triggered(&mut self) -> bool {
-        if self.holds.any() || self.faults.has(F::ActionsIgnored) {
+        let offline = !self.connection.online && self.faults.has(F::R1ActionsHeldOffline);
+        if self.holds.any() || offline || self.faults.has(F::ActionsIgnored) {
             return false;
         }
         let ids = self.actions.startable();
@@ -66,7 +70,7 @@ impl Agv {
     /// Whether anything forbids driving now.
     fn may_drive(&self) -> bool {
         let rolling_out = self.faults.has(F::PauseDrivesOn) && self.book.entered;
-        let held = self.holds.any() && !(rolling_out && self.holds.pause);
+        let held = self.holds.any() && !((rolling_out || self.book.heedless) && self.holds.pause);
         let cancelled = match &self.book.cancel {
             Some(cancel) => {
                 let rolls_on = self.faults.has(F::CancelDrivesOn) || self.faults.has(F::CancelFinishedMoving);
@@ -89,6 +93,7 @@ impl Agv {
             && !cancelled
             && !offline
             && !stuck
+            && !self.book.stunned
             && !warned
             && (!self.actions.block_driving(self.faults)
                 || self.book.updated && self.faults.has(F::UpdateBreaksBlocking))
@@ -112,7 +117,7 @@ impl Agv {
     fn is_released(&self, stop: &Stop) -> bool {
         let ignored =
             self.faults.has(F::HorizonDriven) || (self.faults.has(F::HorizonDrivenOffline) && !self.connection.online);
-        stop.node.released || ignored || self.book.slipped
+        stop.node.released || ignored || self.book.slipped || self.book.unbound
     }
 
     /// The next thing the vehicle does on its way, if it may; whether it did something.
@@ -147,7 +152,8 @@ impl Agv {
         let alone = self.book.base_end.1 == 0 && self.config.node(&stop.node.id).is_none();
         let unreached = alone && self.faults.has(F::TemporaryNodeNotReached);
         let undriven = self.faults.has(F::ContinuationNotDriven) && self.book.continued;
-        if early_end || unreached || undriven || self.faults.has(F::NeverStarts) {
+        let stuck = self.book.stuck_at == Some(self.book.last_sequence);
+        if early_end || unreached || undriven || stuck || self.faults.has(F::NeverStarts) {
             return false;
         }
         let moment = self.moment();
@@ -202,6 +208,9 @@ impl Agv {
             true => (BRAKING.min(distance / 4.0), false),
             false if self.stops_before(&stop.node.id) => (distance / 2.0, false),
             false if self.turns_late() => (distance / 3.0, false),
+            false if self.stops_short(stop) && distance > 1.0 => {
+                (distance - SHORT.min(self.config.tolerance * 0.8), true)
+            }
             false if self.faults.has(F::TraversedEarly) => ((distance - 0.5).max(distance / 2.0), true),
             false => (distance, true),
         };
@@ -213,9 +222,15 @@ impl Agv {
         let to = if part < 1.0 { to } else { (stop.place.x, stop.place.y) };
         let permitted = edge
             .and_then(|edge| edge.max_speed)
-            .filter(|_| !self.faults.has(F::MaxSpeedIgnored));
+            .filter(|_| !self.faults.has(F::MaxSpeedIgnored) && !self.book.hurried);
+        let permitted = if self.faults.has(F::R1MaxSpeedOfEdgeBefore) {
+            self.book.left.1.as_ref().and_then(|left| left.max_speed)
+        } else {
+            permitted
+        };
         let own = match self.mode {
             Mode::Semiautomatic if self.faults.has(F::SemiautomaticFaster) => self.config.speed * 2.0,
+            Mode::Semiautomatic if self.takes(T::R1SemiautomaticAtFullSpeed) => self.config.speed,
             Mode::Semiautomatic => self.config.speed / 2.0,
             _ if self.book.slipped && self.faults.has(F::HorizonCreptInto) => self.config.speed / 40.0,
             _ if self.book.slipped => self.config.speed * 4.0,
@@ -232,6 +247,13 @@ impl Agv {
             () => Facing::Along(0.0),
         };
         self.motion.follow(moment, curve.first(way), speed, facing, to_node);
+    }
+
+    /// Whether it may stand a little beside the node, and does so.
+    fn stops_short(&self, stop: &Stop) -> bool {
+        let position = stop.node.position.as_ref();
+        let allowed = position.and_then(|position| position.allowed_deviation);
+        self.takes(T::R1StopsShortOfNode) && allowed.is_some_and(|allowed| allowed > 2.0 * SHORT)
     }
 
     /// `traversed-early`: the rest of the way to the last node, which is reported already.
@@ -272,9 +294,10 @@ impl Agv {
             .and_then(|curve| curve.at(0.0));
         let heading = begin.map_or(straight, |begin| begin.heading);
         let wanted = edge.filter(|_| !self.faults.has(F::EdgeOrientationIgnored));
+        let tangential = self.faults.has(F::R1GlobalAsTangential);
         let relative = wanted.and_then(|edge| {
             edge.orientation.map(|orientation| {
-                if edge.global {
+                if edge.global && !tangential {
                     orientation - heading
                 } else {
                     orientation
@@ -309,6 +332,7 @@ impl Agv {
         if let Some(theta) = position
             .and_then(|position| position.theta)
             .filter(|_| !self.faults.has(F::ThetaIgnored))
+            .filter(|_| stop.node.sequence_id == self.book.base_end.1 || !self.faults.has(F::R1ThetaAtEndOnly))
         {
             let allowed = position
                 .and_then(|position| position.allowed_deviation_theta)
@@ -341,13 +365,19 @@ impl Agv {
         }
         self.motion.reached = false;
         self.book.entered = false;
+        self.book.hurried = false;
         let behind = |edge: &Edge| edge.sequence_id < sequence_id;
         while self.book.edges.front().is_some_and(behind) {
             let Some(edge) = self.book.edges.pop_front() else { break };
             if self.faults.has(F::EdgeActionsLate) {
                 self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
             } else if !self.faults.has(F::EdgeActionOutlivesEdge) {
-                self.actions.leave_edge(edge.sequence_id, self.faults);
+                let cut = if self.takes(T::R1CutEdgeActionsFail) {
+                    super::actions::Status::Failed
+                } else {
+                    super::actions::Status::Finished
+                };
+                self.actions.leave_edge(edge.sequence_id, self.faults, cut);
             }
             self.book.left.1 = Some(edge);
         }
@@ -357,8 +387,11 @@ impl Agv {
         }
         self.update_last_node(&stop);
         if self.book.cancel.is_none() {
-            let of_update = sequence_id > self.book.first_end;
-            if !(of_update && self.faults.has(F::UpdateActionsNotPerformed)) {
+            let first =
+                sequence_id == 0 && !self.book.nodes.is_empty() && self.faults.has(F::R1FirstNodeActionsSkipped);
+            let continuation = self.book.continued && self.faults.has(F::R1ContinuationActionsSkipped);
+            let of_update = sequence_id > self.book.first_end && self.faults.has(F::UpdateActionsNotPerformed);
+            if !(first || continuation || of_update) {
                 self.actions.trigger(Origin::Node(sequence_id), self.faults);
             }
             let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == stop.node.id);
@@ -395,6 +428,7 @@ impl Agv {
         if stale || (self.faults.has(F::NodeSkipped) && plain && between) {
             return;
         }
+        self.book.previous = (self.book.last_node.clone(), self.book.last_sequence);
         self.book.last_node = self.mark_below().unwrap_or_else(|| stop.node.id.clone());
         if self.faults.has(F::LoopConfused) {
             let first = self

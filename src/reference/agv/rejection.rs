@@ -8,6 +8,7 @@ use super::errors::{ActiveError, Life};
 use super::faults::FaultName as F;
 use super::order_message::Order;
 use super::read::Defect;
+use super::tolerances::ToleranceName as T;
 
 /// Which rule refused an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +69,13 @@ impl Agv {
     pub(super) fn refuse(&mut self, message: &Value, refusal: Refusal) {
         self.refusal_side_effects(message, refusal.rule);
         self.locked |= refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorLocks);
-        let silent = refusal.rule == Rule::StartOutOfRange && self.faults.has(F::StartRefusalSilent);
+        let silent = match refusal.rule {
+            Rule::StartOutOfRange => self.faults.has(F::StartRefusalSilent),
+            Rule::UnknownMap => self.faults.has(F::R1UnknownMapSilent),
+            Rule::OtherOrderActive => self.faults.has(F::R1BusyRefusalSilent),
+            Rule::Outdated => self.faults.has(F::R1OutdatedUpdateSilent),
+            _ => false,
+        };
         if silent || self.faults.has(F::RejectionSilent) {
             return;
         }
@@ -78,6 +85,9 @@ impl Agv {
             Rule::Malformed => &names.validation,
             Rule::Unable if self.faults.has(F::OrderErrorAsValidation) => &names.validation,
             Rule::Unable => &names.order,
+            Rule::Memory if self.takes(T::R1OwnErrorNames) => "insufficientMemory",
+            Rule::UnknownMap if self.takes(T::R1OwnErrorNames) => "unknownMapId",
+            Rule::OtherOrderActive if self.takes(T::R1OwnErrorNames) => "otherOrderActive",
             Rule::Memory => &names.memory,
             Rule::UnknownMap => &names.unknown_map,
             Rule::OtherOrderActive => &names.other_order_active,
@@ -100,6 +110,9 @@ impl Agv {
         };
         let life = match (early, short) {
             (true, _) => Life::Until(self.moment() + super::cancel::MOMENT),
+            (_, true) if refusal.rule == Rule::Outdated && self.takes(T::R1OutdatedErrorBrief) => {
+                Life::Until(self.moment() + self.brief())
+            }
             (_, true) => Life::Until(self.moment() + self.config.error_duration),
             _ => Life::UntilNewOrder,
         };
@@ -113,7 +126,9 @@ impl Agv {
                 }
             }
         }
-        references.extend(refusal.culprits);
+        if !(refusal.rule == Rule::Unable && self.faults.has(F::R1CulpritUnnamed)) {
+            references.extend(refusal.culprits);
+        }
         if self.faults.has(F::UpdateIdUnreferenced) {
             references.retain(|(key, _)| key != "orderUpdateId");
         }
@@ -137,6 +152,22 @@ impl Agv {
         if let Some(id) = message.get("orderId").and_then(Value::as_str).filter(|_| taken) {
             id.clone_into(&mut self.book.order_id);
         }
+        let of_update = matches!(rule, Rule::BrokenUpdate | Rule::Outdated);
+        if of_update && self.faults.has(F::R1RejectedUpdateCutsHorizon) {
+            let gone = self.book.drop_horizon();
+            self.actions.retain(|action| match action.origin {
+                Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
+                Origin::Instant => true,
+            });
+        }
+        let update_id = message.get("orderUpdateId").and_then(Value::as_u64);
+        if rule == Rule::BrokenUpdate
+            && self.faults.has(F::R1RejectedUpdateIdAdopted)
+            && let Some(id) = update_id.and_then(|id| u32::try_from(id).ok())
+        {
+            self.book.update_id = id;
+        }
+        self.book.stunned |= rule == Rule::Outdated && self.faults.has(F::R1OutdatedHaltsDriving);
         if rule == Rule::Malformed {
             if message.is_object() && self.faults.has(F::MalformedStopsOrder) {
                 self.give_up_order();

@@ -35,6 +35,13 @@ pub(super) struct Report {
     silent_until: Option<Moment>,
 }
 
+impl Report {
+    /// Whether the state that is sent now answers a request, and is not the first one.
+    pub(super) fn answers_request(&self) -> bool {
+        self.requested && self.last.is_some()
+    }
+}
+
 /// Members that change without being an event.
 const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
 
@@ -123,7 +130,8 @@ impl Agv {
     }
 
     fn usual_interval(&self) -> Duration {
-        if self.faults.has(F::StateSilence) || self.is_silent_now() {
+        let idle = !self.is_busy() && self.faults.has(F::R1SilentWhenIdle);
+        if idle || self.faults.has(F::StateSilence) || self.is_silent_now() {
             Duration::from_secs(45)
         } else if self.faults.has(F::StateIntervalExceeded) {
             self.stated_interval() * 2 + Duration::from_secs(2)
@@ -169,6 +177,9 @@ impl Agv {
         if self.report.silent_until.is_some() {
             return self.report.silent_until;
         }
+        if self.silent_in_manual() {
+            return self.report.next_visualization;
+        }
         let last = self.report.last.as_ref().map(|(sent, _)| *sent)?;
         let state = if self.report.delayed {
             self.min_state_interval()
@@ -176,6 +187,23 @@ impl Agv {
             self.state_interval()
         };
         Some((last + state).min(self.report.next_visualization.unwrap_or(last + state)))
+    }
+
+    /// `r1-silent-in-manual`: it has reported the mode, and says no more.
+    fn silent_in_manual(&self) -> bool {
+        let told = self
+            .report
+            .last
+            .as_ref()
+            .and_then(|(_, last)| last.get("operatingMode"));
+        self.mode == super::Mode::Manual
+            && self.faults.has(F::R1SilentInManual)
+            && told.is_some_and(|told| told == "MANUAL")
+    }
+
+    /// As short as an event can be that has to be in a state.
+    pub(super) fn brief(&self) -> Duration {
+        super::cancel::MOMENT.max(self.min_state_interval() * 2)
     }
 
     /// Publishes what is due.
@@ -198,7 +226,7 @@ impl Agv {
 
     fn flush_state(&mut self) {
         let moment = self.moment();
-        if self.report.silent_until.is_some_and(|until| until > moment) {
+        if self.report.silent_until.is_some_and(|until| until > moment) || self.silent_in_manual() {
             return;
         }
         let mut body = self.state_picture();
@@ -288,6 +316,9 @@ impl Agv {
         if periodic && self.faults.has(F::NanAsText) {
             body.insert("velocity".into(), json!({ "vx": 0.0, "vy": 0.0, "omega": "NaN" }));
         }
+        if self.charging && self.faults.has(F::R1ReachUnlimited) {
+            mangle.push(("\"reach\":8000", b"\"reach\":1e999"));
+        }
         if periodic && self.faults.has(F::DuplicateKey) {
             let other: &[u8] = if self.motion.is_moving() {
                 b"{\"driving\":false,"
@@ -324,7 +355,8 @@ impl Agv {
     }
 
     fn publish_visualization(&mut self) {
-        if self.faults.has(F::VisualizationMissing) {
+        let stands = !self.motion.is_moving() && self.faults.has(F::R1VisualizationOnlyMoving);
+        if stands || self.faults.has(F::VisualizationMissing) {
             return;
         }
         let mut body = Map::new();
@@ -345,6 +377,11 @@ impl Agv {
             if !self.faults.has(F::VisualizationWithoutPosition) {
                 body.insert("agvPosition".into(), position);
             }
+        }
+        if self.faults.has(F::R1VisualizationWithoutMap)
+            && let Some(Value::Object(pose)) = body.get_mut("agvPosition")
+        {
+            pose.remove("mapId");
         }
         body.insert("velocity".into(), self.velocity_picture());
         let body = self.shown_visualization(body);

@@ -87,6 +87,9 @@ impl Agv {
             return Ok(());
         }
         self.stations.insert(site, false);
+        if self.faults.has(F::R1PickReportedLate) {
+            self.hidden_load = Some(self.moment() + Duration::from_secs(2));
+        }
         let given = |key: &str, other: &str| match action.request.parameter(key).and_then(Value::as_str) {
             Some(text) => text.to_owned(),
             None => other.to_owned(),

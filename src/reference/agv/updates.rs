@@ -5,6 +5,7 @@ use super::actions::{Action, Origin, Status};
 use super::faults::FaultName as F;
 use super::order_message::{Node, Order};
 use super::rejection::{Refusal, Rule};
+use super::tolerances::ToleranceName as T;
 
 impl Agv {
     /// Rows 8 and 10: whether the update continues the order.
@@ -26,14 +27,25 @@ impl Agv {
             (&first.id, first.sequence_id) == (&self.book.base_end.0, self.book.base_end.1)
                 || self.faults.has(F::RunningUpdateGapAccepted)
                 || (self.faults.has(F::UpdateJoinedByNumber) && first.sequence_id == self.book.base_end.1)
+                || (first.id == self.book.base_end.0 && self.faults.has(F::R1JointSequenceUnchecked))
                 || self.faults.has(F::OutdatedUpdateTakenOver)
         } else {
             (&first.id, first.sequence_id) == (&self.book.last_node, self.book.last_sequence)
                 || self.faults.has(F::CompletedUpdateGapAccepted)
+                || (first.sequence_id == self.book.last_sequence && self.faults.has(F::R1JointNodeUnchecked))
         };
         if !joins {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
             return Err(refusal.naming("nodeId", &first.id));
+        }
+        let altered = first
+            .actions
+            .iter()
+            .find(|action| self.actions.get(&action.id).is_none());
+        if let Some(altered) = altered.filter(|_| self.takes(T::R1AlteredJointRejected)) {
+            let reason = "the stitching node has another action than before";
+            let refusal = Refusal::at_field(Rule::Unable, reason, &altered.path);
+            return Err(refusal.naming("actionId", &altered.id));
         }
         self.check_ability(order, 1)
     }
@@ -67,6 +79,7 @@ impl Agv {
         } else {
             self.faults.has(F::HorizonKept)
         };
+        self.take_update_wrongly(&order);
         if !keep {
             self.drop_horizon();
         }
@@ -82,6 +95,9 @@ impl Agv {
         self.continue_actions_wrongly(&mut order);
         let mut nodes = order.nodes.into_iter();
         let joint = nodes.next();
+        if let Some(joint) = &joint {
+            self.join_badly(joint);
+        }
         if let Some(joint) = joint.filter(|_| self.faults.has(F::StitchingNodeOverwritten)) {
             self.overwrite_joint(joint);
         }
@@ -91,14 +107,23 @@ impl Agv {
 
     /// The horizon goes, and the actions that wait there.
     fn drop_horizon(&mut self) {
+        let edges = self.book.edges.clone();
         let gone = self.book.drop_horizon();
+        if self.faults.has(F::R1HorizonEdgesStay) {
+            self.book.edges.extend(edges.into_iter().filter(|edge| !edge.released));
+        }
         let of_horizon = |action: &Action| match action.origin {
             Origin::Node(sequence_id) | Origin::Edge(sequence_id) => gone.contains(&sequence_id),
             Origin::Instant => false,
         };
         let waiting = self.actions.iter().filter(|action| of_horizon(action));
         self.book.dropped = waiting.map(|action| action.request.id.clone()).collect();
-        if self.faults.has(F::HorizonActionsStay) {
+        if self.takes(T::R1HorizonActionsFail) {
+            let given_up = self.actions.iter_mut().filter(|action| of_horizon(action));
+            given_up
+                .filter(|action| !action.status.is_terminal())
+                .for_each(|action| action.end(Status::Failed));
+        } else if self.faults.has(F::HorizonActionsStay) {
             // Nothing ever triggers them.
             let stranded = self.actions.iter_mut().filter(|action| of_horizon(action));
             stranded.for_each(|action| action.origin = Origin::Node(u32::MAX));
@@ -134,6 +159,59 @@ impl Agv {
         }
         if self.faults.has(F::UpdateEndsPause) {
             self.set_holds(|holds| holds.pause = false);
+        }
+    }
+
+    /// What a faulty vehicle does when it takes an update over, before it looks at the horizon.
+    fn take_update_wrongly(&mut self, order: &Order) {
+        if self.is_busy() && self.motion.is_moving() && self.faults.has(F::R1StopsAtStitch) {
+            self.book.stuck_at = Some(self.book.base_end.1);
+        }
+        self.book.heedless |= self.holds.pause && self.faults.has(F::R1UpdateDrivesInPause);
+        let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);
+        self.book.unbound |= plans_only && self.faults.has(F::R1HorizonUpdateDriven);
+        let faults = self.faults;
+        self.actions.retain(|action| {
+            let forgotten = action.status.is_terminal()
+                && if action.of_order() {
+                    faults.has(F::R1UpdateForgetsEndedActions)
+                } else {
+                    faults.has(F::R1UpdateForgetsInstantActions)
+                };
+            !forgotten
+        });
+    }
+
+    /// What a faulty vehicle does with the stitching node of an update.
+    fn join_badly(&mut self, joint: &Node) {
+        let open = self
+            .book
+            .nodes
+            .iter()
+            .any(|stop| stop.node.sequence_id == joint.sequence_id);
+        if !open && self.faults.has(F::R1JointActionsRepeated) && !joint.actions.is_empty() {
+            self.repeat_actions(joint.sequence_id);
+        }
+        if self.faults.has(F::R1JointPositionReplaced) {
+            let place = self.place(joint);
+            for stop in &mut self.book.nodes {
+                if stop.node.sequence_id == joint.sequence_id {
+                    stop.node.position.clone_from(&joint.position);
+                    stop.node.sent_position.clone_from(&joint.sent_position);
+                    if let Some(place) = &place {
+                        stop.place.clone_from(place);
+                    }
+                }
+            }
+        }
+        if self.faults.has(F::R1JointListedTwice) {
+            let again = self
+                .book
+                .nodes
+                .iter()
+                .find(|stop| stop.node.sequence_id == joint.sequence_id)
+                .cloned();
+            self.book.nodes.extend(again);
         }
     }
 

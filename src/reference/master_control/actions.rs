@@ -50,6 +50,9 @@ impl Site {
         if predefined.is_some_and(|(_, scopes)| !scopes.contains(&scope)) {
             return false;
         }
+        if predefined.is_some() && self.faults.has(F::R1PredefinedNeedNoFactsheet) {
+            return true;
+        }
         match sheet.and_then(|sheet| sheet.actions.as_ref()) {
             Some(actions) => {
                 let offer = actions.get(kind);
@@ -71,6 +74,7 @@ impl Site {
         for (key, value) in given.as_object().into_iter().flatten() {
             let listed = offer.and_then(|offer| offer.action_parameters.as_ref());
             let known = listed.is_none_or(|list| list.iter().any(|parameter| parameter.key == *key));
+            let known = known || self.faults.has(F::R1UnlistedParametersPassed);
             if (known || is_mandatory(kind, key)) && !value.is_null() {
                 parameters.insert(key.clone(), value.clone());
             }
@@ -95,6 +99,15 @@ impl Site {
             let habit = self.faults.has(F::DeviceByHabit);
             parameters.insert("lhd".into(), if habit { json!("LHD1") } else { json!(devices[0]) });
         }
+        let vendor = SCOPES.iter().all(|(name, _)| *name != kind);
+        if vendor && self.faults.has(F::R1VendorParametersDropped) {
+            parameters.clear();
+        }
+        for (_, value) in &mut parameters {
+            if vendor && !value.is_string() && self.faults.has(F::R1VendorValuesAsText) {
+                *value = json!(value.to_string());
+            }
+        }
         let blocking = self.blocking(offer);
         let sent = if self.faults.has(F::VendorActionRenamed) && SCOPES.iter().all(|(name, _)| *name != kind) {
             capitalized(kind)
@@ -106,7 +119,10 @@ impl Site {
             "actionId": self.failed_id(vehicle, kind).unwrap_or_else(|| self.next_id(vehicle, "action")),
             "blockingType": blocking,
         });
-        if !parameters.is_empty() {
+        if kind == "startPause" && self.faults.has(F::R1PauseIdRepeats) {
+            action["actionId"] = json!("pause");
+        }
+        if !parameters.is_empty() || self.takes(T::R1EmptyParameterLists) {
             let list: Vec<Value> = parameters
                 .into_iter()
                 .map(|(key, value)| json!({ "key": key, "value": value }))

@@ -6,7 +6,7 @@ use super::Site;
 use super::faults::{FaultName as F, Faults};
 use super::instant::ended;
 use super::seen::State;
-use super::vehicle::{Cancel, Transport, Vehicle};
+use super::vehicle::{Cancel, Presence, Transport, Vehicle};
 
 impl Site {
     /// Calls the running order off once; `then` is what the vehicle is to do instead.
@@ -20,6 +20,25 @@ impl Site {
             // Nobody has heard of it yet.
             vehicle.running = None;
             vehicle.queue.extend(then);
+            return;
+        }
+        if vehicle.presence == Presence::Away && self.faults.has(F::R1CancelLostWhileAway) {
+            return;
+        }
+        let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
+        if self.faults.has(F::R1PauseInsteadOfCancel) {
+            let pausing = vehicle.instants.iter().any(|instant| instant.kind() == "startPause");
+            if !paused && !pausing {
+                self.instant(vehicle, "startPause", &Value::Null);
+            }
+            return;
+        }
+        if paused && self.faults.has(F::R1PausedOrderReplaced) {
+            vehicle.last_order = vehicle.running.take();
+            vehicle.r1_hasty = true;
+            if let Some(transport) = then {
+                vehicle.queue.push_front(transport);
+            }
             return;
         }
         if self.faults.has(F::OrderInsteadOfCancel) {
@@ -84,6 +103,11 @@ pub(super) fn watch_cancel(vehicle: &mut Vehicle, faults: Faults) {
         return;
     }
     vehicle.last_order = vehicle.running.take();
+    vehicle.r1_cancelled = true;
+    vehicle.r1_kept = vehicle
+        .last_order
+        .as_ref()
+        .map(|order| (order.id.clone(), order.update_id));
     if let Some(transport) = cancel.then {
         vehicle.queue.push_front(transport);
     }

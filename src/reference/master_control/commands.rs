@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::config::SiteMap;
 use super::faults::FaultName as F;
+use super::tolerances::ToleranceName as T;
 use super::vehicle::{Transport, Vehicle};
 use super::{MasterControl, Site};
 
@@ -132,12 +133,35 @@ impl Site {
             parameters: parameters(arguments),
             ..Transport::default()
         };
+        vehicle.r1_blind = false;
+        let apart = transport.action.is_none() && self.takes(T::R1PickAndDropApart);
+        if let Some(from) = transport.from.clone().filter(|_| apart) {
+            let pick = Transport {
+                from: None,
+                to: from,
+                action: Some("pick".into()),
+                parameters: Value::Null,
+                ..transport.clone()
+            };
+            let drop = Transport {
+                from: None,
+                action: Some("drop".into()),
+                r1_follows: true,
+                ..transport
+            };
+            self.dispatch(vehicle, pick);
+            self.dispatch(vehicle, drop);
+            return;
+        }
         self.dispatch(vehicle, transport);
     }
 
     /// The running transport, or the next one, is not wanted any more.
     fn call_off(&mut self, vehicle: &mut Vehicle) {
         if vehicle.running.is_some() {
+            if vehicle.queue.front().is_some_and(|next| next.r1_follows) {
+                vehicle.queue.pop_front();
+            }
             self.cancel(vehicle, None);
         } else if vehicle.queue.pop_front().is_none() && vehicle.cancel.is_none() {
             let foreign = vehicle.state.as_ref().is_some_and(|state| !state.route_empty());

@@ -86,6 +86,15 @@ impl Site {
             transport,
             ..Running::default()
         };
+        if self.faults.has(F::R1SequenceContinuesOverOrders) {
+            running.r1_offset = vehicle.r1_sequence;
+        }
+        if self.faults.has(F::R1OrderIdKeptAfterCancel)
+            && let Some((id, update)) = &vehicle.r1_kept
+        {
+            running.id.clone_from(id);
+            running.update_id = update + 1;
+        }
         let end = self.free_until(vehicle, &running, 0);
         let released = end.min(self.config.base_length.max(1).saturating_add(1));
         if released < 2 && running.stops.len() > 1 {
@@ -109,6 +118,12 @@ impl Site {
         };
         running.transport.begun += 1;
         running.released = window.released;
+        vehicle.r1_sequence += 2 * running.stops.len();
+        vehicle.r1_stale = false;
+        vehicle.r1_hasty = false;
+        vehicle.r1_cancelled = false;
+        vehicle.r1_kept = None;
+        vehicle.r1_before_manual = None;
         self.send_order(vehicle, &mut running, message);
         vehicle.running = Some(running);
         if self.takes(T::AsksForStates) {
@@ -137,6 +152,14 @@ impl Site {
     /// When the next order message may be sent; `None` if now (FACT-13).
     pub(super) fn next_order_at(&self, vehicle: &Vehicle) -> Option<crate::clock::Moment> {
         let interval = vehicle.factsheet.as_ref().map_or(0.0, |sheet| sheet.order_interval);
+        let interval = if self.faults.has(F::R1IntervalInMilliseconds) {
+            interval / 1000.0
+        } else {
+            interval
+        };
+        if vehicle.r1_cancelled && self.faults.has(F::R1IntervalNotAfterCancel) {
+            return None;
+        }
         // A little more, since both sides measure.
         let interval = Duration::from_secs_f64(interval * 1.02);
         let due = vehicle.last_order_at? + interval;
@@ -148,8 +171,11 @@ impl Site {
         let Some(state) = &vehicle.state else { return false };
         let hasty = [F::OrderInsteadOfCancel, F::CancelNotAwaited, F::BrokenIsDead];
         let hasty = hasty.iter().any(|fault| self.faults.has(*fault));
-        let busy = !state.route_empty() && !hasty;
+        let busy = !state.route_empty() && !hasty && !vehicle.r1_hasty;
         if vehicle.shunned {
+            return false;
+        }
+        if vehicle.r1_moving || (state.informs() && self.faults.has(F::R1InformationHoldsDispatch)) {
             return false;
         }
         let fit = state.is_fit(self.config.low_battery) || vehicle.absolved || self.takes(T::OrdersToFaulted);
@@ -187,7 +213,8 @@ impl Site {
     pub(super) fn free_until(&self, vehicle: &Vehicle, running: &Running, base: usize) -> usize {
         let first = base.saturating_sub(1);
         let blocked = running.legs.iter().enumerate().skip(first).find(|(_, leg)| {
-            vehicle.blocked.contains(&(leg.from.clone(), leg.to.clone())) && !self.faults.has(F::BlockedEdgeUsed)
+            let used = self.faults.has(F::BlockedEdgeUsed) || vehicle.r1_blind;
+            vehicle.blocked.contains(&(leg.from.clone(), leg.to.clone())) && !used
         });
         blocked.map_or(running.stops.len(), |(index, _)| index + 1)
     }
@@ -201,6 +228,18 @@ impl Site {
             .unwrap_or(&transport.to);
         let (mut way, here) = self.start(vehicle, goal)?;
         self.lead(vehicle, &mut way, &here, transport)?;
+        if self.takes(T::R1GenerousDeviations) {
+            for stop in way.stops.iter_mut().filter(|stop| stop.actions.is_empty()) {
+                stop.deviation_xy.get_or_insert(0.8);
+            }
+        }
+        let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
+        if let Some(range) = position.and_then(|position| position.deviation_range)
+            && self.faults.has(F::R1DeviationRangeAtStart)
+            && let Some(first) = way.stops.first_mut()
+        {
+            first.deviation_xy = Some(first.deviation_xy.unwrap_or(0.0) + range.abs());
+        }
         if self.faults.has(F::StartsElsewhere) && way.legs.len() > 1 {
             way.stops.remove(0);
             way.legs.remove(0);
@@ -210,7 +249,11 @@ impl Site {
 
     /// The first node of a new order, and from which node of the layout the way goes on (ORD-03).
     fn start(&mut self, vehicle: &Vehicle, goal: &str) -> Option<(Way, String)> {
-        let state = vehicle.state.as_ref()?;
+        let mut state = vehicle.state.clone()?;
+        if let Some((node, position)) = &vehicle.r1_before_manual {
+            state.last_node_id.clone_from(node);
+            state.agv_position.clone_from(position);
+        }
         let last = self.config.node(&state.last_node_id);
         let alone = |node: &SiteNode| {
             let way = Way {
@@ -226,7 +269,12 @@ impl Site {
             return alone(node);
         }
         let Some(position) = &state.agv_position else {
-            return alone(last?);
+            let goal = vehicle.last_order.as_ref().and_then(|order| {
+                let end = order.released.checked_sub(1)?;
+                self.config.node(&order.stops.get(end)?.id)
+            });
+            let goal = goal.filter(|_| self.faults.has(F::R1LineGuidedFromBaseEnd));
+            return alone(goal.or(last)?);
         };
         let away = |node: &SiteNode| distance((node.x, node.y), (position.x, position.y));
         let stands = |node: &&SiteNode| {
@@ -246,6 +294,9 @@ impl Site {
         if let Some(node) = last.filter(stands).or_else(|| near().filter(stands)) {
             return if away(node) <= EXACT {
                 alone(node)
+            } else if self.takes(T::R1TemporaryStart) {
+                let position = position.clone();
+                self.between(vehicle, &position, goal)
             } else {
                 wide(node, 0.1)
             };
@@ -254,6 +305,9 @@ impl Site {
             && let Some(node) = last.filter(|node| node.map_id == position.map_id)
         {
             return wide(node, 0.2);
+        }
+        if let Some(node) = last.filter(|_| self.faults.has(F::R1LastNodeTooNarrow)) {
+            return alone(node);
         }
         let position = position.clone();
         self.between(vehicle, &position, goal)
@@ -306,6 +360,8 @@ impl Site {
             .unwrap_or_default();
         let id = if self.faults.has(F::OneIdTwoPlaces) && !last.is_empty() {
             last
+        } else if self.faults.has(F::R1TemporaryNodeIdFixed) {
+            "temporary".to_owned()
         } else {
             self.next_id(vehicle, "place")
         };
@@ -362,6 +418,9 @@ impl Site {
             }
             self.perform(vehicle, way, kind, &Value::Object(given));
         }
+        if self.faults.has(F::R1PickAndDropShareId) {
+            share_id(way);
+        }
         if self.faults.has(F::CancelOnNode) {
             let action = self.action(vehicle, "startPause", &Value::Null);
             way.stops.last_mut()?.actions.push(action);
@@ -371,12 +430,18 @@ impl Site {
 
     fn extend(&mut self, vehicle: &Vehicle, way: &mut Way, from: &str, to: &str) -> Option<()> {
         let blind = std::collections::BTreeSet::new();
-        let blocked = if self.faults.has(F::BlockedEdgeUsed) {
+        let blocked = if self.faults.has(F::BlockedEdgeUsed) || vehicle.r1_blind {
             &blind
         } else {
             &vehicle.blocked
         };
-        for edge in self.config.any_way(from, to, blocked)? {
+        let mut edges = self.config.any_way(from, to, blocked)?;
+        if let Some(first) = edges.first().filter(|_| self.takes(T::R1TakesTheLongWay)) {
+            let mut closed = blocked.clone();
+            closed.insert((first.from.clone(), first.to.clone()));
+            edges = self.config.way(from, to, &closed).unwrap_or(edges);
+        }
+        for edge in edges {
             way.legs.push(Leg::from(edge));
             way.stops.push(Stop::from(self.config.node(&edge.to)?));
         }
@@ -390,7 +455,11 @@ impl Site {
         if let Some(load_type) = &transport.load_type {
             given.insert("loadType".into(), json!(load_type));
         }
-        if kind == "pick" && self.faults.has(F::PickAtOnce) {
+        let there = way.legs.is_empty() && way.stops.first().is_some_and(|stop| !stop.id.is_empty());
+        let there = there && way.stops[0].actions.is_empty();
+        if kind == "pick" && self.faults.has(F::PickAtOnce)
+            || kind == "drop" && there && self.faults.has(F::R1DropAtOnceWhenThere)
+        {
             let action = self.action(vehicle, kind, &Value::Object(given));
             self.queue(vehicle, action);
             return;
@@ -406,6 +475,14 @@ impl Site {
             |name: &str, taken: usize| heedless || taken < sheet.map_or(usize::MAX, |sheet| sheet.limit(&[name]));
         let on_node = self.offers(sheet, kind, "NODE");
         let on_edge = self.offers(sheet, kind, "EDGE");
+        let led = kind == "waitForTrigger" && self.faults.has(F::R1TriggerOnEdge);
+        if let Some(leg) = way.legs.last_mut().filter(|leg| {
+            let rather = on_edge && self.takes(T::R1ActionsOnEdges) && room("edge.actions", leg.actions.len());
+            led || rather
+        }) {
+            leg.actions.push(self.action(vehicle, kind, given));
+            return;
+        }
         if let Some(stop) = way
             .stops
             .last_mut()
@@ -449,6 +526,20 @@ impl Site {
         !zero
             && Running::busiest(&way.stops) <= limit("node.actions", F::NodeActionsIgnored)
             && most <= limit("actions.actionsParameters", F::ParametersIgnored)
+    }
+}
+
+/// `r1-pick-and-drop-share-id`: gives a drop the id of the pick before it.
+fn share_id(way: &mut Way) {
+    let mut picked = None;
+    for action in way.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
+        if action["actionType"] == "pick" {
+            picked = Some(action["actionId"].clone());
+        } else if action["actionType"] == "drop"
+            && let Some(id) = &picked
+        {
+            action["actionId"] = id.clone();
+        }
     }
 }
 

@@ -34,11 +34,19 @@ enum Fate {
 impl Site {
     /// Looks after the running order.
     pub(super) fn watch_order(&mut self, vehicle: &mut Vehicle) {
+        if self.r1_resent_in_service(vehicle) {
+            return;
+        }
         if vehicle.cancel.is_some() && self.faults.has(F::UpdatedWhileCancelled) {
             self.extend_all_the_same(vehicle);
             return;
         }
-        let stubborn = self.faults.has(F::UpdatesInService) && self.reachable(vehicle);
+        let manual = vehicle
+            .state
+            .as_ref()
+            .is_some_and(|state| state.operating_mode == "MANUAL");
+        let stubborn = self.faults.has(F::UpdatesInService) || (manual && self.faults.has(F::R1UpdatesInManual));
+        let stubborn = stubborn && self.reachable(vehicle);
         if vehicle.cancel.is_some() || !(self.commandable(vehicle) || stubborn) {
             return;
         }
@@ -53,7 +61,19 @@ impl Site {
         if fate == Fate::Runs && running.confirmed && !running.refused {
             fate = self.supervise_trigger(vehicle, &mut running, &state);
         }
+        let failed = has_failed(&running, &state);
         vehicle.state = Some(state);
+        if failed && !running.r1_logged && self.takes(T::R1LogAskedAfterFailure) {
+            running.r1_logged = true;
+            let offers = vehicle.factsheet.as_ref().and_then(|sheet| sheet.actions.as_ref());
+            if offers.is_some_and(|offers| offers.contains_key("logReport")) {
+                self.instant(vehicle, "logReport", &json!({ "reason": "an action has failed" }));
+            }
+        }
+        if failed && fate == Fate::CalledOff && self.faults.has(F::R1NextOrderAfterFailedAction) {
+            vehicle.r1_hasty = true;
+            fate = Fate::Over;
+        }
         match fate {
             Fate::Runs => {
                 if running.confirmed && !running.refused {
@@ -163,8 +183,71 @@ impl Site {
         if self.faults.has(F::ResentChanged) {
             slower(&mut running.message, running.resends);
         }
+        if self.faults.has(F::R1ResendAsUpdate) {
+            running.update_id += 1;
+            running.message["orderUpdateId"] = json!(running.update_id);
+        }
+        if self.faults.has(F::R1ResendWithNewActionIds) {
+            self.rename_actions(vehicle, running);
+        }
         if !self.faults.has(F::OrdersNotSent) {
+            self.r1_resending = true;
             self.publish(vehicle, "order", &running.message);
+            self.r1_resending = false;
+        }
+        true
+    }
+
+    /// `r1-resend-with-new-action-ids`: new ids for the actions of the message sent last.
+    fn rename_actions(&mut self, vehicle: &Vehicle, running: &mut Running) {
+        let mut renamed = std::collections::BTreeMap::new();
+        for key in ["nodes", "edges"] {
+            let elements = running.message.get_mut(key).and_then(Value::as_array_mut);
+            let actions = elements.into_iter().flatten();
+            let actions = actions
+                .filter_map(|element| element.get_mut("actions")?.as_array_mut())
+                .flatten();
+            for action in actions {
+                let old = action["actionId"].as_str().unwrap_or_default().to_owned();
+                let fresh = json!(self.next_id(vehicle, "action"));
+                action["actionId"] = fresh.clone();
+                renamed.insert(old, fresh);
+            }
+        }
+        let on_nodes = running.stops.iter_mut().flat_map(|stop| &mut stop.actions);
+        let on_edges = running.legs.iter_mut().flat_map(|leg| &mut leg.actions);
+        for action in on_nodes.chain(on_edges) {
+            let old = action["actionId"].as_str().unwrap_or_default();
+            if let Some(fresh) = renamed.get(old).cloned() {
+                action["actionId"] = fresh;
+            }
+        }
+    }
+
+    /// `r1-resend-in-service`: repeats a lost order although the vehicle is in service.
+    fn r1_resent_in_service(&mut self, vehicle: &mut Vehicle) -> bool {
+        let service = vehicle
+            .state
+            .as_ref()
+            .is_some_and(|state| state.operating_mode == "SERVICE");
+        let open = vehicle
+            .running
+            .as_ref()
+            .is_some_and(|running| !running.confirmed && !running.refused);
+        if !(service && open && self.reachable(vehicle) && self.faults.has(F::R1ResendInService)) {
+            return false;
+        }
+        if let Some(mut running) = vehicle.running.take() {
+            let shown = vehicle.state.as_ref().is_some_and(|state| state.order_id == running.id);
+            let shown = shown
+                && vehicle
+                    .state
+                    .as_ref()
+                    .is_some_and(|state| state.order_update_id >= running.update_id);
+            if !shown {
+                self.send_again(vehicle, &mut running);
+            }
+            vehicle.running = Some(running);
         }
         true
     }
@@ -205,6 +288,20 @@ impl Site {
         let reached = running.reached(Some(state));
         let ahead = running.released.saturating_sub(reached + 1);
         let asked = state.new_base_request == Some(true) && !self.faults.has(F::NewBaseRequestIgnored);
+        let deaf = (vehicle.r1_answered && self.faults.has(F::R1NewBaseAnsweredOnce))
+            || (state.driving && self.faults.has(F::R1NewBaseOnlyAtRest));
+        let asked = asked && !deaf;
+        let held = (vehicle.r1_stale && self.faults.has(F::R1VehicleReturnStopsUpdates))
+            || (state.informs() && self.faults.has(F::R1InformationHoldsBase));
+        if held {
+            return;
+        }
+        let halts = !state.driving && ahead == 0;
+        if self.takes(T::R1HorizonSentAgain) && !running.r1_again && !running.is_whole() {
+            running.r1_again = true;
+            running.changed = true;
+        }
+        let eager = self.takes(T::R1BaseGrowsEagerly) && !running.is_whole();
         let enough = if self.takes(T::SmallSteps) {
             self.config.base_length - 1
         } else {
@@ -213,15 +310,21 @@ impl Site {
         let wanted = if self.faults.has(F::BaseExtendedLate) {
             ahead == 0 && !state.driving
         } else {
-            ahead <= enough || asked
+            ahead <= enough || asked || eager
         };
         if !(wanted || running.changed) || self.localization_shunned(vehicle) {
             return;
         }
         let free = self.free_until(vehicle, running, running.released);
-        let least = running.released + usize::from(asked && wanted);
+        let least = running.released + usize::from((asked || eager) && wanted);
         let target = (reached + 1).saturating_add(self.config.base_length.max(1)).max(least);
         let target = if wanted { target.min(free) } else { running.released };
+        let early = target == running.stops.len() && target > running.released && !halts && !asked;
+        let target = if early && self.faults.has(F::R1GoalReleasedOnArrival) {
+            target - 1
+        } else {
+            target
+        };
         if target <= running.released && !running.changed {
             return;
         }
@@ -231,24 +334,37 @@ impl Site {
         }
         let fresh = running.released.min(target)..target;
         let maps: Vec<String> = running.stops[fresh].iter().map(|stop| stop.map_id.clone()).collect();
-        if !self.maps_ready(vehicle, maps.iter().map(String::as_str)) {
+        let blindly = self.faults.has(F::R1MapNotCheckedInUpdates);
+        if !blindly && !self.maps_ready(vehicle, maps.iter().map(String::as_str)) {
             return;
         }
         let window = Window {
             first: if self.faults.has(F::BaseSentAgain) {
                 0
+            } else if self.faults.has(F::R1UpdateFromVehicle) {
+                reached.min(running.released.saturating_sub(1))
             } else {
                 running.released.saturating_sub(1)
             },
             released: target.max(running.released),
             end: free.min(target.max(running.released).saturating_add(self.config.horizon_length)),
         };
-        let stuck = running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats);
+        let window = if self.takes(T::R1UpdatesWithoutHorizon) && target > running.released {
+            Window {
+                end: window.released,
+                ..window
+            }
+        } else {
+            window
+        };
+        let stuck = (running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats))
+            || (running.changed && self.faults.has(F::R1UpdateIdKeptOnReroute));
         let before = running.update_id;
         running.update_id += u32::from(!stuck);
         match self.order_message(vehicle, running, window) {
             Some((message, window)) if window.released > running.released || running.changed => {
                 running.released = window.released;
+                vehicle.r1_answered |= asked;
                 self.send_order(vehicle, running, message);
             }
             _ => running.update_id = before,
@@ -256,7 +372,7 @@ impl Site {
     }
 
     /// Calls the order off when a trigger does not come in time (ACT-39).
-    fn supervise_trigger(&self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
+    fn supervise_trigger(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
         if self.faults.has(F::TriggerUnsupervised) {
             return Fate::Runs;
         }
@@ -271,6 +387,11 @@ impl Site {
         let now = self.now.moment;
         let known = running.waits.take();
         running.waits = waiting.map(|id| match known {
+            Some((known, _))
+                if known == id && vehicle.state_at == now && self.faults.has(F::R1TriggerTimerRestarts) =>
+            {
+                (id, now)
+            }
             Some((known, since)) if known == id => (id, since),
             _ => (id, now),
         });
@@ -278,6 +399,14 @@ impl Site {
             return Fate::Runs;
         };
         let due = *since + self.config.trigger_timeout;
+        if due <= now && self.faults.has(F::R1TriggerTimeoutPauses) {
+            if let Some((_, since)) = &mut running.waits {
+                *since = now;
+            }
+            vehicle.at(now + self.config.trigger_timeout);
+            self.instant(vehicle, "startPause", &Value::Null);
+            return Fate::Runs;
+        }
         if due <= now {
             return Fate::CalledOff;
         }
@@ -305,10 +434,16 @@ impl Site {
         };
         let mut transport = again(&running, vehicle.state.as_ref());
         to.clone_into(&mut transport.to);
+        vehicle.r1_blind = self.faults.has(F::R1RerouteOverBlockedEdge);
+        if !running.is_whole() && self.faults.has(F::R1RerouteCutsBase) {
+            let next = running.reached(vehicle.state.as_ref()) + 2;
+            running.released = running.released.min(next);
+        }
         if running.is_whole() && self.faults.has(F::BaseReplaced) {
             running.released = running.reached(vehicle.state.as_ref()) + 1;
         }
         let led = vehicle.cancel.is_none() && !running.is_whole() && !running.refused;
+        let led = led && !self.takes(T::R1ReroutesByCancel);
         let led = led && self.lead_on(vehicle, &mut running, transport.clone());
         vehicle.running = Some(running);
         if !led {
@@ -328,6 +463,12 @@ impl Site {
             let mut kinds = stop.actions.iter().filter_map(|action| action["actionType"].as_str());
             kinds.any(|kind| kind == "pick")
         });
+        let mut on_edges = running
+            .legs
+            .iter()
+            .take(base.saturating_sub(1))
+            .flat_map(|leg| &leg.actions);
+        let picks = picks || (self.takes(T::R1ActionsOnEdges) && on_edges.any(|action| action["actionType"] == "pick"));
         let transport = Transport {
             loaded: transport.loaded || picks,
             ..transport
@@ -341,6 +482,10 @@ impl Site {
         if !led || way.stops.len() < 2 || !way.stops[0].actions.is_empty() || !self.names_fit(vehicle, &way) {
             return false;
         }
+        if self.faults.has(F::R1SequenceGapAfterReroute) && running.r1_gap.is_none() {
+            running.r1_gap = Some((base, 2 * running.stops.len().saturating_sub(base)));
+        }
+        running.r1_rerouted = true;
         running.stops.truncate(base);
         running.legs.truncate(base.saturating_sub(1));
         running.stops.extend(way.stops.into_iter().skip(1));
@@ -367,7 +512,12 @@ impl Site {
             return;
         }
         let transport = again(running, vehicle.state.as_ref());
-        if index + 1 < running.released {
+        let shortens = self.faults.has(F::R1BaseShortenedOnBlock);
+        if shortens && let Some(running) = &mut vehicle.running {
+            running.released = running.released.min(index + 1);
+        }
+        let released = vehicle.running.as_ref().map_or(0, |running| running.released);
+        if index + 1 < released {
             self.cancel(vehicle, Some(transport));
         } else if let Some(mut running) = vehicle.running.take() {
             if !self.lead_on(vehicle, &mut running, transport) {
@@ -399,6 +549,12 @@ fn again(running: &Running, state: Option<&State>) -> Transport {
     });
     transport.loaded |= picked;
     transport
+}
+
+/// Whether an action of the order has failed.
+fn has_failed(running: &Running, state: &State) -> bool {
+    let mut ids = running.actions().filter_map(|action| action["actionId"].as_str());
+    ids.any(|id| state.action(id).is_some_and(|action| action.action_status == "FAILED"))
 }
 
 /// The errorType with which the vehicle refuses the message sent last.

@@ -4,8 +4,10 @@ use serde_json::Value;
 
 use super::faults::FaultName as F;
 use super::seen::{Factsheet, Header, MAX_MESSAGE, Position, State};
+use super::tolerances::ToleranceName as T;
 use super::vehicle::{Presence, Vehicle};
-use super::{MasterControl, Site};
+use super::{MasterControl, Output, Site};
+use crate::reference::Publication;
 
 impl MasterControl {
     /// Takes a message. What does not parse or is from another vehicle is ignored.
@@ -41,9 +43,23 @@ impl MasterControl {
                     self.site.state_heard(vehicle, state);
                 }
             }
+            "factsheet" if vehicle.factsheet.is_some() && self.site.faults.has(F::R1FirstFactsheetForever) => return,
             "factsheet" => {
+                if self.site.faults.has(F::R1FactsheetPublishedAgain) && !vehicle.r1_shown {
+                    vehicle.r1_shown = true;
+                    self.site.pending.push(Output::Publish(Publication {
+                        topic: topic.to_owned(),
+                        payload: payload.to_vec(),
+                        qos: 0,
+                        retain: true,
+                    }));
+                }
                 vehicle.factsheet = Some(Factsheet::read(&message));
                 vehicle.missed = None;
+            }
+            _ if self.site.faults.has(F::R1VisualizationHoldsDispatch) => {
+                let speed = |key: &str| message.pointer(key).and_then(Value::as_f64).unwrap_or(0.0).abs();
+                vehicle.r1_moving = speed("/velocity/vx") + speed("/velocity/vy") + speed("/velocity/omega") > 0.0;
             }
             _ if self.site.faults.has(F::VisualizationObeyed) => self.site.visualization_obeyed(vehicle, &message),
             // Visualization is for display, and there is none (VIS-03).
@@ -81,6 +97,15 @@ impl Site {
             return;
         }
         vehicle.heard.clone_from(&header.timestamp);
+        let dying = message["connectionState"] == "CONNECTIONBROKEN";
+        let number = message.get("headerId").and_then(Value::as_u64).unwrap_or(u64::MAX);
+        if dying && number <= vehicle.r1_header && self.faults.has(F::R1WillWithLowHeaderIdIgnored) {
+            return;
+        }
+        vehicle.r1_header = if number == u64::MAX { vehicle.r1_header } else { number };
+        if dying && self.faults.has(F::R1BrokenNotHeeded) {
+            return;
+        }
         let presence = match message.get("connectionState").and_then(Value::as_str) {
             Some("ONLINE") => Presence::Online,
             Some("OFFLINE" | "CONNECTIONBROKEN") => Presence::Away,
@@ -99,6 +124,21 @@ impl Site {
             vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
         }
         vehicle.presence = presence;
+        if presence == Presence::Away {
+            vehicle.r1_stale |= vehicle.running.is_some();
+            vehicle.r1_cancel_due |= broken && vehicle.running.is_some();
+            return;
+        }
+        if std::mem::take(&mut vehicle.r1_cancel_due) && self.faults.has(F::R1BrokenMeansCancel) {
+            self.cancel(vehicle, None);
+        }
+        if let Some(state) = vehicle
+            .state
+            .as_mut()
+            .filter(|_| self.faults.has(F::R1OnlineClearsErrors))
+        {
+            state.errors.clear();
+        }
     }
 
     /// `visualization-obeyed`: believes the visualization as if it were the state.
@@ -135,19 +175,55 @@ impl Site {
         if vehicle.running.is_none() {
             believe(vehicle.shown_at.as_ref(), &mut state);
         }
+        if let Some(before) = vehicle.state.as_ref().filter(|before| before.takes_orders())
+            && !state.takes_orders()
+            && self.faults.has(F::R1StartBeforeManual)
+        {
+            vehicle.r1_before_manual = Some((before.last_node_id.clone(), before.agv_position.clone()));
+        }
         if let Some(running) = vehicle.running.as_mut().filter(|running| running.accepted)
             && state.operating_mode == "MANUAL"
+            && !self.faults.has(F::R1UpdatesInManual)
         {
             running.cleared = true;
         }
         vehicle.absolved &= !state.is_fit(self.config.low_battery);
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
+        if self.faults.has(F::R1LowScoreRelocated) {
+            self.relocate(vehicle);
+        }
         if back {
             vehicle.give_time(self.now.moment);
         }
         if self.faults.has(F::InformationObeyed) {
             self.obey_information(vehicle);
+        }
+    }
+
+    /// `r1-low-score-relocated`: tells a vehicle that is unsure where it is where it says to be.
+    fn relocate(&mut self, vehicle: &mut Vehicle) {
+        let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
+        let low = position
+            .and_then(|position| position.localization_score)
+            .is_some_and(|score| score < 0.5);
+        if low && !vehicle.r1_relocated && vehicle.running.is_none() {
+            self.init_position(vehicle, &Value::Null);
+        }
+        vehicle.r1_relocated = low;
+    }
+
+    /// `r1-state-asked-when-quiet`: asks for a state when none has come for a while.
+    pub(super) fn ask_when_quiet(&mut self, vehicle: &mut Vehicle) {
+        if !self.takes(T::R1StateAskedWhenQuiet) || vehicle.state.is_none() || !self.commandable(vehicle) {
+            return;
+        }
+        let due = vehicle.state_at + std::time::Duration::from_secs(6);
+        if due > self.now.moment {
+            vehicle.at(due);
+        } else if vehicle.r1_asked != Some(vehicle.state_at) {
+            vehicle.r1_asked = Some(vehicle.state_at);
+            self.instant(vehicle, "stateRequest", &Value::Null);
         }
     }
 
@@ -186,6 +262,7 @@ impl Site {
     pub(super) fn commandable(&self, vehicle: &Vehicle) -> bool {
         let Some(state) = &vehicle.state else { return false };
         let manual = !state.takes_orders() && self.faults.has(F::OrdersInManual);
-        self.reachable(vehicle) && (state.takes_orders() || manual)
+        let taught = state.operating_mode == "TEACHIN" && self.faults.has(F::R1TeachinIsAutomatic);
+        self.reachable(vehicle) && (state.takes_orders() || manual || taught)
     }
 }

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::Site;
 use super::faults::FaultName as F;
 use super::seen::ActionState;
+use super::tolerances::ToleranceName as T;
 use super::vehicle::{Instant, MAX_INSTANT, Vehicle};
 
 /// Instant actions that do not go together with an order that is driven (IACT-02).
@@ -14,13 +15,22 @@ impl Site {
     /// Queues an instant action; its actionId, or nothing if the vehicle does not take it.
     pub(super) fn instant(&mut self, vehicle: &mut Vehicle, kind: &str, given: &Value) -> Option<String> {
         let contradicts = vehicle.running.is_some() && AGAINST_ORDER.contains(&kind);
-        if contradicts && !self.faults.has(F::PositionDuringOrder) {
+        let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
+        let despite = (paused && kind == "initPosition" && self.faults.has(F::R1PositionWhilePaused))
+            || (kind.ends_with("Charging") && self.faults.has(F::R1ChargingDuringOrder));
+        if contradicts && !despite && !self.faults.has(F::PositionDuringOrder) {
             return None;
         }
         if !self.offers(vehicle.factsheet.as_ref(), kind, "INSTANT") {
             return None;
         }
-        let action = self.action(vehicle, kind, given);
+        let mut action = self.action(vehicle, kind, given);
+        let offers = vehicle.factsheet.as_ref().and_then(|sheet| sheet.actions.as_ref());
+        let listed = offers.and_then(|offers| offers.get(kind)?.blocking_types.as_ref());
+        let nothing = listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE"));
+        if nothing && self.takes(T::R1InstantsBlockNothing) {
+            action["blockingType"] = json!("NONE");
+        }
         self.queue(vehicle, action)
     }
 
@@ -46,7 +56,10 @@ impl Site {
             .state
             .as_ref()
             .is_some_and(|state| matches!(state.operating_mode.as_str(), "SERVICE" | "TEACHIN"));
-        let despite = service && self.faults.has(F::ActionsInService) && self.reachable(vehicle);
+        let cancels = |instant: &Instant| instant.sent_at.is_none() && instant.kind() == "cancelOrder";
+        let manual = vehicle.state.as_ref().is_some_and(|state| !state.takes_orders());
+        let stops = manual && vehicle.instants.iter().any(cancels) && self.faults.has(F::R1CancelInManual);
+        let despite = (service && self.faults.has(F::ActionsInService) || stops) && self.reachable(vehicle);
         // A paused or stopped vehicle takes actions; before the first state only questions are asked.
         if !self.commandable(vehicle) && !despite {
             return;
@@ -59,6 +72,11 @@ impl Site {
         let limit = limit.map_or(usize::MAX, |sheet| {
             sheet.limit(&["instantActions", "instantActions.actions", "actions"])
         });
+        let limit = match () {
+            () if self.faults.has(F::R1InstantLimitIgnored) => usize::MAX,
+            () if self.takes(T::R1InstantActionsOneByOne) => 1,
+            () => limit,
+        };
         loop {
             let mut actions = Vec::new();
             for instant in vehicle.instants.iter_mut().filter(|instant| instant.sent_at.is_none()) {
@@ -98,6 +116,8 @@ impl Site {
                 instant.resends = u32::MAX;
             } else if lost > now {
                 wake = Some(wake.map_or(lost, |wake: crate::clock::Moment| wake.min(lost)));
+            } else if self.faults.has(F::R1LostInstantNotResent) {
+                instant.resends = u32::MAX;
             } else {
                 instant.resends += 1;
                 instant.sent_at = None;

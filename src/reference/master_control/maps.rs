@@ -6,6 +6,7 @@ use super::Site;
 use super::config::SiteMap;
 use super::faults::FaultName as F;
 use super::instant::ended;
+use super::tolerances::ToleranceName as T;
 use super::vehicle::{MapJob, Stage, Vehicle};
 
 /// More roll-outs than this are not under way at a vehicle.
@@ -18,6 +19,9 @@ impl Site {
         if vehicle.jobs.iter().any(same) || vehicle.jobs.len() >= MAX_JOBS || !self.config.has("mapActions") {
             return;
         }
+        if self.faults.has(F::R1EnableBeforeDownload) {
+            self.map_action(vehicle, "enableMap", &map.map_id, &map.map_version);
+        }
         if let Some(action_id) = self.send_download(vehicle, &map) {
             let stage = Stage::Download;
             vehicle.jobs.push(MapJob { map, stage, action_id });
@@ -25,10 +29,16 @@ impl Site {
     }
 
     fn send_download(&mut self, vehicle: &mut Vehicle, map: &SiteMap) -> Option<String> {
+        let mut link = map.link.as_str();
+        if self.faults.has(F::R1DownloadLinkRelative)
+            && let Some((_, rest)) = link.split_once("://")
+        {
+            link = rest.find('/').map_or(rest, |at| &rest[at..]);
+        }
         let mut given = json!({
             "mapId": map.map_id,
             "mapVersion": map.map_version,
-            "mapDownloadLink": map.link,
+            "mapDownloadLink": link,
         });
         if let Some(hash) = &map.hash {
             given["mapHash"] = json!(hash);
@@ -59,17 +69,37 @@ impl Site {
             };
             let next = match (job.stage, finished) {
                 (Stage::Download, false) if is_duplicate(vehicle, &job) => {
-                    if self.faults.has(F::DownloadRepeated) {
+                    if self.faults.has(F::R1DownloadBeforeDelete) {
+                        job.stage = Stage::DownloadAgain;
+                        let again = self.send_download(vehicle, &job.map);
+                        self.map_action(vehicle, "deleteMap", &job.map.map_id, &job.map.map_version);
+                        again
+                    } else if self.faults.has(F::DownloadRepeated) {
                         job.stage = Stage::DownloadAgain;
                         self.send_download(vehicle, &job.map)
                     } else {
                         job.stage = Stage::Delete;
-                        self.map_action(vehicle, "deleteMap", &job.map.map_id, &job.map.map_version)
+                        let version = if self.faults.has(F::R1DuplicateOtherVersionDeleted) {
+                            other_version(vehicle, &job.map)
+                        } else {
+                            job.map.map_version.clone()
+                        };
+                        self.map_action(vehicle, "deleteMap", &job.map.map_id, &version)
                     }
                 }
                 (Stage::Delete, true) => {
                     job.stage = Stage::DownloadAgain;
-                    self.send_download(vehicle, &job.map)
+                    let id = self.send_download(vehicle, &job.map);
+                    let again = vehicle
+                        .instants
+                        .iter_mut()
+                        .find(|instant| Some(instant.id()) == id.as_deref());
+                    if let Some(again) = again.filter(|_| self.faults.has(F::R1RepeatedDownloadWithoutLink))
+                        && let Some(list) = again.action["actionParameters"].as_array_mut()
+                    {
+                        list.retain(|parameter| parameter["key"] != "mapDownloadLink");
+                    }
+                    id
                 }
                 _ => None,
             };
@@ -89,7 +119,10 @@ impl Site {
                 continue;
             }
             // Not asked again on its own, even if the vehicle says it is done and shows no map.
-            if ended(vehicle, &action_id).is_some() {
+            if let Some(finished) = ended(vehicle, &action_id) {
+                if finished && self.faults.has(F::R1EnableMapTakenForDone) {
+                    vehicle.r1_enabled.insert(map_id.clone());
+                }
                 vehicle.enabling.insert(map_id, String::new());
             }
         }
@@ -109,6 +142,10 @@ impl Site {
             }
             if state.map_enabled(map_id) {
                 vehicle.enabling.remove(map_id);
+                continue;
+            }
+            let absent = !state.maps.iter().flatten().any(|map| map.map_id == map_id);
+            if vehicle.r1_enabled.contains(map_id) || (absent && self.faults.has(F::R1AbsentMapUsed)) {
                 continue;
             }
             ready = false;
@@ -132,6 +169,22 @@ impl Site {
             }
         }
         ready
+    }
+
+    /// `r1-preloads-maps`: brings the maps of the site on board ahead of their use.
+    pub(super) fn preload_maps(&mut self, vehicle: &mut Vehicle) {
+        if !self.takes(T::R1PreloadsMaps) || !self.commandable(vehicle) {
+            return;
+        }
+        for map in self.config.maps.clone() {
+            let missing = vehicle.state.as_ref().is_some_and(|state| {
+                let maps = state.maps.as_ref();
+                maps.is_some_and(|maps| maps.iter().all(|seen| seen.map_id != map.map_id))
+            });
+            if missing && !map.link.is_empty() && vehicle.fetched.insert(map.map_id.clone()) {
+                self.download_map(vehicle, map);
+            }
+        }
     }
 
     /// Sets the vehicle to a place (MAP-27).
@@ -178,13 +231,35 @@ impl Site {
         if self.faults.has(F::NoPositionOnNewMap) && map_id != reported {
             return;
         }
+        let map_id = if self.faults.has(F::R1InitPositionOnOldMap) && !reported.is_empty() {
+            reported
+        } else {
+            map_id
+        };
         let last = arguments.get("lastNodeId").and_then(Value::as_str).map(str::to_owned);
         let nearest = || self.config.nearest(x, y, &map_id).map(|(node, _)| node.id.clone());
         let last = last.or(node.map(|node| node.id)).or_else(nearest).unwrap_or_default();
         let within = theta.sin().atan2(theta.cos());
+        let within = if self.faults.has(F::R1InitPositionInDegrees) {
+            within.to_degrees()
+        } else {
+            within
+        };
         let given = json!({ "x": x, "y": y, "theta": within, "mapId": map_id, "lastNodeId": last });
         self.instant(vehicle, "initPosition", &given);
     }
+}
+
+/// `r1-duplicate-other-version-deleted`: a version of a map that was not meant.
+fn other_version(vehicle: &Vehicle, map: &SiteMap) -> String {
+    let maps = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
+    let mut others = maps
+        .into_iter()
+        .flatten()
+        .filter(|seen| seen.map_id == map.map_id && seen.map_version != map.map_version);
+    others
+        .next()
+        .map_or_else(|| "latest".to_owned(), |seen| seen.map_version.clone())
 }
 
 /// Whether a download failed because the map is on board already.

@@ -6,6 +6,8 @@
 //! made in `actions`, and `maps` rolls maps out; `commands` is what people ask for; `publish` and `wording` speak to
 //! the broker. Every deviation from good behaviour is declared in `faults`, every liberty in `tolerances`.
 
+#[macro_use]
+mod blind_faults;
 mod actions;
 mod cancel;
 mod commands;
@@ -35,9 +37,9 @@ use crate::reference::{ConnectOptions, Device, Input, Output};
 
 pub use commands::COMMANDS;
 pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig};
-pub use faults::{FAULTS, FaultName, find};
+pub use faults::{BLIND_FAULTS, FAULTS, FaultName, find};
 pub use lapses::{LAPSES, lapse};
-pub use tolerances::{TOLERANCES, ToleranceName};
+pub use tolerances::{BLIND_TOLERANCES, TOLERANCES, ToleranceName};
 
 use faults::Faults;
 use publish::Connection;
@@ -67,6 +69,14 @@ struct Site {
     ids: u64,
     /// What was decided and is still to be handed to the driver.
     pending: Vec<Output>,
+    /// Whether the order published now is one that was lost.
+    r1_resending: bool,
+    /// headerId by topic name for the whole fleet (`r1-header-id-counts-fleet`).
+    r1_fleet_ids: BTreeMap<&'static str, u32>,
+    /// Counts actionIds since the last connection (`r1-action-ids-restart-on-reconnect`).
+    r1_actions: u64,
+    /// How often the connection was lost.
+    r1_losses: u32,
 }
 
 impl Site {
@@ -86,16 +96,34 @@ impl Site {
         if self.faults.has(FaultName::IdLimitIgnored) {
             return format!("{what}-{}-{:064}", self.session, self.ids);
         }
-        let number = format!("{}{:05}", self.session, self.ids);
+        let mut count = self.ids;
+        if self.faults.has(FaultName::R1ActionIdsRestartOnReconnect) && what == "action" {
+            self.r1_actions += 1;
+            count = self.r1_actions;
+        }
+        let number = format!("{}{count:05}", self.session);
         let sheet = vehicle.factsheet.as_ref();
         let numerical =
             sheet.is_some_and(|sheet| sheet.ids_numerical) && !self.faults.has(FaultName::NumericalIdsIgnored);
         let longest = sheet.and_then(|sheet| sheet.id_length).unwrap_or(usize::MAX);
-        let full = format!("{what}-{number}");
+        let full = match () {
+            () if self.takes(ToleranceName::R1UuidIds) => {
+                let kind = match what {
+                    "order" => 1,
+                    "action" => 2,
+                    "place" => 3,
+                    _ => 4,
+                };
+                let (high, low) = (self.session >> 16 & 0xffff_ffff, self.session & 0xffff);
+                format!("{high:08x}-{low:04x}-4a{kind:02x}-9c3e-{count:012x}")
+            }
+            () if self.takes(ToleranceName::R1IdsWithPunctuation) => format!("{what}:{number}_a.-"),
+            () => format!("{what}-{number}"),
+        };
         match () {
             () if !numerical && full.len() <= longest => full,
             () if number.len() <= longest => number,
-            () => self.ids.to_string(),
+            () => count.to_string(),
         }
     }
 }
@@ -159,6 +187,10 @@ impl MasterControl {
                 dead: false,
                 ids: 0,
                 pending: Vec::new(),
+                r1_resending: false,
+                r1_fleet_ids: BTreeMap::new(),
+                r1_actions: 0,
+                r1_losses: 0,
             },
             fleet,
             by_topic,
@@ -208,6 +240,8 @@ impl Site {
         cancel::watch_cancel(vehicle, self.faults);
         self.watch_order(vehicle);
         self.repeat_for_ever(vehicle);
+        self.ask_when_quiet(vehicle);
+        self.preload_maps(vehicle);
         self.begin_next(vehicle);
         self.send_instants(vehicle);
         let now = self.now.moment;

@@ -31,7 +31,8 @@ impl Site {
     ) -> Option<(Value, Window)> {
         let sheet = vehicle.factsheet.as_ref();
         let mut window = window;
-        if let Some(sheet) = sheet.filter(|_| !self.faults.has(F::ArrayLimitIgnored)) {
+        let later = window.first > 0 && self.faults.has(F::R1ArrayLimitIgnoredInUpdates);
+        if let Some(sheet) = sheet.filter(|_| !self.faults.has(F::ArrayLimitIgnored) && !later) {
             let nodes = sheet.limit(&["order.nodes", "nodes"]);
             let nodes = nodes.min(sheet.limit(&["order.edges", "edges"]).saturating_add(1));
             let listed = sheet.limit(&["state.nodeStates"]);
@@ -68,22 +69,29 @@ impl Site {
 
     fn message(&self, vehicle: &Vehicle, running: &Running, window: Window) -> Value {
         let sheet = vehicle.factsheet.as_ref();
+        let lax = sheet.map(lax);
+        let hurried = self.faults.has(F::R1RequiredNotInHorizon);
+        let forgetful = self.faults.has(F::R1RequiredOnlyInFirstMessage) && window.first > 0;
         let nodes: Vec<Value> = (window.first..window.end)
             .filter_map(|index| {
                 let stop = running.stops.get(index)?;
-                Some(self.node(sheet, stop, index, index < window.released))
+                let without = hurried && index >= window.released || forgetful && index > window.first;
+                let sheet = if without { lax.as_ref() } else { sheet };
+                let mut node = self.node(sheet, stop, index, index < window.released);
+                node["sequenceId"] = json!(running.r1_number(2 * index));
+                Some(node)
             })
             .collect();
         let edges: Vec<Value> = (window.first..window.end.saturating_sub(1))
             .filter_map(|index| {
                 let ends = (running.stops.get(index)?, running.stops.get(index + 1)?);
-                Some(self.edge(
-                    sheet,
-                    running.legs.get(index)?,
-                    ends,
-                    index,
-                    index + 1 < window.released,
-                ))
+                let leg = running.legs.get(index)?;
+                let without = hurried && index + 1 >= window.released || forgetful;
+                let sheet = if without { lax.as_ref() } else { sheet };
+                let mut edge = self.edge(sheet, leg, ends, index, index + 1 < window.released);
+                edge["sequenceId"] = json!(running.r1_number(2 * index + 1));
+                self.r1_edge(running, leg, window, index, &mut edge);
+                Some(edge)
             })
             .collect();
         let mut message = json!({ "orderId": running.id, "orderUpdateId": running.update_id });
@@ -94,7 +102,45 @@ impl Site {
         }
         message["nodes"] = Value::Array(nodes);
         message["edges"] = Value::Array(edges);
+        if self.faults.has(F::R1SelfEdge) && window.first == 0 && running.stops.len() == 1 {
+            let id = &running.stops[0].id;
+            message["edges"] = json!([{
+                "edgeId": format!("{id}-{id}"),
+                "sequenceId": 1,
+                "released": true,
+                "startNodeId": id,
+                "endNodeId": id,
+                "actions": [],
+            }]);
+        }
         message
+    }
+
+    /// Defects of an edge that depend on where in the order it is.
+    fn r1_edge(&self, running: &Running, leg: &Leg, window: Window, index: usize, edge: &mut Value) {
+        let has = |fault: F| self.faults.has(fault);
+        let update = window.first > 0;
+        if update && has(F::R1SpeedUnaskedInUpdates) {
+            edge["maxSpeed"] = json!(leg.max_speed.unwrap_or(1.0));
+        }
+        if has(F::R1OrientationUnasked) {
+            edge["orientation"] = json!(0.0);
+            edge["orientationType"] = json!("TANGENTIAL");
+        }
+        if running.r1_rerouted && has(F::R1EdgesReleasedAfterReroute) {
+            edge["released"] = json!(true);
+        }
+        if index + 2 == running.stops.len() && edge.get("corridor").is_some() && has(F::R1CorridorZeroAtGoal) {
+            edge["corridor"]["leftWidth"] = json!(0.0);
+            edge["corridor"]["rightWidth"] = json!(0.0);
+        }
+        if update
+            && edge.get("corridor").is_some()
+            && has(F::R1CorridorAloneInUpdates)
+            && let Some(fields) = edge.as_object_mut()
+        {
+            fields.shift_remove("trajectory");
+        }
     }
 
     fn node(&self, sheet: Option<&Factsheet>, stop: &Stop, index: usize, released: bool) -> Value {
@@ -106,7 +152,14 @@ impl Site {
             node["nodeDescription"] = text;
         }
         let mut position = json!({ "x": stop.x, "y": stop.y });
-        let theta = stop.theta.map(|theta| json!(theta));
+        let theta = match stop.theta {
+            _ if self.takes(T::R1ThetaAtTheBound) => Some(json!(-std::f64::consts::PI)),
+            theta if self.faults.has(F::R1ThetaUpToTwoPi) => {
+                let theta = theta.unwrap_or(-std::f64::consts::FRAC_PI_2);
+                Some(json!(theta.rem_euclid(std::f64::consts::TAU)))
+            }
+            theta => theta.map(|theta| json!(theta)),
+        };
         if let Some(theta) = field("nodePosition.theta", theta, json!(std::f64::consts::FRAC_PI_2)) {
             position["theta"] = theta;
         }
@@ -115,6 +168,11 @@ impl Site {
             position["allowedDeviationXY"] = deviation;
         }
         let turn = stop.deviation_theta.map(|radians| json!(radians));
+        let turn = if self.faults.has(F::R1DeviationThetaFullCircle) {
+            Some(json!(std::f64::consts::TAU))
+        } else {
+            turn
+        };
         if let Some(turn) = field("nodePosition.allowedDeviationTheta", turn, json!(std::f64::consts::PI)) {
             position["allowedDeviationTheta"] = turn;
         }
@@ -160,8 +218,8 @@ impl Site {
             ("length", None, json!(length)),
             (
                 "trajectory",
-                curved.then(|| self.straight(from, to)),
-                self.straight(from, to),
+                curved.then(|| self.straight(sheet, from, to)),
+                self.straight(sheet, from, to),
             ),
             (
                 "corridor",
@@ -197,6 +255,18 @@ impl Site {
 
     fn corridor(&self, (left, right): (f64, f64)) -> Value {
         let mut corridor = json!({ "leftWidth": left, "rightWidth": right, "corridorRefPoint": "KINEMATICCENTER" });
+        if self.takes(T::R1CorridorByContour) {
+            corridor["corridorRefPoint"] = json!("CONTOUR");
+        }
+        if self.takes(T::R1CorridorWithoutRefPoint)
+            && let Some(fields) = corridor.as_object_mut()
+        {
+            fields.shift_remove("corridorRefPoint");
+        }
+        if self.faults.has(F::R1CorridorWidthsAsText) {
+            corridor["leftWidth"] = json!(left.to_string());
+            corridor["rightWidth"] = json!(right.to_string());
+        }
         if self.faults.has(F::CorridorNegative) {
             corridor["rightWidth"] = json!(-right);
         }
@@ -212,7 +282,9 @@ impl Site {
     }
 
     /// The straight line between two nodes, as a curve.
-    fn straight(&self, from: &Stop, to: &Stop) -> Value {
+    fn straight(&self, sheet: Option<&Factsheet>, from: &Stop, to: &Stop) -> Value {
+        let there = from.id < to.id || !self.faults.has(F::R1CurveOfWayThere);
+        let (from, to) = if there { (from, to) } else { (to, from) };
         let aside = if self.faults.has(F::CurveBesideNodes) { 3.0 } else { 0.0 };
         let begins = if self.faults.has(F::CorridorApart) { 2.0 } else { aside };
         let mut curve = json!({
@@ -223,6 +295,39 @@ impl Site {
                 { "x": to.x + aside, "y": to.y + aside, "weight": 1.0 },
             ],
         });
+        let room = |name: &str, wanted: usize| {
+            let names = [name, &format!("order.{name}")];
+            sheet.is_none_or(|sheet| sheet.limit(&names) >= wanted)
+        };
+        let roomy = room("edges.trajectory.knotVector", 8)
+            && room("trajectory.knotVector", 8)
+            && room("edges.trajectory.controlPoints", 4)
+            && room("trajectory.controlPoints", 4);
+        if self.takes(T::R1CubicStraights) && roomy {
+            let at = |share: f64| {
+                let (x, y) = (from.x + share * (to.x - from.x), from.y + share * (to.y - from.y));
+                json!({ "x": x, "y": y, "weight": 1.0 })
+            };
+            let end = json!({ "x": to.x, "y": to.y, "weight": 1.0 });
+            curve = json!({
+                "degree": 3,
+                "knotVector": [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0],
+                "controlPoints": [at(0.0), at(0.3), at(0.7), end],
+            });
+        }
+        if self.faults.has(F::R1CubicOfTwoPoints) {
+            curve["degree"] = json!(3);
+        }
+        let points = curve["controlPoints"].as_array_mut().into_iter().flatten();
+        for point in points {
+            if self.faults.has(F::R1ControlPointsAsPairs) {
+                *point = json!([point["x"], point["y"]]);
+            } else if self.takes(T::R1WeightsLeftOut)
+                && let Some(fields) = point.as_object_mut()
+            {
+                fields.shift_remove("weight");
+            }
+        }
         if self.faults.has(F::KnotsShort) {
             curve["knotVector"] = json!([0.0, 0.0, 1.0]);
         }
@@ -266,6 +371,15 @@ impl Site {
             None => None,
         }
     }
+}
+
+/// The factsheet of a vehicle that demands nothing.
+fn lax(sheet: &Factsheet) -> Factsheet {
+    let mut sheet = sheet.clone();
+    for support in sheet.optional.values_mut() {
+        "SUPPORTED".clone_into(support);
+    }
+    sheet
 }
 
 /// Whether the vehicle has a use for an optional parameter.

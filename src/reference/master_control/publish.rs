@@ -51,6 +51,9 @@ impl MasterControl {
             .collect();
         if !silent {
             names.push("visualization");
+            if site.takes(T::R1ListensToOwnTopics) {
+                names.extend(["order", "instantActions"]);
+            }
         }
         let mut subscriptions: Vec<(String, u8)> = Vec::new();
         for vehicle in &self.fleet {
@@ -74,7 +77,11 @@ impl MasterControl {
                 () if site.takes(T::NewestMqtt) => 5,
                 () => 4,
             },
-            client_id: site.config.name.clone(),
+            client_id: if site.takes(T::R1NewClientIdEachTime) {
+                format!("{}-{}", site.config.name, now.utc.as_millisecond())
+            } else {
+                site.config.name.clone()
+            },
             keep_alive: site.config.keep_alive,
             clean_session: !site.takes(T::SessionKept),
             will: None,
@@ -84,6 +91,7 @@ impl MasterControl {
 
     /// The broker accepted. What was sent and not seen is given its time again.
     pub(super) fn connected(&mut self) {
+        let returning = self.connection.returning;
         self.connection = Connection {
             online: true,
             attempt_at: None,
@@ -99,6 +107,12 @@ impl MasterControl {
             }
             vehicle.give_time(now);
             vehicle.at(now);
+            if returning {
+                self.site.r1_returned(vehicle);
+            }
+        }
+        if returning {
+            self.site.r1_actions = 0;
         }
     }
 
@@ -106,7 +120,11 @@ impl MasterControl {
     pub(super) fn connection_lost(&mut self) {
         self.connection.online = false;
         self.site.online = false;
-        let ended = self.connection.shut_down || self.site.faults.has(F::NeverReconnects);
+        if !self.connection.shut_down {
+            self.site.r1_losses += 1;
+        }
+        let tired = self.site.r1_losses > 1 && self.site.faults.has(F::R1ReconnectsOnlyOnce);
+        let ended = self.connection.shut_down || self.site.faults.has(F::NeverReconnects) || tired;
         if !ended && self.connection.attempt_at.is_none() {
             self.connection.attempt_at = Some(self.site.now.moment + self.site.config.reconnect_delay);
         }
@@ -166,13 +184,59 @@ impl Vehicle {
     }
 }
 
+/// Whether a message holds an instant action of one of these types.
+fn holds(name: &str, body: &Value, kinds: &[&str]) -> bool {
+    let actions = body["actions"].as_array().filter(|_| name == "instantActions");
+    let mut types = actions
+        .into_iter()
+        .flatten()
+        .filter_map(|action| action["actionType"].as_str());
+    types.any(|kind| kinds.contains(&kind))
+}
+
+/// Whether an order message is an update.
+fn updates(name: &str, body: &Value) -> bool {
+    let first = body.pointer("/nodes/0/sequenceId").and_then(Value::as_u64);
+    name == "order" && first.is_some_and(|sequence| sequence > 0)
+}
+
 impl Site {
+    /// What a return of the connection does to the picture of a vehicle.
+    fn r1_returned(&mut self, vehicle: &mut Vehicle) {
+        let has = |fault: F| self.faults.has(fault);
+        if has(F::R1ReconnectForgetsOrder) {
+            vehicle.running = None;
+            vehicle.cancel = None;
+        }
+        if has(F::R1BlockForgottenOnReconnect) {
+            vehicle.blocked.clear();
+        }
+        if has(F::R1IntervalForgottenOnReconnect) {
+            vehicle.last_order_at = None;
+        }
+        if has(F::R1UpdateIdsRestartOnReconnect)
+            && let Some(running) = &mut vehicle.running
+        {
+            running.update_id = 0;
+        }
+        if self.takes(T::R1StateAskedAfterReconnect) && vehicle.state.is_some() {
+            self.instant(vehicle, "stateRequest", &Value::Null);
+        }
+    }
+
     /// Publishes an order or instant actions: the header, then the body.
     pub(super) fn publish(&mut self, vehicle: &mut Vehicle, name: &'static str, body: &Value) {
         let Some(topic) = vehicle.topic(name).map(str::to_owned).filter(|_| self.online) else {
             return;
         };
         let mut message = self.header(vehicle, name);
+        let cancels = holds(name, body, &["cancelOrder"]);
+        if cancels && self.faults.has(F::R1HeaderIdMissingInCancel) {
+            message.shift_remove("headerId");
+        }
+        if updates(name, body) && self.faults.has(F::R1ManufacturerMissingInUpdates) {
+            message.shift_remove("manufacturer");
+        }
         if self.faults.has(F::HeaderNested) {
             message = Map::from_iter([("header".to_owned(), Value::Object(message))]);
         }
@@ -184,17 +248,79 @@ impl Site {
         let qos = match name {
             "order" if self.faults.has(F::OrderQosOne) => 1,
             "instantActions" if self.faults.has(F::InstantActionsQosTwo) => 2,
+            "instantActions" if cancels && self.faults.has(F::R1CancelQosOne) => 1,
+            "order" if self.r1_resending && self.faults.has(F::R1ResendQosOne) => 1,
             _ => 0,
         };
+        let topic = self.r1_misdirected(name, body, topic);
+        let mut payload = wording::written(self.faults, self.config.tolerances, &message);
+        if cancels && self.faults.has(F::R1CancelDoubleEncoded) {
+            payload = json!(String::from_utf8_lossy(&payload)).to_string().into_bytes();
+        }
+        if name == "instantActions" && self.faults.has(F::R1Utf16InstantActions) {
+            let text = String::from_utf8_lossy(&payload).into_owned();
+            payload = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        }
         self.pending.push(Output::Publish(Publication {
             topic: self.misdirected(vehicle, name, topic),
-            payload: wording::written(self.faults, self.config.tolerances, &message),
+            payload,
             qos,
             retain: match name {
                 "order" => self.faults.has(F::OrdersRetained),
                 _ => self.faults.has(F::InstantActionsRetained),
             },
         }));
+        if name == "order" && self.faults.has(F::R1PathOnVisualization) {
+            self.r1_show_path(vehicle, body);
+        }
+    }
+
+    /// `r1-path-on-visualization`: shows on the topic of the vehicle where its order begins.
+    fn r1_show_path(&mut self, vehicle: &mut Vehicle, body: &Value) {
+        let Some(topic) = vehicle.topic("visualization").map(str::to_owned) else {
+            return;
+        };
+        let Some(position) = body.pointer("/nodes/0/nodePosition") else {
+            return;
+        };
+        let position = json!({
+            "x": position["x"],
+            "y": position["y"],
+            "theta": 0.0,
+            "mapId": position["mapId"],
+            "positionInitialized": true,
+        });
+        let mut message = self.header(vehicle, "visualization");
+        message.insert("agvPosition".into(), position);
+        self.pending.push(Output::Publish(Publication {
+            topic,
+            payload: Value::Object(message).to_string().into_bytes(),
+            qos: 0,
+            retain: false,
+        }));
+    }
+
+    fn r1_misdirected(&self, name: &str, body: &Value, topic: String) -> String {
+        let sends = |fault: F| self.faults.has(fault);
+        if updates(name, body) && sends(F::R1UpdatesOnOwnTopic) {
+            return format!("{topic}Update");
+        }
+        if name == "instantActions" && sends(F::R1TopicLevelsSwapped) {
+            let mut levels: Vec<&str> = topic.split('/').collect();
+            let end = levels.len();
+            if end >= 4 {
+                levels.swap(end - 2, end - 3);
+            }
+            return levels.join("/");
+        }
+        if name == "instantActions" && sends(F::R1VersionLevelWithoutLetter) {
+            return topic.replacen("/v", "/", 1);
+        }
+        if holds(name, body, &["startPause", "stopPause"]) && sends(F::R1PauseToFirstVehicle) {
+            let first = self.config.vehicles.first();
+            return first.and_then(|first| first.topics.get(name).cloned()).unwrap_or(topic);
+        }
+        topic
     }
 
     fn misdirected(&self, vehicle: &Vehicle, name: &str, topic: String) -> String {
@@ -216,13 +342,25 @@ impl Site {
     }
 
     /// The header of the next message on a topic (HDR-01 to HDR-05).
-    pub(super) fn header(&self, vehicle: &mut Vehicle, name: &'static str) -> Map<String, Value> {
-        let sends = |fault: F| self.faults.has(fault);
-        let first = if self.takes(T::HeaderIdFromThousand) { 1000 } else { 0 };
+    pub(super) fn header(&mut self, vehicle: &mut Vehicle, name: &'static str) -> Map<String, Value> {
+        let faults = self.faults;
+        let sends = |fault: F| faults.has(fault);
+        let first = match () {
+            () if self.takes(T::R1HeaderIdHigh) => 4_000_000_000,
+            () if self.takes(T::HeaderIdFromThousand) => 1000,
+            () => 0,
+        };
         let counter = if sends(F::HeaderIdShared) { "all" } else { name };
-        let next = vehicle.header_ids.entry(counter).or_insert(first);
-        let id = *next;
-        if !sends(F::HeaderIdConstant) {
+        let counters = if sends(F::R1HeaderIdCountsFleet) {
+            &mut self.r1_fleet_ids
+        } else {
+            &mut vehicle.header_ids
+        };
+        let next = counters.entry(counter).or_insert(first);
+        let mut id = *next;
+        if self.r1_resending && sends(F::R1HeaderIdKeptOnResend) {
+            id = id.wrapping_sub(1);
+        } else if !sends(F::HeaderIdConstant) {
             *next = next.wrapping_add(1);
         }
         let mut header = Map::new();
@@ -230,6 +368,8 @@ impl Site {
             "headerId".into(),
             if sends(F::HeaderIdNegative) {
                 json!(i64::from(id) - 1_000_000)
+            } else if sends(F::R1HeaderIdFromClock) {
+                json!(self.now.utc.as_millisecond())
             } else {
                 json!(id)
             },
@@ -243,7 +383,12 @@ impl Site {
             .filter(|_| sends(F::VersionShort))
             .map_or(version.as_str(), |(short, _)| short);
         if !(name == "order" && sends(F::VersionMissing)) {
-            header.insert("version".into(), json!(version));
+            let letter = if name == "order" && sends(F::R1VersionWithLetter) {
+                "v"
+            } else {
+                ""
+            };
+            header.insert("version".into(), json!(format!("{letter}{version}")));
         }
         let VehicleNames { manufacturer, serial } = self.names(vehicle);
         header.insert("manufacturer".into(), json!(manufacturer));
@@ -254,6 +399,10 @@ impl Site {
     fn names(&self, vehicle: &Vehicle) -> VehicleNames {
         let (manufacturer, serial) = (&vehicle.config.manufacturer, &vehicle.config.serial_number);
         let names = |manufacturer: String, serial: String| VehicleNames { manufacturer, serial };
+        let first = self.config.vehicles.first();
+        if let Some(first) = first.filter(|_| self.faults.has(F::R1HeaderOfFirstVehicle)) {
+            return names(first.manufacturer.clone(), first.serial_number.clone());
+        }
         match () {
             () if self.faults.has(F::OwnNameInHeader) => names(self.config.name.clone(), "1".into()),
             () if self.faults.has(F::OtherSerialNumber) => names(manufacturer.clone(), format!("{serial}0")),
@@ -272,6 +421,7 @@ impl Site {
                 json!(format!("{local:.2}").replace('Z', "+01:00"))
             }
             () if self.faults.has(F::TimestampWithoutZone) => json!(text.trim_end_matches('Z')),
+            () if self.faults.has(F::R1TimestampZeroOffset) => json!(text.replace('Z', "+00:00")),
             () if self.faults.has(F::TimestampUnix) => json!(utc.as_second()),
             () => json!(text),
         }

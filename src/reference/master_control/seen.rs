@@ -154,6 +154,9 @@ pub(super) struct State {
     #[serde(default)]
     pub(super) loads: Option<Vec<Value>>,
     pub(super) driving: bool,
+    /// Looked at by faulty master controls.
+    #[serde(default)]
+    pub(super) paused: Option<Value>,
     #[serde(default)]
     pub(super) new_base_request: Option<bool>,
     pub(super) action_states: Vec<ActionState>,
@@ -179,6 +182,16 @@ impl State {
     /// Whether master control may command the vehicle (MODE-04).
     pub(super) fn takes_orders(&self) -> bool {
         matches!(self.operating_mode.as_str(), "AUTOMATIC" | "SEMIAUTOMATIC")
+    }
+
+    /// Whether it is paused.
+    pub(super) fn is_paused(&self) -> bool {
+        self.paused == Some(Value::Bool(true))
+    }
+
+    /// Whether it gives any information.
+    pub(super) fn informs(&self) -> bool {
+        self.information.as_ref().is_some_and(|list| !list.is_empty())
     }
 
     /// Whether nothing is left to be traversed.

@@ -38,6 +38,8 @@ pub(super) struct Transport {
     pub(super) loaded: bool,
     /// How often it was begun.
     pub(super) begun: u32,
+    /// The second half of a transport in two orders (`r1-pick-and-drop-apart`).
+    pub(super) r1_follows: bool,
 }
 
 /// A node of the way that is driven.
@@ -95,6 +97,16 @@ pub(super) struct Running {
     pub(super) changed: bool,
     /// actionId of the running waitForTrigger, and since when.
     pub(super) waits: Option<(String, Moment)>,
+    /// Where the sequenceIds begin (`r1-sequence-continues-over-orders`).
+    pub(super) r1_offset: usize,
+    /// From which node on sequenceIds are skipped, and how many (`r1-sequence-gap-after-reroute`).
+    pub(super) r1_gap: Option<(usize, usize)>,
+    /// The way was changed while it was driven.
+    pub(super) r1_rerouted: bool,
+    /// The horizon was sent again.
+    pub(super) r1_again: bool,
+    /// The log was asked for.
+    pub(super) r1_logged: bool,
 }
 
 impl Running {
@@ -109,10 +121,24 @@ impl Running {
     pub(super) fn reached(&self, state: Option<&State>) -> usize {
         let sequence = state.filter(|state| state.order_id == self.id);
         // A vehicle that has just taken the order over may still name the last node of the one before.
-        let sequence = sequence.map_or(0, |state| state.last_node_sequence_id.min(state.before_next_node()) / 2);
-        usize::try_from(sequence)
-            .unwrap_or(usize::MAX)
-            .min(self.stops.len().saturating_sub(1))
+        let sequence = sequence.map_or(self.r1_offset, |state| {
+            usize::try_from(state.last_node_sequence_id.min(state.before_next_node())).unwrap_or(usize::MAX)
+        });
+        let place = sequence.saturating_sub(self.r1_offset);
+        let place = match self.r1_gap {
+            Some((base, skipped)) if place >= (2 * base + skipped) => place - skipped,
+            _ => place,
+        };
+        (place / 2).min(self.stops.len().saturating_sub(1))
+    }
+
+    /// The sequenceId of the node (even) or edge (odd) at a place of the way.
+    pub(super) fn r1_number(&self, place: usize) -> usize {
+        let skipped = match self.r1_gap {
+            Some((base, skipped)) if place + 1 >= 2 * base => skipped,
+            _ => 0,
+        };
+        self.r1_offset + place + skipped
     }
 
     /// What is done at a node.
@@ -210,6 +236,36 @@ pub(super) struct Vehicle {
     pub(super) last_order: Option<Running>,
     /// What is sent again and again, and when the next time (`order-repeated-for-ever`).
     pub(super) repeated: Option<(Value, Moment)>,
+    /// The connection of the vehicle was away during the running order.
+    pub(super) r1_stale: bool,
+    /// A request for a new base was answered.
+    pub(super) r1_answered: bool,
+    /// Its factsheet was published again.
+    pub(super) r1_shown: bool,
+    /// Where it was when it was taken over by hand.
+    pub(super) r1_before_manual: Option<(String, Option<Position>)>,
+    /// The next way may lead over blocked edges.
+    pub(super) r1_blind: bool,
+    /// The next order does not wait for the end of the old one.
+    pub(super) r1_hasty: bool,
+    /// The next free sequenceId over all orders.
+    pub(super) r1_sequence: usize,
+    /// The id and the last update of the order called off last.
+    pub(super) r1_kept: Option<(String, u32)>,
+    /// The last order was called off.
+    pub(super) r1_cancelled: bool,
+    /// The visualization shows it moving.
+    pub(super) r1_moving: bool,
+    /// The highest headerId of its connection messages.
+    pub(super) r1_header: u64,
+    /// An order is to be called off once it is back.
+    pub(super) r1_cancel_due: bool,
+    /// Maps it said to have enabled.
+    pub(super) r1_enabled: BTreeSet<String>,
+    /// It was told where it is.
+    pub(super) r1_relocated: bool,
+    /// The state after which it was asked for another.
+    pub(super) r1_asked: Option<Moment>,
 }
 
 impl Vehicle {

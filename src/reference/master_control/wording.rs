@@ -8,6 +8,9 @@ use super::tolerances::{ToleranceName as T, Tolerances};
 /// Stands for a token no JSON writer produces.
 const NAN: &str = "@NaN@";
 
+/// Stands for a number beyond all numbers.
+const INFINITE: &str = "@Infinite@";
+
 /// Applies what changes the content of a message.
 pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, message: &mut Value) {
     if name == "order" {
@@ -29,6 +32,12 @@ pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, messa
     {
         message["instantActions"] = actions;
     }
+    if name == "instantActions"
+        && faults.has(F::R1OneInstantNotInArray)
+        && let Some([only]) = message["actions"].as_array().map(Vec::as_slice)
+    {
+        message["actions"] = only.clone();
+    }
     if tolerances.has(T::VendorFields)
         && let Some(message) = message.as_object_mut()
     {
@@ -49,6 +58,16 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
     } else {
         message.to_string().into_bytes()
     };
+    if tolerances.has(T::R1TextEscaped) {
+        text = escaped(&text);
+    }
+    if tolerances.has(T::R1BlankLinesAround) {
+        text = [b"\r\n ".as_slice(), &text, b"\r\n"].concat();
+    }
+    if faults.has(F::R1HorizonSpeedInfinite) {
+        let token = format!("\"{INFINITE}\"");
+        text = replaced(&text, token.as_bytes(), b"1e999");
+    }
     if faults.has(F::NanCoordinate) {
         text = String::from_utf8_lossy(&text)
             .replace(&format!("\"{NAN}\""), "NaN")
@@ -62,6 +81,23 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
         text.push(0);
     }
     text
+}
+
+/// Writes every hyphen within a text as its code point.
+fn escaped(text: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(text.len() * 2);
+    let (mut inside, mut after) = (false, false);
+    for byte in text {
+        match byte {
+            b'-' if inside && !after => out.extend_from_slice(b"\\u002d"),
+            _ => out.push(*byte),
+        }
+        if *byte == b'"' && !after {
+            inside = !inside;
+        }
+        after = *byte == b'\\' && !after;
+    }
+    out
 }
 
 fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
@@ -128,6 +164,14 @@ fn identity(faults: Faults, update: bool, message: &mut Value) {
     if faults.has(F::UpdateIdMissing) && !update {
         remove(message, "orderUpdateId");
     }
+    if faults.has(F::R1NumericalIdsAsNumbers)
+        && let Ok(number) = id.parse::<u64>()
+    {
+        message["orderId"] = json!(number);
+    }
+    if faults.has(F::R1ZoneSetNullInUpdates) && update {
+        message["zoneSetId"] = Value::Null;
+    }
     if faults.has(F::ZoneSetEmpty) {
         message["zoneSetId"] = json!("");
     }
@@ -137,6 +181,16 @@ fn identity(faults: Faults, update: bool, message: &mut Value) {
 fn stitching(faults: Faults, message: &mut Value) {
     let id = format!("added-{}", message["orderUpdateId"]);
     if let Some(node) = elements(message, "nodes").next() {
+        if faults.has(F::R1StitchingDeviationWidened)
+            && let Some(position) = node.get_mut("nodePosition").and_then(Value::as_object_mut)
+        {
+            position.insert("allowedDeviationXY".into(), json!(1.0));
+        }
+        if faults.has(F::R1StitchingActionsRenamed) {
+            for action in elements(node, "actions") {
+                action["actionId"] = json!(format!("{}-{id}", action["actionId"].as_str().unwrap_or_default()));
+            }
+        }
         if faults.has(F::StitchingMoved)
             && let Some(x) = node.pointer_mut("/nodePosition/x")
         {
@@ -164,6 +218,7 @@ fn stitching(faults: Faults, message: &mut Value) {
 fn numbering(faults: Faults, first: u64, message: &mut Value) {
     let changed = |sequence: u64| match () {
         () if faults.has(F::SequenceFromOne) => sequence + 1,
+        () if first > 0 && faults.has(F::R1StitchingNumberedAgain) => sequence + 2,
         () if faults.has(F::SequencePerKind) => sequence / 2,
         () if faults.has(F::SequenceRestarts) => sequence.saturating_sub(first),
         () => sequence,
@@ -227,6 +282,19 @@ fn node(faults: Faults, node: &mut Value) {
     if faults.has(F::ReleasedMissing) && node["released"] == json!(false) {
         remove(node, "released");
     }
+    let planned = node["released"] == json!(false);
+    let stops = !node["actions"].as_array().is_none_or(Vec::is_empty);
+    if planned && stops && faults.has(F::R1StationsAlwaysReleased) {
+        node["released"] = json!(true);
+    }
+    if planned && faults.has(F::R1HorizonWithoutPosition) {
+        remove(node, "nodePosition");
+    }
+    if faults.has(F::R1OneActionNotInArray)
+        && let Some([only]) = node["actions"].as_array().map(Vec::as_slice)
+    {
+        node["actions"] = only.clone();
+    }
     element(faults, node);
 }
 
@@ -236,6 +304,10 @@ fn element(faults: Faults, element: &mut Value) {
         && let Some(released) = element.get("released").and_then(Value::as_bool)
     {
         element["released"] = json!(if released { "TRUE" } else { "FALSE" });
+    }
+    let planned = element["released"] == json!(false);
+    if planned && faults.has(F::R1HorizonWithoutActions) {
+        remove(element, "actions");
     }
     if faults.has(F::SnakeCaseKeys)
         && let Some(sequence) = remove(element, "sequenceId")
@@ -251,6 +323,12 @@ fn position(faults: Faults, position: &mut Map<String, Value>) {
             position.insert(key.to_owned(), json!(number * factor));
         }
     };
+    if faults.has(F::R1NullTheta) && !position.contains_key("theta") {
+        position.insert("theta".into(), Value::Null);
+    }
+    if faults.has(F::R1ZeroCoordinatesOmitted) {
+        position.retain(|key, value| !matches!(key.as_str(), "x" | "y") || value.as_f64() != Some(0.0));
+    }
     if faults.has(F::MirroredMap) {
         scaled(position, "y", -1.0);
     }
@@ -285,6 +363,31 @@ fn edge(faults: Faults, edge: &mut Value) {
         remove(edge, "startNodeId");
         remove(edge, "endNodeId");
     }
+    if faults.has(F::R1EdgeIdWithArrow)
+        && let Some(id) = edge["edgeId"].as_str()
+    {
+        edge["edgeId"] = json!(id.replacen('-', "->", 1));
+    }
+    let back = edge["startNodeId"].as_str() > edge["endNodeId"].as_str();
+    let planned = edge["released"] == json!(false);
+    if planned && edge.get("maxSpeed").is_some() && faults.has(F::R1HorizonSpeedInfinite) {
+        edge["maxSpeed"] = json!(INFINITE);
+    }
+    if back && faults.has(F::R1ReverseEdgesMisdirected) {
+        let (from, to) = (edge["startNodeId"].clone(), edge["endNodeId"].clone());
+        edge["startNodeId"] = to;
+        edge["endNodeId"] = from;
+    }
+    if faults.has(F::R1ReleasedAsNumber)
+        && let Some(released) = edge["released"].as_bool()
+    {
+        edge["released"] = json!(u8::from(released));
+    }
+    if faults.has(F::R1EdgeActionsSingular)
+        && let Some(actions) = remove(edge, "actions")
+    {
+        edge["action"] = actions;
+    }
     if faults.has(F::EdgeIdMissing) {
         remove(edge, "edgeId");
     }
@@ -307,6 +410,20 @@ fn action(faults: Faults, name: &str, action: &mut Value) {
             remove(action, "blockingType");
         }
     }
+    if faults.has(F::R1NumericalIdsAsNumbers)
+        && let Some(number) = action["actionId"].as_str().and_then(|id| id.parse::<u64>().ok())
+    {
+        action["actionId"] = json!(number);
+    }
+    if name == "instantActions" && faults.has(F::R1InstantWithoutBlockingType) {
+        remove(action, "blockingType");
+    }
+    if name == "order"
+        && faults.has(F::R1ActionIdKeyUpperCase)
+        && let Some(id) = remove(action, "actionId")
+    {
+        action["actionID"] = id;
+    }
     if name == "instantActions" && faults.has(F::ActionIdMissing) {
         remove(action, "actionId");
     }
@@ -317,6 +434,9 @@ fn action(faults: Faults, name: &str, action: &mut Value) {
         (F::DownloadWithoutLink, "downloadMap", "mapDownloadLink"),
         (F::DownloadWithoutId, "downloadMap", "mapId"),
         (F::DownloadWithoutVersion, "downloadMap", "mapVersion"),
+        (F::R1EnableMapWithoutVersion, "enableMap", "mapVersion"),
+        (F::R1DeleteMapWithoutVersion, "deleteMap", "mapVersion"),
+        (F::R1TriggerTypeMissing, "waitForTrigger", "triggerType"),
     ];
     if let Some(parameters) = action.get_mut("actionParameters").and_then(Value::as_array_mut) {
         for (fault, of, key) in left_out {
@@ -326,6 +446,12 @@ fn action(faults: Faults, name: &str, action: &mut Value) {
         }
         for parameter in parameters.iter_mut() {
             self::parameter(faults, &kind, parameter);
+        }
+        if faults.has(F::R1ParametersByKey) {
+            for parameter in parameters.iter_mut() {
+                let key = parameter["key"].as_str().unwrap_or_default().to_owned();
+                *parameter = Value::Object(Map::from_iter([(key, parameter["value"].clone())]));
+            }
         }
         if faults.has(F::ParametersAsObject) {
             let members = parameters.iter().filter_map(|parameter| {
@@ -342,6 +468,19 @@ fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
     let key = parameter["key"].as_str().unwrap_or_default().to_owned();
     if faults.has(F::StationTypeRenamed) && key == "stationType" {
         parameter["key"] = json!("station_type");
+    }
+    if faults.has(F::R1TriggerTypeRenamed) && kind == "waitForTrigger" && key == "triggerType" {
+        parameter["key"] = json!("trigger");
+    }
+    if faults.has(F::R1DeviceAsNumber) && key == "lhd" {
+        parameter["value"] = json!(0);
+    }
+    if faults.has(F::R1InitPositionAxesSwapped) && kind == "initPosition" {
+        match key.as_str() {
+            "x" => parameter["key"] = json!("y"),
+            "y" => parameter["key"] = json!("x"),
+            _ => {}
+        }
     }
     if faults.has(F::PoseAsText)
         && kind == "initPosition"

@@ -7,6 +7,7 @@ use crate::reference::agv::actions::{Action, Origin, Status};
 use crate::reference::agv::book::Stop;
 use crate::reference::agv::faults::FaultName as F;
 use crate::reference::agv::order_message::Edge;
+use crate::reference::agv::tolerances::ToleranceName as T;
 use crate::reference::agv::{Agv, Load, Mode};
 
 impl Agv {
@@ -29,7 +30,11 @@ impl Agv {
         if self.config.has("maps") {
             set("maps", self.maps.picture(self.faults));
         }
-        set("orderId", json!(order_id));
+        if has(F::R1NoOrderNull) && !self.book.has_order() {
+            set("orderId", Value::Null);
+        } else {
+            set("orderId", json!(order_id));
+        }
         let reset = complete && has(F::UpdateIdResetWhenDone);
         set("orderUpdateId", json!(if reset { 0 } else { self.book.update_id }));
         if let Some(zones) = &self.config.zone_set {
@@ -48,15 +53,31 @@ impl Agv {
         if has(F::DistanceNegative) {
             set("distanceSinceLastNode", json!(-1.0));
         }
+        let here = Origin::Node(self.book.last_sequence);
+        let working = self
+            .actions
+            .iter()
+            .any(|action| action.origin == here && !action.status.is_terminal());
+        let before = working && !self.book.previous.0.is_empty() && has(F::R1LastNodeAfterActions);
+        let last_node = if before { &self.book.previous.0 } else { last_node };
         set("lastNodeId", json!(last_node));
-        set("lastNodeSequenceId", json!(self.book.last_sequence));
-        set("nodeStates", self.node_states(complete));
-        set("edgeStates", self.edge_states(complete));
+        let last_sequence = match () {
+            () if before => self.book.previous.1,
+            () if complete && has(F::R1LastSequenceResetWhenDone) => 0,
+            () => self.book.last_sequence,
+        };
+        set("lastNodeSequenceId", json!(last_sequence));
+        if !(has(F::R1RouteOmittedWhenIdle) && self.book.nodes.is_empty()) {
+            set("nodeStates", self.node_states(complete));
+            set("edgeStates", self.edge_states(complete));
+        }
         if !self.config.line_guided() {
             set("agvPosition", self.position_picture());
         }
         set("velocity", self.velocity_picture());
-        set("loads", self.loads_picture());
+        if !(has(F::R1LoadsOmittedWhenEmpty) && self.loads.is_empty()) {
+            set("loads", self.loads_picture());
+        }
         set(
             "driving",
             if has(F::DrivingAsText) {
@@ -67,7 +88,9 @@ impl Agv {
         );
         if !has(F::PauseFlagMissing) {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
-            set("paused", json!(self.holds.pause || button || self.holds.emergency));
+            let idle = complete && self.faults.has(F::R1PauseUnreportedWhenIdle);
+            let pause = self.holds.pause && !idle;
+            set("paused", json!(pause || button || self.holds.emergency));
         }
         let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
         set(
@@ -107,7 +130,11 @@ impl Agv {
         } else if self.is_flashing() {
             set(
                 "information",
-                json!([{ "infoType": "warningLights", "infoLevel": "INFO" }]),
+                if has(F::R1InfoTypeMissing) {
+                    json!([{ "infoDescription": "warning lights on", "infoLevel": "INFO" }])
+                } else {
+                    json!([{ "infoType": "warningLights", "infoLevel": "INFO" }])
+                },
             );
         } else {
             set("information", json!([]));
@@ -135,8 +162,10 @@ impl Agv {
     fn shows_driving(&self) -> bool {
         let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
         let turning = self.motion.is_turning() && self.faults.has(F::TurnsWithoutDriving);
+        let velocity = self.motion.velocity();
+        let turns = velocity.vx == 0.0 && velocity.omega != 0.0 && self.faults.has(F::R1TurningNotDriving);
         let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
-        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning)
+        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning && !turns)
             || idle
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
             || (self.book.has_order() && self.faults.has(F::DrivingKept))
@@ -149,7 +178,8 @@ impl Agv {
     }
 
     fn node_states(&self, complete: bool) -> Value {
-        if self.hides_route() {
+        let ends_on_next = self.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node);
+        if self.hides_route() || (ends_on_next && self.faults.has(F::R1CancelHidesNextNode)) {
             return json!([]);
         }
         let left = self.book.left.0.as_ref().filter(|_| {
@@ -161,6 +191,14 @@ impl Agv {
             .nodes
             .iter()
             .filter(|stop| stop.node.released || !self.faults.has(F::HorizonNotReported));
+        let mut planned = 0;
+        let mut listed: Vec<&str> = Vec::new();
+        let shown = shown.filter(|stop| {
+            planned += u32::from(!stop.node.released);
+            let again = listed.contains(&stop.node.id.as_str());
+            listed.push(&stop.node.id);
+            !(planned > 1 && self.faults.has(F::R1HorizonCutToOne)) && !(again && self.faults.has(F::R1LoopNodesMerged))
+        });
         left.into_iter()
             .chain(shown)
             .map(|stop| self.node_state(stop))
@@ -207,11 +245,20 @@ impl Agv {
             .edges
             .iter()
             .filter(|edge| edge.released || !self.faults.has(F::HorizonNotReported));
+        let entered = self
+            .book
+            .edge_ahead()
+            .filter(|_| self.book.entered)
+            .map(|edge| edge.sequence_id);
+        let hidden = entered.filter(|_| self.faults.has(F::R1EnteredEdgeUnlisted));
+        let shown = shown.filter(|edge| Some(edge.sequence_id) != hidden);
+        let next = self.book.edges.front().map(|edge| edge.sequence_id);
         let picture = |edge: &Edge| {
+            let far = Some(edge.sequence_id) != next && self.faults.has(F::R1FarEdgesUnreleased);
             let mut picture = json!({
                 "edgeId": edge.id,
                 "sequenceId": edge.sequence_id,
-                "released": edge.released || self.faults.has(F::HorizonReportedReleased),
+                "released": edge.released && !far || self.faults.has(F::HorizonReportedReleased),
             });
             if let Some(path) = self.planned_path(edge) {
                 picture["trajectory"] = path;
@@ -228,6 +275,7 @@ impl Agv {
         };
         let hidden = (of_horizon && self.faults.has(F::HorizonActionsMissing))
             || (!action.of_order() && self.faults.has(F::InstantActionUnlisted))
+            || (!action.of_order() && action.status == Status::Failed && self.faults.has(F::R1FailedInstantUnlisted))
             || (matches!(action.origin, Origin::Edge(_))
                 && action.status == Status::Waiting
                 && self.faults.has(F::EdgeActionsUnlisted))
@@ -244,6 +292,11 @@ impl Agv {
             Status::Waiting | Status::Initializing if early_pick => "RUNNING",
             Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
+            Status::Running
+                if action.of_order() && self.book.cancel.is_some() && self.faults.has(F::R1CancelShowsPaused) =>
+            {
+                "PAUSED"
+            }
             status => status.literal(),
         };
         let lower = self.faults.has(F::StatusLowerCase);
@@ -273,8 +326,17 @@ impl Agv {
         {
             (pose.x, pose.y) = (start.x, start.y);
         }
+        let trembling = if self.takes(T::R1PositionTrembles) {
+            [0.0, 0.003, -0.002, 0.001, -0.003][usize::try_from(self.states_sent % 5).unwrap_or_default()]
+        } else {
+            0.0
+        };
         let theta = if self.faults.has(F::DegreesReported) {
             pose.theta.to_degrees() + 180.0
+        } else if self.faults.has(F::R1ThetaNeverNegative) {
+            pose.theta.rem_euclid(2.0 * std::f64::consts::PI)
+        } else if self.takes(T::R1ThetaMinusPi) && pose.theta > std::f64::consts::PI - 1e-9 {
+            -std::f64::consts::PI
         } else {
             pose.theta
         };
@@ -297,8 +359,8 @@ impl Agv {
         };
         json!({
             "positionInitialized": !(self.lost || self.persona.lost),
-            "localizationScore": 0.98,
-            "x": number(pose.x),
+            "localizationScore": if self.faults.has(F::R1LocalizationScorePercent) { 98.0 } else { 0.98 },
+            "x": number(pose.x + trembling),
             "y": number(y),
             "theta": theta,
             "mapId": map_id,
@@ -308,6 +370,14 @@ impl Agv {
     /// velocity, also for the visualization.
     pub(super) fn velocity_picture(&self) -> Value {
         let velocity = self.motion.velocity();
+        if self.faults.has(F::R1VelocityInMapAxes) {
+            let theta = self.motion.pose(self.moment()).theta;
+            let (vx, vy) = (velocity.vx * theta.cos(), velocity.vx * theta.sin());
+            return json!({ "vx": vx, "vy": vy, "omega": velocity.omega });
+        }
+        if self.faults.has(F::R1OmegaClockwise) {
+            return json!({ "vx": velocity.vx, "vy": 0.0, "omega": -velocity.omega });
+        }
         let vx = if self.faults.has(F::VelocityMirrored) {
             -velocity.vx
         } else {
@@ -317,7 +387,7 @@ impl Agv {
     }
 
     fn loads_picture(&self) -> Value {
-        if self.faults.has(F::LoadsAlwaysEmpty) {
+        if self.faults.has(F::LoadsAlwaysEmpty) || self.hidden_load.is_some() {
             return json!([]);
         }
         let weight = if self.faults.has(F::LoadWeightNegative) {
@@ -329,9 +399,13 @@ impl Agv {
             json!({
                 "loadId": load.id,
                 "loadType": load.kind,
-                "loadPosition": load.position,
+                "loadPosition": if self.faults.has(F::R1LoadPositionUnlisted) { "1" } else { &load.position },
                 "boundingBoxReference": { "x": 0.0, "y": 0.0, "z": 0.0 },
-                "loadDimensions": { "length": 1.2, "width": 0.8, "height": MAX_HEIGHT / 2.0 },
+                "loadDimensions": if self.faults.has(F::R1LoadWidthMissing) {
+                    json!({ "length": 1.2, "height": MAX_HEIGHT / 2.0 })
+                } else {
+                    json!({ "length": 1.2, "width": 0.8, "height": MAX_HEIGHT / 2.0 })
+                },
                 "weight": weight,
             })
         };
@@ -344,12 +418,21 @@ impl Agv {
         if !self.faults.has(F::ChargeMissing) {
             let charge = match self.motion.is_moving() {
                 moving if self.faults.has(F::ChargeGoodBad) => json!(if moving { 0.0 } else { 100.0 }),
+                _ if self.takes(T::R1BatteryDrains) && self.persona.charge.is_none() => {
+                    let used = u32::try_from(self.states_sent % 5_000).unwrap_or_default();
+                    json!(87.5 - f64::from(used) * 0.01)
+                }
                 _ => json!(self.persona.charge.unwrap_or(87.5)),
             };
             battery.insert("batteryCharge".into(), charge);
         }
         battery.insert("batteryVoltage".into(), json!(48.2));
-        battery.insert("batteryHealth".into(), json!(96));
+        let health = if self.faults.has(F::R1BatteryHealthUnknown) {
+            255
+        } else {
+            96
+        };
+        battery.insert("batteryHealth".into(), json!(health));
         let charging = if self.faults.has(F::BooleanAsText) {
             json!(self.charging.to_string())
         } else {
@@ -374,6 +457,7 @@ impl Agv {
             Mode::Manual if next => "SERVICE",
             Mode::Service if next => "TEACHIN",
             Mode::Teachin if next => "SEMIAUTOMATIC",
+            Mode::Semiautomatic if self.faults.has(F::R1SemiautomaticUnderscore) => "SEMI_AUTOMATIC",
             Mode::Automatic => "AUTOMATIC",
             Mode::Semiautomatic => "SEMIAUTOMATIC",
             Mode::Manual => "MANUAL",
@@ -388,9 +472,10 @@ impl Agv {
     }
 
     fn safety(&self) -> Value {
-        let stopped = self.holds.emergency && !self.faults.has(F::EmergencyStopUnreported);
+        let stopped = (self.holds.emergency || self.latched) && !self.faults.has(F::EmergencyStopUnreported);
         let emergency_stop = match () {
             () if stopped => "MANUAL",
+            () if self.holds.field && self.faults.has(F::R1AutoAckMixedCase) => "AutoAck",
             () if self.holds.field => "AUTOACK",
             () if self.faults.has(F::EmergencyStopSpelled) => "Off",
             () if self.faults.has(F::EmergencyStopNull) => {
@@ -398,6 +483,11 @@ impl Agv {
             }
             () => "NONE",
         };
-        json!({ "eStop": emergency_stop, "fieldViolation": self.holds.field })
+        let violation = if self.holds.field && self.faults.has(F::R1FieldViolationCounted) {
+            json!(1)
+        } else {
+            json!(self.holds.field)
+        };
+        json!({ "eStop": emergency_stop, "fieldViolation": violation })
     }
 }

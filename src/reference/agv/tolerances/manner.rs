@@ -62,6 +62,7 @@ fn state(tolerances: Tolerances, state: &mut Map<String, Value>, even: bool) {
                 "errorReferences": [{ "referenceKey": "part", "referenceValue": "brush 2" }] }),
         );
     }
+    worded_otherwise(tolerances, state);
     if has(T::DescriptionsEverywhere)
         && let Some(Value::Array(actions)) = state.get_mut("actionStates")
     {
@@ -74,6 +75,81 @@ fn state(tolerances: Tolerances, state: &mut Map<String, Value>, even: bool) {
     }
     if has(T::OptionalOmitted) {
         for key in OPTIONAL {
+            state.remove(key);
+        }
+    }
+}
+
+/// What a vehicle may leave out, or list in another order.
+fn worded_otherwise(tolerances: Tolerances, state: &mut Map<String, Value>) {
+    let has = |tolerance| tolerances.has(tolerance);
+    for (list, tolerance) in [
+        ("actionStates", T::R1ActionStatesReversed),
+        ("errors", T::R1ErrorsNewestFirst),
+        ("maps", T::R1MapsReversed),
+    ] {
+        if let Some(Value::Array(entries)) = state.get_mut(list).filter(|_| has(tolerance)) {
+            entries.reverse();
+        }
+    }
+    if let Some(Value::Array(errors)) = state.get_mut("errors") {
+        for error in errors.iter_mut().filter_map(Value::as_object_mut) {
+            if has(T::R1ErrorsUndescribed) {
+                error.remove("errorDescription");
+            }
+            if has(T::R1ReferencesReversed)
+                && let Some(Value::Array(references)) = error.get_mut("errorReferences")
+            {
+                references.reverse();
+            }
+            let none = error
+                .get("errorReferences")
+                .and_then(Value::as_array)
+                .is_some_and(Vec::is_empty);
+            if none && has(T::R1EmptyReferencesOmitted) {
+                error.remove("errorReferences");
+            }
+        }
+    }
+    if let Some(Value::Array(actions)) = state.get_mut("actionStates") {
+        for action in actions.iter_mut().filter_map(Value::as_object_mut) {
+            if has(T::R1ActionTypeOmitted) {
+                action.remove("actionType");
+            }
+            let finished = action.get("actionStatus").is_some_and(|status| status == "FINISHED");
+            if finished && has(T::R1ResultsEverywhere) {
+                action.entry("resultDescription").or_insert_with(|| json!("done"));
+            }
+        }
+    }
+    for list in ["nodeStates", "edgeStates"] {
+        if let Some(Value::Array(entries)) = state.get_mut(list) {
+            for entry in entries.iter_mut().filter_map(Value::as_object_mut) {
+                if has(T::R1NodePositionOmitted) {
+                    entry.remove("nodePosition");
+                }
+                if has(T::R1RouteDescribed) {
+                    let key = if list == "nodeStates" {
+                        "nodeDescription"
+                    } else {
+                        "edgeDescription"
+                    };
+                    entry.insert(key.into(), json!("as it is called in the vehicle"));
+                }
+            }
+        }
+    }
+    if has(T::R1BatteryMinimal)
+        && let Some(Value::Object(battery)) = state.get_mut("batteryState")
+    {
+        battery.retain(|key, _| key == "batteryCharge" || key == "charging");
+    }
+    for (key, tolerance) in [
+        ("information", T::R1InformationOmitted),
+        ("newBaseRequest", T::R1NewBaseNeverRequested),
+        ("loads", T::R1LoadsUndetermined),
+    ] {
+        if has(tolerance) {
             state.remove(key);
         }
     }
