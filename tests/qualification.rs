@@ -118,7 +118,7 @@ fn prove_version(side: &Side, library: &Library, pack: &Pack) {
     );
 
     let outcome = retried(library, pack, side.role, outcome);
-    hold_to_failing(side.role, &outcome);
+    hold_to_failing(side.role, &outcome, &excused);
     hold_to_what_is_first(rows(side.first, library, pack), &outcome);
     let name = match is_latest {
         true => side.matrix.to_owned(),
@@ -164,11 +164,13 @@ fn retried(library: &Library, pack: &Pack, role: Role, mut outcome: Qualificatio
     outcome
 }
 
-/// A fault ends in a fail, and a lapse in no more than a warning, or undecided.
-fn hold_to_failing(role: Role, outcome: &Qualification) {
+/// A fault ends in a fail, and a lapse in no more than a warning, or undecided. What cannot show in a version is excused
+/// there.
+fn hold_to_failing(role: Role, outcome: &Qualification, excused: &[(String, String)]) {
     let named = |fails: bool| {
         let kills = outcome.kills.iter();
-        let wrong = kills.filter(move |kill| {
+        let shows = kills.filter(|kill| !excused.iter().any(|(name, _)| name == kill.fault.name));
+        let wrong = shows.filter(move |kill| {
             (kill.verdict == Some(Verdict::Fail)) == fails && BuiltIn::lapse(role, kill.fault.name).is_some() == fails
         });
         wrong.map(|kill| kill.fault.name).collect::<Vec<_>>()

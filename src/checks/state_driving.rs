@@ -222,6 +222,8 @@ struct PositionMoves {
     nodes: BTreeMap<String, (String, f64, f64)>,
     /// The last node, and the pose when it was reached.
     before: Option<(String, Pose)>,
+    /// When something else than driving last set the position.
+    displaced: Option<Moment>,
     stuck: u32,
 }
 
@@ -252,6 +254,7 @@ impl Running for PositionMoves {
         self.traffic.note(entry);
         if is_displaced(entry, context) {
             self.before = None;
+            self.displaced = Some(entry.at().moment);
         }
         if let Some(order) = to_vehicle("order", entry, context) {
             self.learn(order);
@@ -263,6 +266,15 @@ impl Running for PositionMoves {
             self.before = None;
             return false;
         };
+        // A vehicle may be slow to take a new place over.
+        let patience = context.time("react").unwrap_or(COMING_TO_REST);
+        if self
+            .displaced
+            .is_some_and(|since| entry.at().moment.since(since) < patience)
+        {
+            self.before = None;
+            return false;
+        }
         if self.before.as_ref().is_some_and(|(last, _)| *last == node) {
             return false;
         }

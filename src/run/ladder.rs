@@ -281,6 +281,10 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// What the vehicle shows although it stands idle is a lasting mistake, and is read over from here on.
     pub(super) async fn read_over(&mut self, since: crate::clock::Moment) -> Result<bool, EngineError> {
+        // What is listed a moment longer is no lasting mistake: a vehicle may set out late, or tidy up late.
+        if self.obstacles().contains(&Obstacle::Order) && self.rests_within(self.time("slow")).await? {
+            return Ok(false);
+        }
         let judge = self.engine.recorder.judge();
         let idle = Idle {
             answered: self.cancelled.as_deref().is_some_and(|id| has_ended(judge, id)),

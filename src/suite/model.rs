@@ -1,6 +1,8 @@
 //! What a test is, once it has been read and linted.
 
+mod drawn;
 mod monitor;
+mod serving;
 mod vehicle;
 
 use std::sync::Arc;
@@ -8,7 +10,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::diagnostic::{Source, Span};
-use crate::pack::{RequirementId, Role, VersionRange, Way};
+use crate::pack::{RequirementId, Role, VersionRange};
 use crate::pattern::{Pattern, Term};
 
 /// One scripted exchange; one row of `cases:` is one test.
@@ -44,17 +46,6 @@ pub struct Test {
     pub course: CourseNeed,
     /// What it breaks, when it is one of many cases that come from a schema.
     pub drawn: Option<Drawn>,
-}
-
-/// One of many cases that come from a schema, of which a run takes some.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Drawn {
-    /// The topic whose schema it is.
-    pub topic: String,
-    /// How a member is broken.
-    pub way: Way,
-    /// How many cases of the table a run takes.
-    pub draw: usize,
 }
 
 impl Test {
@@ -165,7 +156,9 @@ pub enum Need {
 }
 
 pub use crate::course::CourseNeed;
+pub use drawn::Drawn;
 pub use monitor::{About, Monitor, Rule};
+pub use serving::ServeBehaviour;
 pub use vehicle::{VehicleStep, Which};
 
 /// One step.
@@ -552,26 +545,6 @@ pub struct Serve {
     pub file: Option<Term>,
     /// How it is served.
     pub behaviour: ServeBehaviour,
-}
-
-/// How a map file is served.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ServeBehaviour {
-    /// As it should be.
-    #[default]
-    Well,
-    /// 404.
-    NotFound,
-    /// The connection is accepted and nothing ever comes.
-    Stall,
-    /// Half the body, then the connection is cut.
-    Cut,
-    /// Other bytes than the ones that were hashed.
-    WrongBytes,
-    /// Slowly.
-    Slow,
-    /// The port refuses connections.
-    Unreachable,
 }
 
 /// `operator:`.

@@ -3,11 +3,14 @@
 use std::time::{Duration, Instant};
 
 use crate::bench::{Bench, Profile, REFUSAL};
-use crate::broken::{LATER, step_begun};
+use crate::broken::step_begun;
 use crate::tool::{Running, tool};
 
 /// Leaves the vehicle with an order until its postamble.
 const WAITING: &str = "order-acceptance/horizon-not-entered";
+
+/// Runs after both: it may do more to the vehicle.
+const AFTERWARDS: &str = "connection/after-cut-listens-again";
 
 /// Begins with a hook.
 const GOODBYE: &str = "connection/graceful-goodbye";
@@ -17,7 +20,7 @@ fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_p
     let bench = Bench::new();
     let mut profile = Profile::default().with(&[("quiet", "40 s")]);
     profile.motion = true;
-    let (mut run, port) = bench.start(&profile, &[WAITING, LATER]);
+    let (mut run, port) = bench.start(&profile, &[WAITING, AFTERWARDS]);
     let _agv = bench.agv(port, &[]);
     // The vehicle waits at the decision point, with a horizon left that only a cancelOrder can end.
     step_begun(&bench, &mut run, (WAITING, "steps[1]"));
@@ -31,7 +34,7 @@ fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_p
         "the postamble was left out"
     );
     assert!(
-        !journal.contains(&format!("\"kind\":\"test-begun\",\"test\":\"{LATER}\"")),
+        !journal.contains(&format!("\"kind\":\"test-begun\",\"test\":\"{AFTERWARDS}\"")),
         "it went on"
     );
     assert!(journal.contains("interrupted by the user"));

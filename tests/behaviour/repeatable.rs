@@ -12,7 +12,9 @@ fn decided(tests: &str, seed: &str) -> Value {
     for name in ["started", "settings"] {
         result.as_object_mut().unwrap().remove(name);
     }
-    result
+    // The clock of the day stands in what some assertions expect.
+    let times = regex::Regex::new(r"\d{4}-\d\d-\d\dT[\d:.]+Z").unwrap();
+    serde_json::from_str(&times.replace_all(&result.to_string(), "TIME")).unwrap()
 }
 
 #[test]

@@ -11,17 +11,14 @@ use crate::rig::*;
 async fn a_harness_that_is_held_up_records_by_how_much() {
     let mut rig = rig().await;
     let until = rig.link.now().after(Duration::from_millis(100)).moment;
-    let mut held_up = std::pin::pin!(async {
-        // One thread does everything here, so nothing of the harness gets on meanwhile.
+    // One thread does everything here, so nothing of the harness gets on meanwhile.
+    tokio::spawn(async {
         tokio::time::sleep(Duration::from_millis(50)).await;
         std::thread::sleep(Duration::from_millis(800));
     });
     let mut lag = 0;
     while lag == 0 {
-        let next = tokio::select! {
-            next = rig.link.next(until) => next.unwrap(),
-            () = &mut held_up => continue,
-        };
+        let next = rig.link.next(until).await.unwrap();
         match next.map(|occurrence| occurrence.event) {
             Some(Event::Lag { micros, .. }) => lag = micros,
             Some(_) => {}

@@ -154,7 +154,7 @@ impl Agv {
                 "state.errors": MAX_ERRORS,
             },
             "timing": {
-                "minOrderInterval": if self.takes(T::OrdersSpaced) { 0.5 } else { 0.0 },
+                "minOrderInterval": if self.takes(T::OrdersSpaced) { 0.25 } else { 0.0 },
                 "minStateInterval": min_state_interval,
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },

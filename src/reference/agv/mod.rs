@@ -389,7 +389,7 @@ impl Agv {
     fn overlooks_order(&mut self) -> bool {
         let now = self.moment();
         let before = self.ordered.replace(now);
-        let early = before.is_some_and(|before| now.since(before) < Duration::from_millis(400));
+        let early = before.is_some_and(|before| now.since(before) < Duration::from_millis(150));
         early && self.takes(T::OrdersSpaced)
     }
 

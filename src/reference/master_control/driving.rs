@@ -588,10 +588,7 @@ fn progress(running: &Running, state: &State) -> Fate {
     if state.route_empty() && (running.is_whole() || failed) && running.confirmed {
         // Nothing is left to be driven. Actions that are not listed any more have ended as well.
         let pending = actions().any(|id| state.action(id).is_some_and(|action| !action.is_terminal()));
-        return match (pending, open && state.action_states.is_empty()) {
-            (true, _) => Fate::Runs,
-            _ => Fate::Over,
-        };
+        return if pending { Fate::Runs } else { Fate::Over };
     }
     let halted = !state.driving && !state.node_states.iter().any(|node| node.released);
     if failed || (running.refused && halted) {

@@ -105,7 +105,7 @@ tolerances! {
     ReconnectsLate "reconnects-late" ["MQTT-10"] "Connects again eight seconds after a broken link.";
     KeepAliveTwenty "keep-alive-20" ["CONN-04"] "Asks for a keep-alive of 20 s.";
 
-    OrdersSpaced "orders-spaced" ["FACT-13"] "States a minOrderInterval of half a second, and overlooks an order that comes earlier.";
+    OrdersSpaced "orders-spaced" ["FACT-13"] "States a minOrderInterval of a quarter of a second, and overlooks an order that comes earlier.";
     // Order and actions
     FirstNodeListed "first-node-listed" ["NODE-03", "STATE-12"] "Lists the first node of an order until it sets out from it.";
     StopsOnNodes "stops-on-nodes" ["ORD-06", "STATE-08"] "Stops for a moment on every node.";
