@@ -25,6 +25,22 @@ pub const LAPSES: &[(&str, &str)] = &[
     ("keep-alive-off", "It breaks a recommendation only."),
     ("keep-alive-long", "It breaks a recommendation only."),
     (
+        "edge-ends-assumed",
+        "No sentence obliges a vehicle to check startNodeId and endNodeId; a remark.",
+    ),
+    (
+        "edge-ends-unchecked",
+        "No sentence obliges a vehicle to check startNodeId and endNodeId; a remark.",
+    ),
+    (
+        "sequence-unchecked",
+        "Gaps and repetitions of sequenceIds are for the master control to avoid; no vehicle has to refuse them.",
+    ),
+    (
+        "manual-keeps-actions",
+        "MODE-05 is plain about orders; what becomes of a running action in MANUAL is not said.",
+    ),
+    (
         "speed-min-above-max",
         "A contradiction within the factsheet is remarked on; no sentence forbids it.",
     ),

@@ -579,7 +579,6 @@ fn slower(message: &mut Value, times: u32) {
 fn progress(running: &Running, state: &State) -> Fate {
     let actions = || running.actions().filter_map(|action| action["actionId"].as_str());
     let failed = actions().any(|id| state.action(id).is_some_and(|action| action.action_status == "FAILED"));
-    let open = actions().any(|id| state.action(id).is_none_or(|action| !action.is_terminal()));
     let reached = running.reached(Some(state)) + 1;
     let known = if running.confirmed { running.released } else { reached };
     if state.route_empty() && reached < known && !failed {

@@ -18,10 +18,6 @@ pub const LAPSES: &[(&str, &str)] = &[
         "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning.",
     ),
     (
-        "instant-actions-retained",
-        "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning.",
-    ),
-    (
         "connection-with-qos-0",
         "The QoS is asked of whoever publishes; the ruling of TOPIC-14 is a warning.",
     ),
