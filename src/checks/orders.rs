@@ -211,7 +211,7 @@ impl Orders {
 #[derive(Debug, Default)]
 pub(super) struct Malformed {
     /// orderId, empty where it cannot be read, and orderUpdateId, where it can be.
-    malformed: VecDeque<(String, Option<u64>)>,
+    broken_ones: VecDeque<(String, Option<u64>)>,
     /// The same of the other orders.
     good: VecDeque<(String, u64)>,
     /// No good order has been shown since one that does not even have a name.
@@ -234,9 +234,9 @@ impl Malformed {
             None => {
                 let name: String = text(message, "orderId").chars().take(512).collect();
                 self.nameless |= name.is_empty();
-                self.malformed.push_back((name, number(message, "orderUpdateId")));
-                let excess = self.malformed.len().saturating_sub(MESSAGES);
-                self.malformed.drain(..excess);
+                self.broken_ones.push_back((name, number(message, "orderUpdateId")));
+                let excess = self.broken_ones.len().saturating_sub(MESSAGES);
+                self.broken_ones.drain(..excess);
             }
         }
     }
@@ -253,7 +253,7 @@ impl Malformed {
 
     /// Whether a state shows a malformed order, taken over as if it were none.
     pub fn is_shown_in(&mut self, state: &Value) -> bool {
-        if self.malformed.is_empty() {
+        if self.broken_ones.is_empty() {
             return false;
         }
         let (order, update) = (text(state, "orderId"), number(state, "orderUpdateId"));
@@ -267,7 +267,7 @@ impl Malformed {
             return false;
         }
         let same = |(id, number): &(String, Option<u64>)| id == order && (number.is_none() || *number == update);
-        self.nameless && order.is_empty() || self.malformed.iter().any(same)
+        self.nameless && order.is_empty() || self.broken_ones.iter().any(same)
     }
 }
 

@@ -338,13 +338,7 @@ mod tests {
             "it may have driven and stopped between them"
         );
         assert!(driving(&turning[..2], 0.5).is_empty(), "once may be a matter of timing");
-        assert!(
-            driving(
-                &[at(1.0, 3.14, false), at(1.0, -3.14, false), at(1.0, 3.14, false)],
-                0.5
-            )
-            .is_empty()
-        );
+        assert!(driving(&[at(1.0, 3.1, false), at(1.0, -3.1, false), at(1.0, 3.1, false)], 0.5).is_empty());
     }
 
     #[test]

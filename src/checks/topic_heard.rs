@@ -39,7 +39,7 @@ struct Heard {
     /// Since when each connection is open, and the topics it subscribed to.
     open: BTreeMap<u64, (Moment, BTreeSet<&'static str>)>,
     /// Topics on which something has arrived, or is sure to.
-    heard: BTreeSet<&'static str>,
+    arrived: BTreeSet<&'static str>,
     /// What was sent and has not been delivered yet: topic, entry and time.
     pending: BTreeMap<&'static str, (u64, Moment)>,
     /// Identifiers that were sent, by topic.
@@ -75,14 +75,14 @@ impl Heard {
                     if filters.iter().any(|filter| covers(&filter.filter, topic)) {
                         let opened = (entry.at().moment, BTreeSet::new());
                         self.open.entry(*connection).or_insert(opened).1.insert(name);
-                        self.heard.insert(name);
+                        self.arrived.insert(name);
                         self.pending.remove(name);
                     }
                 }
             }
             Packet::Publish { topic, .. } if down => {
                 if let Some(name) = TOPICS.into_iter().find(|name| context.topics.get(*name) == Some(topic)) {
-                    self.heard.insert(name);
+                    self.arrived.insert(name);
                     self.pending.remove(name);
                 }
             }
@@ -147,7 +147,7 @@ impl Heard {
             .collect();
         for (name, id) in &self.sent {
             if (*name == "order" && id == order) || (*name == "instantActions" && listed.contains(id.as_str())) {
-                self.heard.insert(name);
+                self.arrived.insert(name);
             }
         }
     }
@@ -170,7 +170,7 @@ fn covers(filter: &str, topic: &str) -> bool {
 impl Running for Heard {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
-        let before = self.heard.len();
+        let before = self.arrived.len();
         match entry.event() {
             Event::Closed { connection, .. } => {
                 self.open.remove(connection);
@@ -189,7 +189,7 @@ impl Running for Heard {
             self.reaction(state);
         }
         // Both, or nothing is shown: the one without the other is half of it.
-        self.heard.len() > before && self.heard.len() == TOPICS.len()
+        self.arrived.len() > before && self.arrived.len() == TOPICS.len()
     }
 
     fn finish(&mut self, end: Moment, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {

@@ -138,7 +138,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             self.set_back().await?;
         }
         if self.setup.capabilities.motion.is_ok() && self.obstacles().contains(&Obstacle::Place) {
-            self.to_a_node().await?;
+            self.drive_to_a_node().await?;
         }
         let only_errors = |all: &[Obstacle]| all.iter().all(|one| matches!(one, Obstacle::Fatal(_) | Obstacle::Load));
         if !self.obstacles().is_empty() && only_errors(&self.obstacles()) {
@@ -190,7 +190,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     }
 
     /// An order from a temporary node where the vehicle stands to the nearest node, or the hook that does the same.
-    async fn to_a_node(&mut self) -> Result<(), EngineError> {
+    async fn drive_to_a_node(&mut self) -> Result<(), EngineError> {
         let state = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
         let (Some(state), Some(layout)) = (state, self.setup.layout.as_ref()) else {
             return Ok(());

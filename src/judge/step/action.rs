@@ -155,6 +155,7 @@ impl Walking {
         self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost || self.lasting
     }
 
+    #[expect(clippy::unnecessary_wraps, reason = "the other evaluators may have none")]
     pub(super) fn timing(&self) -> Option<Timing> {
         let (since, limit) = (self.position.base, self.limit.soft);
         match &self.last {

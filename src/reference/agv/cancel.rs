@@ -116,7 +116,7 @@ impl Agv {
             };
             match action.status {
                 Status::Waiting if planned && faults.has(F::R1CancelFinishesHorizonActions) => {
-                    action.end(Status::Finished)
+                    action.end(Status::Finished);
                 }
                 _ if survives(action, faults) => {}
                 Status::Waiting if !faults.has(F::CancelLeavesWaiting) => action.end(Status::Failed),

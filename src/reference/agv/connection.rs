@@ -131,9 +131,9 @@ impl Agv {
         };
         let wanted: &[&str] = if self.connection.returning && self.faults.has(F::NotSubscribedAgain) {
             &[]
-        } else if self.connection.returning && self.faults.has(F::R1InstantActionsNotSubscribedAgain) {
-            &["order"]
-        } else if self.faults.has(F::InstantActionsNotSubscribed) {
+        } else if self.faults.has(F::InstantActionsNotSubscribed)
+            || (self.connection.returning && self.faults.has(F::R1InstantActionsNotSubscribedAgain))
+        {
             &["order"]
         } else {
             &["order", "instantActions"]

@@ -197,7 +197,8 @@ impl Agv {
             planned += u32::from(!stop.node.released);
             let again = listed.contains(&stop.node.id.as_str());
             listed.push(&stop.node.id);
-            !(planned > 1 && self.faults.has(F::R1HorizonCutToOne)) && !(again && self.faults.has(F::R1LoopNodesMerged))
+            !((planned > 1 && self.faults.has(F::R1HorizonCutToOne))
+                || (again && self.faults.has(F::R1LoopNodesMerged)))
         });
         left.into_iter()
             .chain(shown)
