@@ -60,10 +60,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     ("cancel-lets-run", "It breaks a recommendation only."),
     ("cancel-fails-early", "It breaks a recommendation only."),
     (
-        "validation-error-lingers",
-        "That the error goes with the next order is implied only; the ruling of ORD-REJ-03 is a warning.",
-    ),
-    (
         "header-unchecked",
         "No sentence says what becomes of an order whose header is broken; that it is malformed is a matter of reading.",
     ),
@@ -74,10 +70,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     ("unknown-instant-waits", "It breaks a recommendation only."),
     ("unknown-instant-silent", "It breaks a recommendation only."),
     ("unknown-instant-unreferenced", "It breaks a recommendation only."),
-    (
-        "order-error-as-validation",
-        "The name within the family is a preference by the ruling of ORD-REJ-06, and what follows is not reached.",
-    ),
     (
         "max-rotation-speed-ignored",
         "The turn takes place while the edge is entered; whether it belongs to the edge yet is a matter of reading.",
