@@ -15,8 +15,8 @@ use crate::journal::Entry;
 pub(super) const LIMITS: Check = Check {
     name: "factsheet/limits",
     decides: &["FACT-05"],
-    doc: "Each member of maxStringLens and maxArrayLens is a number under its literal name, which for arrays has a dot, and \
-          no object that holds the numbers.",
+    doc: "Each member of maxStringLens and maxArrayLens is a number under its literal name, which for arrays has a dot: what \
+          comes before the dot is no object that holds the numbers. Members of other names are not judged.",
     arguments: &[],
     start: |_| Box::new(Limits::default()),
 };
@@ -98,6 +98,23 @@ impl Running for Consistency {
     }
 }
 
+/// What the literal names with a dot begin with.
+const FIRST_PARTS: [&str; 13] = [
+    "order",
+    "node",
+    "edge",
+    "actions",
+    "instantActions",
+    "trajectory",
+    "state",
+    "error",
+    "errors",
+    "information",
+    "topic",
+    "msg",
+    "id",
+];
+
 #[derive(Default)]
 struct Limits {
     traffic: Traffic,
@@ -116,7 +133,8 @@ impl Running for Limits {
             let members = limits.and_then(|limits| limits.get(name)?.as_object());
             for (key, value) in members.into_iter().flatten().take(ELEMENTS) {
                 judged = true;
-                if value.is_object() || value.is_array() {
+                // A manufacturer may add members of any kind.
+                if (value.is_object() || value.is_array()) && FIRST_PARTS.contains(&key.as_str()) {
                     let text = format!("{name}.{} holds {}, which is no number", quote(key), show(value));
                     findings.push(broken("FACT-05", entry.seq(), text));
                 }
