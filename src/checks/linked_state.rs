@@ -10,10 +10,11 @@ use serde_json::Value;
 use super::continuity::Continuity;
 use super::orders::sets_position;
 use super::state_driving::Pose;
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, show, state, text, to_vehicle};
+use super::traffic::{Traffic, actions, broken, elements, quote, show, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
+use crate::journal::event::Event;
 
 /// How many actions are kept in mind.
 const ACTIONS: usize = 1024;
@@ -59,10 +60,14 @@ struct Linked {
     known: BTreeMap<String, Known>,
     /// Seen FINISHED or FAILED.
     ended: BTreeSet<String>,
-    touched: Option<Moment>,
+    /// When a person or a hook last had a hand in something.
+    touched: BTreeMap<&'static str, Moment>,
     /// orderId of the last state, if there was one since the start or a restart.
     order: Option<String>,
 }
+
+/// Everything that is looked at.
+const TOPICS: [&str; 5] = ["pause", "charging", "maps", "pose", "order"];
 
 /// What two actions may both change.
 fn topic(kind: &str) -> Option<&'static str> {
@@ -73,6 +78,21 @@ fn topic(kind: &str) -> Option<&'static str> {
         "cancelOrder" => Some("order"),
         kind if sets_position(kind) => Some("pose"),
         _ => None,
+    }
+}
+
+/// What a hook may have changed beside the protocol, or a person. Loads, obstacles and triggers are none of it.
+fn touched(entry: &Entry) -> &'static [&'static str] {
+    let Event::Hook { hook, .. } = entry.event() else {
+        let answered = matches!(entry.event(), Event::Answer { .. });
+        return if answered { &TOPICS } else { &[] };
+    };
+    match hook.as_str() {
+        "place-load" | "remove-load" | "trigger" | "confirm" | "place-obstacle" | "remove-obstacle" => &[],
+        "press-pause" | "release-pause" | "block-pause" | "unblock-pause" => &["pause"],
+        "lock-charger" | "unlock-charger" => &["charging"],
+        "enable-map" => &["maps", "pose"],
+        _ => &TOPICS,
     }
 }
 
@@ -195,8 +215,8 @@ impl Running for Linked {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.learn(entry, context);
-        if outside_influence(entry) {
-            self.touched = Some(entry.at().moment);
+        for topic in touched(entry) {
+            self.touched.insert(topic, entry.at().moment);
         }
         if self.life.restarted(self.traffic, entry, context) {
             self.order = None;
@@ -208,7 +228,7 @@ impl Running for Linked {
         let same_order = self.order.as_ref() == Some(&order);
         let begun = self.order.replace(order).is_some();
         let now = entry.at().moment;
-        let left_alone = self.touched.is_none_or(|at| now.since(at) > INFLUENCE);
+        let left_alone = |topic| self.touched.get(topic).is_none_or(|at| now.since(*at) > INFLUENCE);
         let still = state.get("driving").and_then(Value::as_bool) == Some(false);
         let listed: Vec<(&str, &str)> = elements(state, "actionStates")
             .take(ACTIONS)
@@ -241,7 +261,8 @@ impl Running for Linked {
                 Some("order") => same_order,
                 _ => still,
             };
-            if rivals.count() != 1 || !begun || !left_alone || !fits {
+            let free = topic(&known.kind).is_some_and(left_alone);
+            if rivals.count() != 1 || !begun || !free || !fits {
                 continue;
             }
             judged = true;

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use serde_json::Value;
 
 use super::continuity::Continuity;
-use super::orders::{Malformed, last_node, may_abandon, number, read_elements};
+use super::orders::{Element, Malformed, last_node, may_abandon, number, read_elements};
 use super::traffic::{Traffic, actions, broken, outside_influence, quote, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
@@ -62,8 +62,8 @@ type Pair = (String, u64);
 struct Before {
     pair: Pair,
     last: Option<(String, u64)>,
-    /// nodeId and released of the last node that is listed, if it is still ahead.
-    end: Option<(String, bool)>,
+    /// What nodeStates list, if something of it is still ahead of the vehicle.
+    ahead: Option<Vec<Element>>,
     may_be_over: bool,
 }
 
@@ -141,24 +141,35 @@ impl OrderKnown {
     }
 
     /// What is wrong with a new order that replaces another one.
-    fn too_early(&self, before: &Before, now: &Pair, last: Option<&(String, u64)>) -> Option<(&'static str, String)> {
+    fn too_early(&self, before: &Before, now: &Before) -> Option<(&'static str, String)> {
         let over = before.may_be_over
             || before.pair.0.is_empty()
-            || before.pair.0 == now.0
+            || before.pair.0 == now.pair.0
             || self.cancelled.as_ref() == Some(&before.pair.0)
             || self.since.iter().any(|sent| sent.0 == before.pair.0);
-        let (end, released) = before.end.as_ref().filter(|_| !over)?;
+        let listed = before.ahead.as_ref().filter(|_| !over)?;
+        // One that only shows the other name is wrong about the name.
+        if now.ahead.as_ref() == Some(listed) {
+            return None;
+        }
+        let base = listed.iter().rfind(|node| node.released);
+        let stayed = before.last == now.last;
+        let behind = base.filter(|base| stayed && now.last.as_ref().is_some_and(|(node, _)| *node != base.id));
         let what = format!(
             "the vehicle shows the new order {}, though order {}",
-            quote(&now.0),
+            quote(&now.pair.0),
             quote(&before.pair.0)
         );
-        if !released {
-            let text = format!("{what} had a horizon, and was neither cancelled nor extended");
-            return Some(("ORD-FLOW-03", text));
+        if let Some(base) = behind {
+            return Some(("ORD-FLOW-01", format!("{what} still led to node {}", quote(&base.id))));
         }
-        let stayed = before.last.as_ref() == last && last.is_some_and(|(node, _)| node != end);
-        stayed.then(|| ("ORD-FLOW-01", format!("{what} still led to node {}", quote(end))))
+        let horizon = listed.iter().any(|node| !node.released);
+        horizon.then(|| {
+            (
+                "ORD-FLOW-03",
+                format!("{what} had a horizon, and was neither cancelled nor extended"),
+            )
+        })
     }
 }
 
@@ -167,13 +178,12 @@ fn named(message: &Value) -> Option<Pair> {
     Some((order.chars().take(512).collect(), number(message, "orderUpdateId")?))
 }
 
-/// The last node a state lists, if it stands behind the last node in the order.
-fn end(state: &Value, last: Option<&(String, u64)>) -> Option<(String, bool)> {
+/// What nodeStates list, if it leads away from the last node: what is listed first may be the node the vehicle is on.
+fn ahead(state: &Value, last: Option<&(String, u64)>) -> Option<Vec<Element>> {
     let nodes = read_elements(state, "nodeStates", "nodeId")?;
     let end = nodes.last()?;
-    // What is listed first may be the node the vehicle stands on.
-    let ahead = nodes.len() > 1 || last.is_some_and(|(node, _)| *node != end.id);
-    ahead.then(|| (end.id.clone(), end.released))
+    let leads = nodes.len() > 1 || last.is_some_and(|(node, _)| *node != end.id);
+    leads.then_some(nodes)
 }
 
 impl Running for OrderKnown {
@@ -196,12 +206,12 @@ impl Running for OrderKnown {
         let last = last_node(state);
         let now = Before {
             pair: pair.clone(),
-            last: last.clone(),
-            end: end(state, last.as_ref()),
+            ahead: ahead(state, last.as_ref()),
+            last,
             may_be_over: may_abandon(state),
         };
-        let before = self.before.replace(now);
-        let Some(before) = before else {
+        let Some(before) = self.before.take() else {
+            self.before = Some(now);
             self.since.clear();
             return false;
         };
@@ -213,8 +223,8 @@ impl Running for OrderKnown {
             }
             Part::Replaced => {
                 let other = |sent: &Pair| sent.0 != before.pair.0;
-                let early = self.too_early(&before, &pair, last.as_ref());
-                (before.end.is_some() && self.since.iter().any(other), early)
+                let early = self.too_early(&before, &now);
+                (before.ahead.is_some() && self.since.iter().any(other), early)
             }
         };
         if let Some((requirement, text)) = found {
@@ -223,6 +233,7 @@ impl Running for OrderKnown {
         if before.pair.0 != pair.0 {
             self.cancelled = None;
         }
+        self.before = Some(now);
         self.since.clear();
         judged
     }

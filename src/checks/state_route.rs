@@ -181,14 +181,14 @@ impl RemainingRoute {
         let mut found = Vec::new();
         let remainder = self.remainder(sent, progress, |order| &order.nodes);
         compare("nodeStates", "node", &remainder, nodes, (progress, seq), &mut found);
-        self.twice(nodes, seq, &mut found);
+        self.twice(sent, nodes, seq, &mut found);
         let remainder = self.remainder(sent, progress, |order| &order.edges);
         compare("edgeStates", "edge", &remainder, edges, (progress, seq), &mut found);
         found
     }
 
     /// What more is broken where an update made the vehicle list a visit twice.
-    fn twice(&self, listed: &[Element], seq: u64, found: &mut Vec<CheckFinding>) {
+    fn twice(&self, sent: &SentOrder, listed: &[Element], seq: u64, found: &mut Vec<CheckFinding>) {
         if found.is_empty() {
             return;
         }
@@ -196,7 +196,9 @@ impl RemainingRoute {
             .iter()
             .enumerate()
             .find(|(at, element)| listed[..*at].iter().any(|other| other.sequence == element.sequence));
-        if let Some((_, element)) = twice.filter(|_| self.adopted.len() > 1) {
+        if let Some((_, element)) =
+            twice.filter(|_| self.adopted.len() > 1 && self.adopted.last() == Some(&sent.update))
+        {
             let text = format!("after an update, nodeStates lists node {} twice", quote(&element.id));
             found.insert(0, broken("ORD-FLOW-09", seq, text));
         }
