@@ -6,10 +6,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde_json::Value;
 
+use super::continuity::Continuity;
 use super::orders::number;
-use super::traffic::{
-    Traffic, actions, broken, elements, maybe_restarted, outside_influence, quote, remark, state, text, to_vehicle,
-};
+use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::pack::Pack;
@@ -140,6 +139,7 @@ impl Running for Transitions {
 struct Kept {
     graph: Graph,
     traffic: Traffic,
+    life: Continuity,
     order: Option<(String, u64)>,
     listed: HashMap<String, String>,
     /// actionIds of cancelOrder actions seen on their way to the vehicle.
@@ -152,7 +152,7 @@ impl Running for Kept {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         // A restarted vehicle may have forgotten everything; what it keeps over a restart is not ruled.
-        if outside_influence(entry) || maybe_restarted(self.traffic, entry, context) {
+        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
             self.listed.clear();
         }
         if let Some(message) = to_vehicle("instantActions", entry, context) {

@@ -33,10 +33,19 @@ impl Agv {
         if has(F::R1NoOrderNull) && !self.book.has_order() {
             set("orderId", Value::Null);
         } else {
-            set("orderId", json!(order_id));
+            let prefix = if has(F::OrderIdPrefixed) && !order_id.is_empty() {
+                "7-"
+            } else {
+                ""
+            };
+            set("orderId", json!(format!("{prefix}{order_id}")));
         }
         let reset = complete && has(F::UpdateIdResetWhenDone);
-        set("orderUpdateId", json!(if reset { 0 } else { self.book.update_id }));
+        let more = u32::from(has(F::UpdateIdCounted) && self.book.update_id > 0);
+        set(
+            "orderUpdateId",
+            json!(if reset { 0 } else { self.book.update_id + more }),
+        );
         if let Some(zones) = &self.config.zone_set {
             let invented = has(F::ZoneSetInvented) && self.book.zoned;
             set("zoneSetId", json!(if invented { "factory" } else { zones }));
@@ -167,6 +176,7 @@ impl Agv {
         let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
         (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning && !turns)
             || idle
+            || (self.holds.pause && !self.book.nodes.is_empty() && self.faults.has(F::DrivingInPause))
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
             || (self.book.has_order() && self.faults.has(F::DrivingKept))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
@@ -223,6 +233,13 @@ impl Agv {
             "sequenceId": node.sequence_id,
             "released": node.released || self.faults.has(F::HorizonReportedReleased),
         });
+        let copied = !node.released && self.faults.has(F::HorizonPositionsCopied);
+        let node = self
+            .book
+            .nodes
+            .front()
+            .filter(|_| copied)
+            .map_or(node, |first| &first.node);
         if let Some(position) = node.sent_position.as_ref().filter(|_| !self.config.line_guided()) {
             picture["nodePosition"] = position.clone();
         }
