@@ -197,7 +197,7 @@ pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
     all
 }
 
-/// What was decided, the cases that come from a schema counting as one: which of them are drawn is chance.
+/// What was decided, the cases of a table that is drawn from counting as one: which of them are drawn is chance.
 fn decided_in(library: &Library, result: &RunResult) -> Vec<(Decider, Verdict)> {
     let tests = &library.rules.suites.tests;
     let fold = |mut decider: Decider| {
