@@ -282,6 +282,7 @@ static REGISTRY: &[Check] = &[
     commands::ENABLED,
     commands::DOWNLOADS,
     commands::DUPLICATES,
+    commands::ON_BOARD,
     commands::MODES,
     commands::NOT_ASKED,
     commands::FIRST_PLACE,

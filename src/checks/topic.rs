@@ -17,6 +17,8 @@ use crate::pack::Role;
 
 /// How many different topics are remembered; a device that invents more is judged on the first ones.
 const TOPICS: usize = 64;
+/// How many order messages are remembered.
+const ORDERS: usize = 1024;
 
 /// `topic/names`.
 pub(super) const NAMES: Check = Check {
@@ -24,7 +26,8 @@ pub(super) const NAMES: Check = Check {
     decides: &["TOPIC-01", "TOPIC-02", "TOPIC-03"],
     doc: "The last level of a protocol topic is spelled exactly as defined. Topics whose last level is no variant of \
           a defined name are the vendor's own and not judged, unless what belongs on a defined one is published there \
-          and, for thirty seconds, never where it belongs. Where only the levels before the name differ, that is a warning.",
+          and, for thirty seconds, never where it belongs. An order of a master control belongs on its topic by its \
+          orderId and orderUpdateId. Where only the levels before the name differ, that is a warning.",
     arguments: &[],
     start: |_| Box::new(Names::default()),
 };
@@ -67,6 +70,10 @@ struct Names {
     proper: BTreeSet<String>,
     /// What looks like a message of ours on a topic of another name: by name, where, entry, time, and how often.
     astray: BTreeMap<&'static str, (String, u64, Moment, u32)>,
+    /// Orders that a master control has published where they belong, by orderId and orderUpdateId.
+    orders: BTreeSet<(String, u64)>,
+    /// Those it has published elsewhere below the levels of the vehicle only: where, entry, time.
+    strays: BTreeMap<(String, u64), (String, u64, Moment)>,
 }
 
 /// Members that tell a message of a vehicle wherever it is published.
@@ -89,7 +96,11 @@ pub(super) fn looks_like(message: &Value) -> Option<&'static str> {
 impl Names {
     /// Notes where the device publishes what.
     fn note(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
-        if context.role != Role::Agv || topic.len() > 1024 {
+        if topic.len() > 1024 {
+            return;
+        }
+        if context.role == Role::MasterControl {
+            self.note_order(topic, entry, context);
             return;
         }
         if let Some(name) = context.topic_name(topic) {
@@ -101,6 +112,58 @@ impl Names {
         };
         let first = || (topic.to_owned(), entry.seq(), entry.at().moment, 0);
         self.astray.entry(name).or_insert_with(first).3 += 1;
+    }
+
+    /// Notes where a master control publishes its orders.
+    fn note_order(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
+        let Some(order) = entry
+            .json()
+            .filter(|order| order.get("nodes").is_some_and(Value::is_array))
+        else {
+            return;
+        };
+        let id = order.get("orderId").and_then(Value::as_str);
+        let (Some(id), Some(update)) = (id, order.get("orderUpdateId").and_then(Value::as_u64)) else {
+            return;
+        };
+        let key = (id.chars().take(256).collect(), update);
+        if context.topic_name(topic) == Some("order") {
+            self.strays.remove(&key);
+            if self.orders.len() == ORDERS {
+                self.orders.pop_first();
+            }
+            self.orders.insert(key);
+            return;
+        }
+        let above = |topic: &str| topic.rsplit_once('/').map(|(above, _)| above.to_owned());
+        let beside = context
+            .topics
+            .get("order")
+            .is_some_and(|usual| above(usual) == above(topic));
+        if beside && context.topic_name(topic).is_none() && !self.orders.contains(&key) && self.strays.len() < ORDERS {
+            let place = (topic.to_owned(), entry.seq(), entry.at().moment);
+            self.strays.entry(key).or_insert(place);
+        }
+    }
+
+    /// Orders that came on a topic beside that of orders, and on that of orders never.
+    fn strayed(&mut self, now: Moment, patience: Duration, findings: &mut Vec<CheckFinding>) {
+        let due = |since: &Moment| now.since(*since) >= patience;
+        let late: Vec<_> = self.strays.iter().filter(|(_, (.., since))| due(since)).collect();
+        let late: Vec<_> = late.into_iter().map(|(key, _)| key.clone()).collect();
+        for key in late {
+            let Some((topic, seq, _)) = self.strays.remove(&key) else {
+                continue;
+            };
+            if self.seen.first(&topic) {
+                let (id, update) = (quote(&key.0), key.1);
+                let text = format!(
+                    "order {id}, orderUpdateId {update}, is published on {}, which is no topic name, and not as order",
+                    quote(&topic)
+                );
+                findings.push(broken("TOPIC-01", seq, text));
+            }
+        }
     }
 
     /// Messages that come on another topic, and never on their own.
@@ -138,11 +201,14 @@ impl Names {
 impl Running for Names {
     fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         self.astray(end, context, findings);
+        // What came at the very last may still be on its way to the other topic.
+        self.strayed(end, Duration::from_secs(2), findings);
     }
 
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.astray(entry.at().moment, context, findings);
+        self.strayed(entry.at().moment, ELSEWHERE, findings);
         let topic = match entry.event() {
             Event::Message {
                 topic, retain: false, ..

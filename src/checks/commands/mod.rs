@@ -40,7 +40,7 @@ pub(super) use health::HEALTH;
 pub(super) use identity::{ACTION_IDS, NODE_IDS};
 pub(super) use limits::{ORDER_INTERVAL, SIZES};
 pub(super) use link::{ALIVE, LISTENS};
-pub(super) use maps::{DOWNLOADS, DUPLICATES, ENABLED};
+pub(super) use maps::{DOWNLOADS, DUPLICATES, ENABLED, ON_BOARD};
 pub(super) use modes::MODES;
 pub(super) use parameters::{KEYS, MANDATORY, VALUES};
 pub(super) use place::{CANCELLED_BETWEEN, CANCELLED_ON_NODE, FIRST_PLACE, START};

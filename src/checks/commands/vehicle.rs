@@ -115,7 +115,7 @@ const MOVES: [&str; 14] = [
 ];
 
 /// What makes the states or the answers of a vehicle less than the truth.
-const DEVIATES: [&str; 12] = [
+const DEVIATES: [&str; 11] = [
     "answer-after",
     "state-interval",
     "lose-states",
@@ -127,7 +127,6 @@ const DEVIATES: [&str; 12] = [
     "publish",
     "speak-version",
     "stale-will",
-    "fail-actions",
 ];
 
 /// What happened to the vehicle from outside.

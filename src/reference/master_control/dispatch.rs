@@ -519,12 +519,15 @@ impl Site {
             let limit = sheet.limit(&[name]);
             if self.faults.has(ignored) { usize::MAX } else { limit }
         };
-        let actions = || way.stops.iter().flat_map(|stop| &stop.actions);
+        let on_nodes = way.stops.iter().flat_map(|stop| &stop.actions);
+        let actions = on_nodes.chain(way.legs.iter().flat_map(|leg| &leg.actions));
         let parameters = |action: &Value| action["actionParameters"].as_array().map_or(0, Vec::len);
-        let most = actions().map(parameters).max().unwrap_or_default();
+        let most = actions.map(parameters).max().unwrap_or_default();
+        let busiest = way.legs.iter().map(|leg| leg.actions.len()).max().unwrap_or_default();
         let zero = sheet.has_zeros && self.faults.has(F::ZeroIsALimit);
         !zero
             && Running::busiest(&way.stops) <= limit("node.actions", F::NodeActionsIgnored)
+            && busiest <= limit("edge.actions", F::NodeActionsIgnored)
             && most <= limit("actions.actionsParameters", F::ParametersIgnored)
     }
 }
