@@ -108,6 +108,9 @@ impl Maps {
                 map.enabled = false;
             }
         }
+        if faults.has(F::R2EnableRemovesOldVersion) {
+            self.purge(map_id);
+        }
         Ok(())
     }
 
