@@ -55,7 +55,23 @@ impl Agv {
             return;
         }
         if let Err(refusal) = result {
+            if refusal.is_of_busy() && self.faults.has(F::R2RefusedOrderQueued) {
+                self.queued = message.as_ref().ok().cloned();
+            }
             self.refuse(message.as_ref().unwrap_or(&Value::Null), refusal);
+        }
+    }
+
+    /// `r2-refused-order-queued`: begins the order that came too early.
+    pub(super) fn begin_queued(&mut self) {
+        if self.queued.is_none() || self.is_busy() {
+            return;
+        }
+        self.flush();
+        if let Some(message) = self.queued.take()
+            && self.order_decided(&message).is_ok()
+        {
+            self.settle();
         }
     }
 
@@ -65,6 +81,9 @@ impl Agv {
         let mut order = Order::read(mended.as_ref().unwrap_or(&taken))?;
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
+        }
+        if !order.nodes.is_empty() && self.faults.has(F::R2SurplusEdgeDropped) {
+            order.edges.truncate(order.nodes.len() - 1);
         }
         let tolerated = |defect: &Defect| {
             let unchecked = match defect.path.rsplit('.').next() {
@@ -135,6 +154,9 @@ impl Agv {
     fn seen_again(&mut self) {
         if self.faults.has(F::R1DuplicateClearsErrors) {
             self.errors.new_order();
+        }
+        if self.waits_at_decision_point() && self.faults.has(F::R2DuplicateReleasesHorizon) {
+            self.book.unbound = true;
         }
         if self.is_busy() && self.faults.has(F::R1DuplicateRepeatsActions) {
             self.repeat_actions(self.book.last_sequence);
@@ -253,6 +275,9 @@ impl Agv {
         if self.persona.lost {
             return false;
         }
+        if node.id == self.book.last_node && self.faults.has(F::R2LastNodeTrusted) {
+            return true;
+        }
         let temporary = self.faults.has(F::TemporaryNodeRefused)
             && self.config.node(&node.id).is_none()
             && node.id != self.book.last_node;
@@ -284,6 +309,7 @@ impl Agv {
             self.errors.new_order();
         }
         self.latched = false;
+        self.field_latched = false;
         self.actions.drop_lists();
         if self.faults.has(F::OldActionStatesKept) {
             let ids: Vec<&str> = order.actions().map(|action| action.id.as_str()).collect();
@@ -291,9 +317,11 @@ impl Agv {
         } else {
             let dropped = self.faults.has(F::RunningInstantDropped);
             let cancel_stays = self.faults.has(F::R1CancelOutlivesOrder);
+            let failed_stay = self.faults.has(F::R2FailedActionsOutliveOrder);
             self.actions.retain(|action| {
                 let stays = cancel_stays && action.request.action_type == "cancelOrder";
-                !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
+                let failed = action.of_order() && action.status == super::actions::Status::Failed;
+                failed && failed_stay || !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
             });
         }
         let moment = self.moment();
@@ -308,7 +336,10 @@ impl Agv {
         }
         let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
         let last_update = self.book.has_order().then_some(self.book.update_id);
+        let after_cancel = self.book.cancelled && self.faults.has(F::R2OrderAfterCancelNotDriven);
         self.book = super::book::Book::empty(last.0);
+        let in_pause = (self.holds.pause || self.holds.button) && self.faults.has(F::R2OrderInPauseNeverStarts);
+        self.book.stunned = after_cancel || in_pause;
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
         let carried = last_update.filter(|_| self.faults.has(F::UpdateIdCarriedOver));
@@ -335,6 +366,9 @@ impl Agv {
         if self.takes(T::R1SetsOutLate) {
             self.lingers_until = Some(self.moment() + std::time::Duration::from_millis(700));
         }
+        if self.takes(T::R2AdoptsBeforeDriving) {
+            self.flush();
+        }
     }
 
     pub(super) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
@@ -342,6 +376,9 @@ impl Agv {
         for node in nodes {
             while let Some(edge) = edges.next_if(|edge| edge.sequence_id < node.sequence_id) {
                 self.push_edge(edge);
+            }
+            if !node.released {
+                self.book.planned.insert(node.sequence_id);
             }
             if node.released {
                 self.book.base_end = (node.id.clone(), node.sequence_id);
@@ -361,6 +398,9 @@ impl Agv {
 
     fn push_edge(&mut self, edge: Edge) {
         self.push_actions(edge.actions.clone(), Origin::Edge(edge.sequence_id));
+        if !edge.released {
+            self.book.planned.insert(edge.sequence_id);
+        }
         self.book.edges.push_back(edge);
     }
 

@@ -115,6 +115,9 @@ impl Maps {
                 map.enabled = false;
             }
         }
+        if faults.has(F::R2EnableRemovesOldVersion) {
+            self.purge(map_id);
+        }
         Ok(())
     }
 

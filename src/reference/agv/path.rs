@@ -74,6 +74,9 @@ impl Agv {
             corridor.left *= 2.0;
             corridor.right *= 2.0;
         }
+        if self.faults.has(F::R2CorridorSidesSwapped) {
+            std::mem::swap(&mut corridor.left, &mut corridor.right);
+        }
         corridor.contour &= !self.faults.has(F::CorridorContourIgnored);
         Some(corridor)
     }
@@ -261,6 +264,10 @@ impl Agv {
         knots.push(1.0);
         if !self.faults.has(F::KnotsTooFew) {
             knots.push(1.0);
+        }
+        if self.faults.has(F::R2KnotsNotNormalized) {
+            let length = (to.0 - from.0).hypot(to.1 - from.1).max(2.0);
+            knots.iter_mut().for_each(|knot| *knot *= length);
         }
         let points: Vec<Value> = points
             .iter()

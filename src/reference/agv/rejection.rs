@@ -47,6 +47,11 @@ impl Refusal {
         self.rule == Rule::Malformed
     }
 
+    /// Whether the vehicle has no time for the order.
+    pub(super) fn is_of_busy(&self) -> bool {
+        self.rule == Rule::OtherOrderActive
+    }
+
     pub(super) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
         self.culprits.push((key.to_owned(), value.into()));
         self
@@ -135,6 +140,9 @@ impl Agv {
         if refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorUnreferenced) {
             references.clear();
         }
+        if refusal.rule == Rule::OtherOrderActive && self.faults.has(F::R2BusyRefusalUnreferenced) {
+            references.clear();
+        }
         let error = ActiveError {
             error_type: name.to_owned(),
             fatal,
@@ -190,6 +198,9 @@ impl Agv {
                 action.end(Status::Failed);
                 self.actions.push(action);
             }
+        }
+        if self.faults.has(F::R2RejectionLiftsPause) {
+            self.set_holds(|holds| holds.pause = false);
         }
         if self.faults.has(F::RejectionDropsHorizon) {
             self.book.drop_horizon();

@@ -67,20 +67,28 @@ impl Agv {
             .actions
             .iter()
             .any(|action| action.origin == here && !action.status.is_terminal());
+        let ahead = self.book.nodes.front();
+        let ahead = ahead.filter(|_| self.book.entered && has(F::R2LastNodeIsNextNode));
+        let last_node = ahead.map_or(last_node, |stop| stop.node.id.as_str());
         let before = working && !self.book.previous.0.is_empty() && has(F::R1LastNodeAfterActions);
         let last_node = if before { &self.book.previous.0 } else { last_node };
         set("lastNodeId", json!(last_node));
         let last_sequence = match () {
             () if before => self.book.previous.1,
             () if complete && has(F::R1LastSequenceResetWhenDone) => 0,
-            () => self.book.last_sequence,
+            () => ahead.map_or(self.book.last_sequence, |stop| stop.node.sequence_id),
         };
-        set("lastNodeSequenceId", json!(last_sequence));
+        if has(F::R2LastSequenceMinusOne) && !self.book.has_order() {
+            set("lastNodeSequenceId", json!(-1));
+        } else {
+            set("lastNodeSequenceId", json!(last_sequence));
+        }
         if !(has(F::R1RouteOmittedWhenIdle) && self.book.nodes.is_empty()) {
             set("nodeStates", self.node_states(complete));
             set("edgeStates", self.edge_states(complete));
         }
-        if !self.config.line_guided() {
+        let unplaced = self.mode == Mode::Manual && has(F::R2PositionOmittedInManual);
+        if !self.config.line_guided() && !unplaced {
             set("agvPosition", self.position_picture());
         }
         set("velocity", self.velocity_picture());
@@ -98,7 +106,7 @@ impl Agv {
         if !has(F::PauseFlagMissing) {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             let idle = complete && self.faults.has(F::R1PauseUnreportedWhenIdle);
-            let pause = self.holds.pause && !idle;
+            let pause = self.holds.pause && !idle && self.pause_hidden_until.is_none();
             set("paused", json!(pause || button || self.holds.emergency));
         }
         let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
@@ -139,14 +147,16 @@ impl Agv {
         } else if self.is_flashing() {
             set(
                 "information",
-                if has(F::R1InfoTypeMissing) {
+                if has(F::R2InfoReferencesAsMap) {
+                    json!([{ "infoType": "warningLights", "infoLevel": "INFO", "infoReferences": { "device": "lights" } }])
+                } else if has(F::R1InfoTypeMissing) {
                     json!([{ "infoDescription": "warning lights on", "infoLevel": "INFO" }])
                 } else {
                     json!([{ "infoType": "warningLights", "infoLevel": "INFO" }])
                 },
             );
         } else {
-            set("information", json!([]));
+            set("information", self.log_information());
         }
         if !has(F::SafetyStateMissing) {
             set("safetyState", self.safety());
@@ -159,6 +169,19 @@ impl Agv {
             }
         }
         state
+    }
+
+    /// What it tells about its last log.
+    fn log_information(&self) -> Value {
+        let entry = |(action_id, name): &(String, String)| {
+            json!({
+                "infoType": "logReport",
+                "infoLevel": "INFO",
+                "infoDescription": name,
+                "infoReferences": [{ "referenceKey": "actionId", "referenceValue": action_id }],
+            })
+        };
+        self.last_log.iter().map(entry).collect()
     }
 
     /// Metres since the last node.
@@ -212,6 +235,7 @@ impl Agv {
         });
         left.into_iter()
             .chain(shown)
+            .take(if self.faults.has(F::R2RouteListsCapped) { 3 } else { usize::MAX })
             .map(|stop| self.node_state(stop))
             .collect()
     }
@@ -231,7 +255,7 @@ impl Agv {
         let mut picture = json!({
             "nodeId": node.id,
             "sequenceId": node.sequence_id,
-            "released": node.released || self.faults.has(F::HorizonReportedReleased),
+            "released": node.released && !self.stays_planned(node.sequence_id) || self.faults.has(F::HorizonReportedReleased),
         });
         let copied = !node.released && self.faults.has(F::HorizonPositionsCopied);
         let node = self
@@ -242,6 +266,8 @@ impl Agv {
             .map_or(node, |first| &first.node);
         if let Some(position) = node.sent_position.as_ref().filter(|_| !self.config.line_guided()) {
             picture["nodePosition"] = position.clone();
+        } else if self.takes(T::R2NodePositionsFromLayout) && !self.config.line_guided() {
+            picture["nodePosition"] = json!({ "x": stop.place.x, "y": stop.place.y, "mapId": stop.place.map_id });
         }
         if self.faults.has(F::NodeStatesWithoutSequence)
             && let Some(fields) = picture.as_object_mut()
@@ -249,6 +275,11 @@ impl Agv {
             fields.remove("sequenceId");
         }
         picture
+    }
+
+    /// `r2-released-not-updated`: what was in the horizon once.
+    fn stays_planned(&self, sequence_id: u32) -> bool {
+        self.faults.has(F::R2ReleasedNotUpdated) && self.book.planned.contains(&sequence_id)
     }
 
     fn edge_states(&self, complete: bool) -> Value {
@@ -273,17 +304,21 @@ impl Agv {
         let next = self.book.edges.front().map(|edge| edge.sequence_id);
         let picture = |edge: &Edge| {
             let far = Some(edge.sequence_id) != next && self.faults.has(F::R1FarEdgesUnreleased);
+            let released = edge.released && !far && !self.stays_planned(edge.sequence_id) || self.faults.has(F::HorizonReportedReleased);
+            let id = if self.faults.has(F::R2EdgeIdMisspelled) { "edgeID" } else { "edgeId" };
             let mut picture = json!({
-                "edgeId": edge.id,
+                id: edge.id,
                 "sequenceId": edge.sequence_id,
-                "released": edge.released && !far || self.faults.has(F::HorizonReportedReleased),
+                "released": if self.faults.has(F::R2ReleasedNumeric) { json!(u8::from(released)) } else { json!(released) },
             });
-            if let Some(path) = self.planned_path(edge) {
+            let unplanned = Some(edge.sequence_id) != next && self.faults.has(F::R2PlannedPathOfNextEdgeOnly);
+            if let Some(path) = self.planned_path(edge).filter(|_| !unplanned) {
                 picture["trajectory"] = path;
             }
             picture
         };
-        left.into_iter().chain(shown).map(picture).collect()
+        let most = if self.faults.has(F::R2RouteListsCapped) { 3 } else { usize::MAX };
+        left.into_iter().chain(shown).take(most).map(picture).collect()
     }
 
     fn action_state(&self, action: &Action) -> Option<Value> {
@@ -309,6 +344,12 @@ impl Agv {
             Status::Waiting if self.faults.has(F::InitializingFromStart) => "INITIALIZING",
             Status::Waiting | Status::Initializing if early_pick => "RUNNING",
             Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
+            Status::Waiting if self.is_next(action) && self.faults.has(F::R2NextNodeActionsInitializing) => {
+                "INITIALIZING"
+            }
+            Status::Waiting if of_horizon && self.waits_at_decision_point() && self.faults.has(F::R2PausedAtDecisionPoint) => {
+                "PAUSED"
+            }
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
             Status::Running
                 if action.of_order() && self.book.cancel.is_some() && self.faults.has(F::R1CancelShowsPaused) =>
@@ -323,8 +364,13 @@ impl Agv {
         } else {
             status.to_owned()
         };
+        let id: String = if self.faults.has(F::R2ActionIdTruncated) {
+            action.request.id.chars().take(32).collect()
+        } else {
+            action.request.id.clone()
+        };
         let mut picture = json!({
-            "actionId": action.request.id,
+            "actionId": id,
             "actionType": action.request.action_type,
             "actionStatus": status,
         });
@@ -332,6 +378,17 @@ impl Agv {
             picture["resultDescription"] = json!(result);
         }
         Some(picture)
+    }
+
+    /// Whether the vehicle is on its way to the node of this action.
+    fn is_next(&self, action: &Action) -> bool {
+        let next = self.book.nodes.front().map(|stop| stop.node.sequence_id);
+        self.book.entered && next.is_some_and(|next| action.origin == Origin::Node(next))
+    }
+
+    /// Whether there is nothing left but the horizon.
+    pub(in crate::reference::agv) fn waits_at_decision_point(&self) -> bool {
+        self.book.nodes.front().is_some_and(|stop| !stop.node.released)
     }
 
     /// agvPosition, also for the visualization (STATE-MSG-05).
@@ -459,7 +516,9 @@ impl Agv {
         battery.insert("charging".into(), charging);
         battery.insert(
             "reach".into(),
-            if self.faults.has(F::ReachFractional) {
+            if self.faults.has(F::R2ReachMinusOne) {
+                json!(-1)
+            } else if self.faults.has(F::ReachFractional) {
                 json!(8_000.5)
             } else {
                 json!(8_000)
@@ -504,7 +563,7 @@ impl Agv {
         let violation = if self.holds.field && self.faults.has(F::R1FieldViolationCounted) {
             json!(1)
         } else {
-            json!(self.holds.field)
+            json!(self.holds.field || self.field_latched)
         };
         json!({ "eStop": emergency_stop, "fieldViolation": violation })
     }
