@@ -6,6 +6,7 @@ use super::Site;
 use super::faults::{FaultName as F, Faults};
 use super::instant::ended;
 use super::seen::State;
+use super::tolerances::ToleranceName as T;
 use super::vehicle::{Cancel, Presence, Transport, Vehicle};
 
 impl Site {
@@ -19,6 +20,11 @@ impl Site {
         if running.message.is_null() {
             // Nobody has heard of it yet.
             vehicle.running = None;
+            vehicle.queue.extend(then);
+            return;
+        }
+        if !running.accepted && self.faults.has(F::R2CancelForgottenBeforeAcceptance) {
+            vehicle.last_order = vehicle.running.take();
             vehicle.queue.extend(then);
             return;
         }
@@ -53,6 +59,9 @@ impl Site {
             let body =
                 json!({ "orderId": running.id, "orderUpdateId": running.update_id + 1, "nodes": [], "edges": [] });
             self.publish(vehicle, "order", &body);
+        }
+        if !paused && self.takes(T::R2PausesBeforeCancel) {
+            vehicle.r2_resume = self.instant(vehicle, "startPause", &Value::Null).is_some();
         }
         let Some(action_id) = self.instant(vehicle, "cancelOrder", &Value::Null) else {
             return;
@@ -97,7 +106,9 @@ pub(super) fn watch_cancel(vehicle: &mut Vehicle, faults: Faults) {
         return;
     }
     vehicle.cancel = None;
-    if busy {
+    let over = busy && faults.has(F::R2FailedCancelTakenForDone);
+    vehicle.r1_hasty |= over;
+    if busy && !over {
         // It could not be called off, and is driven to its end.
         vehicle.queue.extend(cancel.then);
         return;

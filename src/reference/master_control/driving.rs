@@ -83,6 +83,9 @@ impl Site {
             }
             Fate::Over => {
                 vehicle.last_order = Some(running);
+                if self.faults.has(F::R2EmptyMessageAfterOrder) {
+                    self.r2_empty_order(vehicle);
+                }
             }
             Fate::Again => {
                 let transport = again(&running, vehicle.state.as_ref());
@@ -182,6 +185,12 @@ impl Site {
         vehicle.at(self.lost_after(now));
         if self.faults.has(F::ResentChanged) {
             slower(&mut running.message, running.resends);
+        }
+        if self.faults.has(F::R2ResendExtendsBase) && release_next(&mut running.message) {
+            running.released += 1;
+        }
+        if self.faults.has(F::R2ResendWithoutActions) {
+            without_actions(&mut running.message);
         }
         if self.faults.has(F::R1ResendAsUpdate) {
             running.update_id += 1;
@@ -286,11 +295,23 @@ impl Site {
     fn extend_base(&mut self, vehicle: &mut Vehicle, running: &mut Running) {
         let Some(state) = &vehicle.state else { return };
         let reached = running.reached(Some(state));
+        let stopped = !matches!(state.safety_state.e_stop.as_str(), "NONE" | "");
+        let withdraws = stopped && self.faults.has(F::R2EStopWithdrawsBase);
+        if withdraws && running.released > reached + 1 && !running.r2_withdrawn {
+            running.r2_withdrawn = true;
+            running.released = reached + 1;
+            running.changed = true;
+        }
         let ahead = running.released.saturating_sub(reached + 1);
         let asked = state.new_base_request == Some(true) && !self.faults.has(F::NewBaseRequestIgnored);
         let deaf = (vehicle.r1_answered && self.faults.has(F::R1NewBaseAnsweredOnce))
             || (state.driving && self.faults.has(F::R1NewBaseOnlyAtRest));
-        let asked = asked && !deaf;
+        let half = state.operating_mode == "SEMIAUTOMATIC" && self.faults.has(F::R2NewBaseIgnoredInSemiautomatic);
+        let asked = asked && !deaf && !half;
+        let warned = state.errors.iter().any(|error| error.error_level == "WARNING");
+        if warned && self.faults.has(F::R2WarningHoldsBase) {
+            return;
+        }
         let held = (vehicle.r1_stale && self.faults.has(F::R1VehicleReturnStopsUpdates))
             || (state.informs() && self.faults.has(F::R1InformationHoldsBase));
         if held {
@@ -307,7 +328,9 @@ impl Site {
         } else {
             1
         };
-        let wanted = if self.faults.has(F::BaseExtendedLate) {
+        let wanted = if withdraws {
+            false
+        } else if self.faults.has(F::BaseExtendedLate) {
             ahead == 0 && !state.driving
         } else {
             ahead <= enough || asked || eager
@@ -328,7 +351,8 @@ impl Site {
         if target <= running.released && !running.changed {
             return;
         }
-        if let Some(due) = self.next_order_at(vehicle) {
+        let at_once = running.changed && self.faults.has(F::R2IntervalIgnoredOnReroute);
+        if let Some(due) = self.next_order_at(vehicle).filter(|_| !at_once) {
             vehicle.at(due);
             return;
         }
@@ -343,11 +367,18 @@ impl Site {
                 0
             } else if self.faults.has(F::R1UpdateFromVehicle) {
                 reached.min(running.released.saturating_sub(1))
+            } else if self.faults.has(F::R2UpdateBeginsOneNodeEarly) {
+                running.released.saturating_sub(2)
             } else {
                 running.released.saturating_sub(1)
             },
             released: target.max(running.released),
             end: free.min(target.max(running.released).saturating_add(self.config.horizon_length)),
+        };
+        let window = if self.takes(T::R2HorizonToTheGoal) {
+            Window { end: free, ..window }
+        } else {
+            window
         };
         let window = if self.takes(T::R1UpdatesWithoutHorizon) && target > running.released {
             Window {
@@ -373,7 +404,7 @@ impl Site {
 
     /// Calls the order off when a trigger does not come in time (ACT-39).
     fn supervise_trigger(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
-        if self.faults.has(F::TriggerUnsupervised) {
+        if self.faults.has(F::TriggerUnsupervised) || running.r2_unsupervised {
             return Fate::Runs;
         }
         let trigger = |action: &Value| {
@@ -508,7 +539,7 @@ impl Site {
         let Some((index, _)) = ahead.find(|(_, leg)| leg.from == from && leg.to == to) else {
             return;
         };
-        if self.faults.has(F::BlockedEdgeUsed) {
+        if self.faults.has(F::BlockedEdgeUsed) || self.faults.has(F::R2BlockCheckedAtPlanningOnly) {
             return;
         }
         let transport = again(running, vehicle.state.as_ref());
@@ -517,7 +548,7 @@ impl Site {
             running.released = running.released.min(index + 1);
         }
         let released = vehicle.running.as_ref().map_or(0, |running| running.released);
-        if index + 1 < released {
+        if index + 1 < released || self.takes(T::R2BlocksByCancel) {
             self.cancel(vehicle, Some(transport));
         } else if let Some(mut running) = vehicle.running.take() {
             if !self.lead_on(vehicle, &mut running, transport) {
@@ -530,6 +561,11 @@ impl Site {
 
     /// Queues a transport.
     pub(super) fn dispatch(&mut self, vehicle: &mut Vehicle, transport: Transport) {
+        let mut transport = transport;
+        if self.faults.has(F::R2StartPlannedTooEarly) {
+            let state = vehicle.state.as_ref();
+            transport.r2_asked_at = state.map(|state| (state.last_node_id.clone(), state.agv_position.clone()));
+        }
         if vehicle.queue.len() < MAX_QUEUE {
             vehicle.queue.push_back(transport);
             vehicle.at(self.now.moment);
@@ -538,7 +574,7 @@ impl Site {
 }
 
 /// The transport as it is still to be done.
-fn again(running: &Running, state: Option<&State>) -> Transport {
+pub(super) fn again(running: &Running, state: Option<&State>) -> Transport {
     let mut transport = running.transport.clone();
     let mut picks = running.actions().filter(|action| action["actionType"] == "pick");
     let picked = picks.any(|action| {
@@ -565,6 +601,29 @@ fn refusal<'a>(running: &Running, state: &'a State) -> Option<&'a str> {
         own && error.reference("orderUpdateId").is_none_or(|named| named == update)
     });
     found.map(|error| error.error_type.as_str())
+}
+
+/// `r2-resend-extends-base`: releases the first node of the horizon of a message.
+fn release_next(message: &mut Value) -> bool {
+    let nodes = message["nodes"].as_array_mut().into_iter().flatten();
+    let Some((index, node)) = nodes.enumerate().find(|(_, node)| node["released"] == json!(false)) else {
+        return false;
+    };
+    node["released"] = json!(true);
+    let edge = index.checked_sub(1).and_then(|before| message["edges"].get_mut(before));
+    if let Some(edge) = edge {
+        edge["released"] = json!(true);
+    }
+    true
+}
+
+/// `r2-resend-without-actions`: leaves the actions of a message out.
+fn without_actions(message: &mut Value) {
+    for key in ["nodes", "edges"] {
+        for element in message[key].as_array_mut().into_iter().flatten() {
+            element["actions"] = json!([]);
+        }
+    }
 }
 
 /// Changes a message that must not be changed.
