@@ -136,6 +136,7 @@ impl Agv {
         if self.faults.has(F::R1DuplicateClearsErrors) {
             self.errors.new_order();
         }
+        self.book.stunned |= self.is_busy() && self.faults.has(F::DuplicateHaltsDriving);
         if self.is_busy() && self.faults.has(F::R1DuplicateRepeatsActions) {
             self.repeat_actions(self.book.last_sequence);
         }
