@@ -131,7 +131,9 @@ mod tests {
                 assert_eq!(count, drawn.draw.min(possible), "{}", test.id);
                 let ways = |tests: &[Arc<Test>]| -> BTreeSet<Kind> {
                     let of_table = tests.iter().filter(of_table);
-                    of_table.filter_map(|test| Some(test.drawn.as_ref()?.kind.clone())).collect()
+                    of_table
+                        .filter_map(|test| Some(test.drawn.as_ref()?.kind.clone()))
+                        .collect()
                 };
                 assert_eq!(
                     ways(&drawing.tests).len(),

@@ -62,7 +62,10 @@ impl<'a> Fill<'a> {
         let filled = self.apply(item, problems);
         match (&item.kind, filled.kind) {
             (Kind::Text { .. }, Kind::List(items)) => items,
-            (_, kind) => vec![Node { kind, span: filled.span }],
+            (_, kind) => vec![Node {
+                kind,
+                span: filled.span,
+            }],
         }
     }
 

@@ -55,13 +55,20 @@ pub(super) fn cells(
         cells = cells
             .into_iter()
             .flat_map(|(names, values)| {
-                table.iter().map(move |(name, row)| with_row(&names, &values, axis, name, row))
+                table
+                    .iter()
+                    .map(move |(name, row)| with_row(&names, &values, axis, name, row))
             })
             .collect();
     }
     if let Some(((names, values), true)) = cells.first().map(|first| (first, problems.len() == before)) {
         if names.is_empty() {
-            problems.at("empty-cases", &cases.span, "a table without rows", "no test comes out of it");
+            problems.at(
+                "empty-cases",
+                &cases.span,
+                "a table without rows",
+                "no test comes out of it",
+            );
         }
         twice(values, problems);
     }
@@ -73,7 +80,10 @@ pub(super) fn cells(
         without.retain(|(other, _)| *other != name);
         if without.len() == known {
             let column = names.first().cloned().unwrap_or_default();
-            let drawn = Drawn { kind: Origin::Column(column), draw };
+            let drawn = Drawn {
+                kind: Origin::Column(column),
+                draw,
+            };
             found.push(Cell { name, values, drawn });
         }
     }
@@ -93,7 +103,10 @@ fn with_row(
     row: &[(Node, Node)],
 ) -> (Vec<String>, Vec<(Node, Node)>) {
     let named = Node {
-        kind: Kind::Text { value: name.to_owned(), quoted: true },
+        kind: Kind::Text {
+            value: name.to_owned(),
+            quoted: true,
+        },
         span: axis.span.clone(),
     };
     let names = names.iter().cloned().chain([name.to_owned()]).collect();
@@ -116,6 +129,8 @@ fn twice(values: &[(Node, Node)], problems: &mut Problems) {
 /// The names of the cells that make no sense.
 fn left_out<'a>(fields: &Fields<'a>, problems: &mut Problems) -> Vec<(&'a str, &'a Span)> {
     let nodes = fields.list("without", problems);
-    let texts = nodes.iter().filter_map(|node| Some((text_of(node, problems)?, &node.span)));
+    let texts = nodes
+        .iter()
+        .filter_map(|node| Some((text_of(node, problems)?, &node.span)));
     texts.collect()
 }

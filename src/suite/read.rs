@@ -6,12 +6,12 @@ use std::sync::Arc;
 use super::CheckInfo;
 use super::course::course_need;
 use super::drawn;
-use super::matrix;
 use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::load::{States, parse};
+use super::matrix;
 use super::model::{About, Binding, CourseNeed, Drawn, Maturity, Monitor, Need, Rule, Test};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
@@ -310,7 +310,12 @@ impl TestReader<'_> {
                 .and_then(|(_, patch)| patch.list())
                 .map_or(0, <[Node]>::len);
             let lint = linted.insert((row.drawn.kind.clone(), length, row.spec.is_some()));
-            let case = Case::Drawn { name: &row.name, spec: row.spec.as_ref(), drawn: &row.drawn, lint };
+            let case = Case::Drawn {
+                name: &row.name,
+                spec: row.spec.as_ref(),
+                drawn: &row.drawn,
+                lint,
+            };
             tests.extend(self.read(&filled, case, problems));
         }
         tests

@@ -158,6 +158,7 @@ impl Agv {
         if self.waits_at_decision_point() && self.faults.has(F::R2DuplicateReleasesHorizon) {
             self.book.unbound = true;
         }
+        self.book.stunned |= self.is_busy() && self.faults.has(F::DuplicateHaltsDriving);
         if self.is_busy() && self.faults.has(F::R1DuplicateRepeatsActions) {
             self.repeat_actions(self.book.last_sequence);
         }

@@ -247,6 +247,10 @@ with_blind_faults! { faults!
     OutdatedUpdateMisnamed "outdated-update-misnamed" ["ORD-REJ-12"] "Reports an outdated update as validationError.";
     OutdatedUpdateFatal "outdated-update-fatal" ["ORD-REJ-12"] "Reports an outdated update as FATAL.";
     DuplicateReported "duplicate-reported" ["ORD-REJ-13"] "Raises an error for an order that is sent twice.";
+    DuplicateHaltsDriving "duplicate-halts-driving" ["ORD-06", "ORD-REJ-13"] "Stands still for ever when the order it drives is sent again.";
+    RefusalStallsAction "refusal-stalls-action" ["ACT-01", "ORD-FLOW-12"] "An order it refuses makes it forget to end the action that runs.";
+    RefusedUpdateDropsEdges "refused-update-drops-edges" ["ORD-FLOW-12", "STATE-12"] "An order it refuses makes it throw the edges of its horizon away.";
+    BusyRefusalUntyped "busy-refusal-untyped" ["ERR-02"] "The error of an order it refuses because of another one has an empty errorType.";
     DuplicateExecuted "duplicate-executed" ["ORD-REJ-13"] "Begins an order again when it is sent twice.";
     UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
     MemoryUnchecked "memory-unchecked" ["ORD-REJ-15", "STATE-12"] "Takes over orders larger than its stated limits, cut to what fits.";

@@ -95,6 +95,7 @@ impl Agv {
             Rule::OtherOrderActive if self.takes(T::R1OwnErrorNames) => "otherOrderActive",
             Rule::Memory => &names.memory,
             Rule::UnknownMap => &names.unknown_map,
+            Rule::OtherOrderActive if self.faults.has(F::BusyRefusalUntyped) => "",
             Rule::OtherOrderActive => &names.other_order_active,
             Rule::StartOutOfRange => &names.start_out_of_range,
             Rule::Outdated if self.faults.has(F::OutdatedUpdateMisnamed) => &names.validation,
@@ -176,6 +177,15 @@ impl Agv {
             self.book.update_id = id;
         }
         self.book.stunned |= rule == Rule::Outdated && self.faults.has(F::R1OutdatedHaltsDriving);
+        if self.faults.has(F::RefusalStallsAction) {
+            self.actions
+                .iter_mut()
+                .filter(|action| action.of_order())
+                .for_each(|action| action.due = None);
+        }
+        if self.faults.has(F::RefusedUpdateDropsEdges) {
+            self.book.edges.retain(|edge| edge.released);
+        }
         if rule == Rule::Malformed {
             if message.is_object() && self.faults.has(F::MalformedStopsOrder) {
                 self.give_up_order();
