@@ -40,8 +40,9 @@ pub(super) const LINKED_STATE: Check = Check {
           stopPause, batteryState.charging of startCharging and stopCharging, the pose (within half a metre and 20 degrees), \
           map and last node of initPosition, the one ENABLED version of enableMap; of startPause and cancelOrder also that \
           the vehicle stands, and of cancelOrder that no node or edge is left. Not judged where another action on the \
-          same may have come in between, while the vehicle drives, after a restart, and for two minutes after what a \
-          person or a hook did.",
+          same may have come in between, while the vehicle drives, after a restart, while an emergency stop, the \
+          protective field, a mode or an error may hold it, and for two minutes after what a person or a hook did to \
+          what is linked.",
     arguments: &[],
     start: |_| Box::new(Linked::default()),
 };
@@ -89,11 +90,31 @@ fn touched(entry: &Entry) -> &'static [&'static str] {
     };
     match hook.as_str() {
         "place-load" | "remove-load" | "trigger" | "confirm" | "place-obstacle" | "remove-obstacle" => &[],
+        // What these do is seen in the state for as long as it holds, or in a new connection.
+        "set-mode"
+        | "emergency-stop"
+        | "release-emergency-stop"
+        | "enter-field"
+        | "leave-field"
+        | "provoke-error"
+        | "clear-error"
+        | "power-cycle"
+        | "shutdown"
+        | "start" => &[],
         "press-pause" | "release-pause" | "block-pause" | "unblock-pause" => &["pause"],
         "lock-charger" | "unlock-charger" => &["charging"],
         "enable-map" => &["maps", "pose"],
         _ => &TOPICS,
     }
+}
+
+/// Whether the state shows nothing that may hold the vehicle, or let somebody else act on it.
+fn nothing_holds(state: &Value) -> bool {
+    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
+    matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
+        && safety("eStop").and_then(Value::as_str) == Some("NONE")
+        && safety("fieldViolation") == Some(&Value::Bool(false))
+        && elements(state, "errors").all(|error| text(error, "errorLevel") == "WARNING")
 }
 
 fn parameter<'v>(action: &'v Value, key: &str) -> Option<&'v Value> {
@@ -262,7 +283,7 @@ impl Running for Linked {
                 _ => still,
             };
             let free = topic(&known.kind).is_some_and(left_alone);
-            if rivals.count() != 1 || !begun || !free || !fits {
+            if rivals.count() != 1 || !begun || !free || !fits || !nothing_holds(state) {
                 continue;
             }
             judged = true;
@@ -284,6 +305,7 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::super::trace::{Trace, merged};
+    use crate::journal::event::{Event, Source};
 
     fn judge(action: &str, parameters: &Value, shown: &Value) -> Vec<String> {
         let mut trace = Trace::subscriber();
@@ -340,7 +362,13 @@ mod tests {
     #[test]
     fn a_button_at_the_vehicle_leaves_it_open() {
         let mut trace = Trace::subscriber();
-        trace.state(&json!({})).hook().instant("stopPause", "x", &json!([]));
+        let pressed = Event::Answer {
+            prompt: "Press the button".into(),
+            answer: "done".into(),
+            ok: true,
+        };
+        trace.state(&json!({})).add(Source::Operator, None, pressed);
+        trace.instant("stopPause", "x", &json!([]));
         trace.state(&json!({ "actionStates": [{ "actionId": "x", "actionStatus": "FINISHED" }], "paused": true }));
         assert!(trace.judge("action/linked-state").findings.is_empty());
     }
