@@ -39,7 +39,13 @@ impl Site {
             }
             return;
         }
-        if paused && self.faults.has(F::R1PausedOrderReplaced) {
+        let works = vehicle.state.as_ref().is_some_and(|state| {
+            let mut ids = running.actions().filter_map(|action| action["actionId"].as_str());
+            !state.driving && ids.any(|id| state.action(id).is_some_and(|action| !action.is_terminal()))
+        });
+        let replaced = (paused && self.faults.has(F::R1PausedOrderReplaced))
+            || (works && then.is_some() && self.faults.has(F::ReplacedAtWork));
+        if replaced {
             vehicle.last_order = vehicle.running.take();
             vehicle.r1_hasty = true;
             if let Some(transport) = then {

@@ -175,7 +175,10 @@ impl Site {
         if running.resends >= self.config.resend_limit {
             return false;
         }
-        if let Some(due) = self.next_order_at(vehicle) {
+        if let Some(due) = self
+            .next_order_at(vehicle)
+            .filter(|_| !self.faults.has(F::ResentTooSoon))
+        {
             vehicle.at(due);
             return true;
         }
@@ -314,7 +317,8 @@ impl Site {
         }
         let held = (vehicle.r1_stale && self.faults.has(F::R1VehicleReturnStopsUpdates))
             || (state.informs() && self.faults.has(F::R1InformationHoldsBase));
-        if held {
+        let first = self.config.vehicles.first() == Some(&vehicle.config);
+        if held || (!first && self.faults.has(F::FirstVehicleExtended)) {
             return;
         }
         let halts = !state.driving && ahead == 0;

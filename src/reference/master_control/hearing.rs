@@ -157,6 +157,7 @@ impl Site {
         if presence == Presence::Online && vehicle.presence != Presence::Online {
             vehicle.give_time(self.now.moment);
             vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
+            self.forget_on_return(vehicle);
         }
         vehicle.presence = presence;
         if presence == Presence::Away {
@@ -173,6 +174,21 @@ impl Site {
             .filter(|_| self.faults.has(F::R1OnlineClearsErrors))
         {
             state.errors.clear();
+        }
+    }
+
+    /// What a faulty master control does not know any more when a vehicle is back.
+    fn forget_on_return(&self, vehicle: &mut Vehicle) {
+        if self.faults.has(F::BlockForgottenOnReturn) {
+            vehicle.blocked.clear();
+        }
+        if self.faults.has(F::CancelForgottenOnReturn) {
+            vehicle.cancel = None;
+        }
+        if let Some(running) = vehicle.running.as_mut()
+            && self.faults.has(F::UpdateIdsRestartOnReturn)
+        {
+            running.update_id = 0;
         }
     }
 

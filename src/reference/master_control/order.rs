@@ -53,7 +53,7 @@ impl Site {
         loop {
             let message = self.message(vehicle, running, window);
             // The header comes on top.
-            let length = message.to_string().len() + 300;
+            let length = super::wording::written(self.faults, self.config.tolerances, &message).len() + 300;
             if window.released <= window.first {
                 return None;
             }
