@@ -37,7 +37,7 @@ impl Agv {
             Err(Refusal::new(Rule::Malformed, "the message is too long"))
         } else {
             serde_json::from_slice::<Value>(payload)
-                .map_err(|_| Refusal::new(Rule::Malformed, "the message is not JSON"))
+                .map_err(|error| Refusal::new(Rule::Malformed, &format!("the message is not JSON: {error}")))
         };
         if message.is_err() && self.faults.has(F::R1UnreadableOrderDropped) {
             return;
