@@ -29,6 +29,7 @@ mod motion;
 mod motion_signs;
 mod mqtt;
 mod orders;
+mod state_action_ids;
 mod state_actions;
 mod state_battery;
 mod state_bursts;
@@ -186,6 +187,7 @@ static REGISTRY: &[Check] = &[
     state_period::PERIOD,
     state_period::OWN_LIMITS,
     state_bursts::BURSTS,
+    state_action_ids::ACTION_IDS,
     state_actions::TRANSITIONS,
     state_actions::KEPT,
     state_order::ORDER_KEPT,

@@ -3,18 +3,24 @@
 //!
 //! Whether it had to take the order over is left to the tests, but for what the states alone show.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
+use std::time::Duration;
 
 use serde_json::Value;
 
 use super::continuity::Continuity;
 use super::orders::{Element, Malformed, last_node, may_abandon, number, read_elements};
-use super::traffic::{Traffic, actions, broken, outside_influence, quote, state, text, to_vehicle};
+use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
+use crate::clock::Moment;
 use crate::journal::Entry;
 
 /// How many orders on their way are kept in mind.
 const ORDERS: usize = 1024;
+/// How many refusals are kept in mind.
+const REFUSALS: usize = 64;
+/// What is begun so soon after an error that names it may have crossed with it.
+const CROSSING: Duration = Duration::from_secs(2);
 
 /// `state/order-known`.
 pub(super) const ORDER_KNOWN: Check = Check {
@@ -42,7 +48,8 @@ pub(super) const NOT_REPLACED: Check = Check {
     name: "state/order-not-replaced",
     decides: &["ORD-FLOW-01", "ORD-FLOW-03"],
     doc: "An order that comes while the vehicle lists a horizon, or base that it has not come to since, is not shown, unless \
-          the one before was cancelled, extended, or may have been given up. Otherwise as state/order-known.",
+          the one before was cancelled, extended, or may have been given up; and one that was refused then, with an error \
+          that names it, is not shown later either, unless it was sent again. Otherwise as state/order-known.",
     arguments: &[],
     start: |_| Box::new(OrderKnown::looking_for(Part::Replaced)),
 };
@@ -81,6 +88,16 @@ struct OrderKnown {
     /// What was sent since the last state.
     since: Vec<Pair>,
     before: Option<Before>,
+    refused: VecDeque<Refused>,
+    /// orderIds that errors of the last state named.
+    blamed: BTreeSet<String>,
+}
+
+/// An order that an error named while the vehicle was on its way with another one.
+struct Refused {
+    order: String,
+    at: Moment,
+    seq: u64,
 }
 
 impl OrderKnown {
@@ -140,6 +157,46 @@ impl OrderKnown {
         })
     }
 
+    /// Learns which orders a vehicle refuses that has still another one to drive.
+    fn refusals(&mut self, entry: &Entry, state: &Value, busy: bool) {
+        let named: BTreeSet<String> = elements(state, "errors")
+            .take(REFUSALS)
+            .flat_map(|error| elements(error, "errorReferences").take(REFUSALS))
+            .filter(|reference| text(reference, "referenceKey") == "orderId")
+            .map(|reference| text(reference, "referenceValue").chars().take(512).collect())
+            .collect();
+        for order in named.iter().filter(|order| busy && !self.blamed.contains(*order)) {
+            let shown = text(state, "orderId") == order || self.before.as_ref().is_some_and(|it| it.pair.0 == **order);
+            if shown || self.refused.iter().any(|refused| refused.order == *order) {
+                continue;
+            }
+            if self.refused.len() == REFUSALS {
+                self.refused.pop_front();
+            }
+            self.refused.push_back(Refused {
+                order: order.clone(),
+                at: entry.at().moment,
+                seq: entry.seq(),
+            });
+        }
+        self.blamed = named;
+    }
+
+    /// What is wrong with an order that is shown after it was refused, and was sent only once.
+    fn queued(&self, before: &Before, now: &Pair, at: Moment) -> Option<(&'static str, String)> {
+        let refused = self.refused.iter().find(|refused| refused.order == now.0)?;
+        let once = self.sent.iter().filter(|sent| sent.0 == now.0).count() == 1;
+        let begun = before.pair.0 != now.0 && once && !self.unknown && at.since(refused.at) > CROSSING;
+        begun.then(|| {
+            let text = format!(
+                "the vehicle shows order {}, which error #{} had refused, and which was not sent again",
+                quote(&now.0),
+                refused.seq
+            );
+            ("ORD-FLOW-01", text)
+        })
+    }
+
     /// What is wrong with a new order that replaces another one.
     fn too_early(&self, before: &Before, now: &Before) -> Option<(&'static str, String)> {
         let over = before.may_be_over
@@ -193,6 +250,7 @@ impl Running for OrderKnown {
         self.learn(entry, context);
         if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
             self.before = None;
+            self.refused.clear();
         }
         let Some(state) = state(self.traffic, entry, context) else {
             return false;
@@ -201,6 +259,8 @@ impl Running for OrderKnown {
         let pair = named(state).filter(|_| in_command && !self.malformed.is_shown_in(state));
         let Some(pair) = pair else {
             self.before = None;
+            self.blamed.clear();
+            self.refused.clear();
             return false;
         };
         let last = last_node(state);
@@ -210,6 +270,8 @@ impl Running for OrderKnown {
             last,
             may_be_over: may_abandon(state),
         };
+        let busy = self.part == Part::Replaced && now.ahead.is_some();
+        self.refusals(entry, state, busy);
         let Some(before) = self.before.take() else {
             self.before = Some(now);
             self.since.clear();
@@ -223,8 +285,12 @@ impl Running for OrderKnown {
             }
             Part::Replaced => {
                 let other = |sent: &Pair| sent.0 != before.pair.0;
-                let early = self.too_early(&before, &now);
-                (before.ahead.is_some() && self.since.iter().any(other), early)
+                let queued = self.queued(&before, &pair, entry.at().moment);
+                let early = queued.or_else(|| self.too_early(&before, &now));
+                (
+                    early.is_some() || before.ahead.is_some() && self.since.iter().any(other),
+                    early,
+                )
             }
         };
         if let Some((requirement, text)) = found {
@@ -313,6 +379,29 @@ mod tests {
             trace.state(&shows("o", update, ("n1", 0), &[]));
         }
         assert_eq!(trace.judge("state/update-id-rises").summary(), ["ORD-REJ-10"]);
+    }
+
+    #[test]
+    fn an_order_that_was_refused_and_is_begun_later_is_found() {
+        let begun = |again: bool| {
+            let mut trace = Trace::subscriber();
+            trace
+                .state(&json!({}))
+                .sent("order", &order("o", 0, &[("n1", true), ("n2", true)]));
+            trace.state(&shows("o", 0, ("n1", 0), &[("n2", 2, true)]));
+            trace.sent("order", &order("p", 0, &[("n2", true), ("n3", true)]));
+            let mut refuses = shows("o", 0, ("n1", 0), &[("n2", 2, true)]);
+            refuses["errors"] = json!([{ "errorType": "orderUpdateError", "errorLevel": "WARNING",
+                "errorReferences": [{ "referenceKey": "orderId", "referenceValue": "p" }] }]);
+            trace.state(&refuses).wait(10.0).state(&shows("o", 0, ("n2", 2), &[]));
+            if again {
+                trace.sent("order", &order("p", 0, &[("n2", true), ("n3", true)]));
+            }
+            trace.state(&shows("p", 0, ("n2", 0), &[("n3", 2, true)]));
+            trace.judge("state/order-not-replaced").summary()
+        };
+        assert_eq!(begun(false), ["ORD-FLOW-01"]);
+        assert!(begun(true).is_empty());
     }
 
     #[test]
