@@ -32,6 +32,9 @@ impl Agv {
         if self.ignores_order() {
             return;
         }
+        if self.loses_order() {
+            return;
+        }
         self.report.order_received = true;
         let message = if payload.len() > self.config.max_message {
             Err(Refusal::new(Rule::Malformed, "the message is too long"))
@@ -60,6 +63,16 @@ impl Agv {
             }
             self.refuse(message.as_ref().unwrap_or(&Value::Null), refusal);
         }
+    }
+
+    /// `order-after-refusal-lost`: the first one after a refusal.
+    fn loses_order(&mut self) -> bool {
+        let loses = self.faults.has(F::OrderAfterRefusalLost)
+            && !self.is_busy()
+            && self.errors.lists_refusals()
+            && !self.order_lost;
+        self.order_lost = loses;
+        loses
     }
 
     /// `r2-refused-order-queued`: begins the order that came too early.

@@ -94,6 +94,11 @@ impl Errors {
         self.active.retain(|error| error.life != Life::UntilNewOrder);
     }
 
+    /// Whether anything that was refused is still listed.
+    pub(super) fn lists_refusals(&self) -> bool {
+        self.active.iter().any(|error| error.life == Life::UntilNewOrder)
+    }
+
     /// The emergency stop was released.
     pub(super) fn released(&mut self) {
         self.active.retain(|error| error.life != Life::WhileStopped);

@@ -123,6 +123,7 @@ with_blind_faults! { faults!
     // Order
     NodeSkipped "node-skipped" ["ORD-01", "STATE-06", "NODE-03"] "Leaves plain nodes between others out of its reports.";
     FirstNodeRefused "first-node-refused" ["ORD-04"] "Refuses orders that begin where it stands.";
+    OrderAfterRefusalLost "order-after-refusal-lost" ["ORD-FLOW-06"] "Loses the first order that comes after a refused one while it has nothing to do.";
     DeviationIgnored "deviation-ignored" ["ORD-05", "ORD-CANCEL-16"] "Counts itself as on the first node only when it stands exactly there.";
     StopsBeforeEndOfBase "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base.";
     HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05", "MQTT-04"] "Drives into the horizon without waiting for its release.";

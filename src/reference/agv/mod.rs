@@ -187,6 +187,8 @@ pub struct Agv {
     last_log: Option<(String, String)>,
     /// An order that was refused and waits all the same (`r2-refused-order-queued` only).
     queued: Option<serde_json::Value>,
+    /// The last order was lost (`order-after-refusal-lost` only).
+    order_lost: bool,
     /// The pause is not shown before this (`r2-paused-flag-late` only).
     pause_hidden_until: Option<Moment>,
     /// What was decided and is still to be handed to the driver.
@@ -264,6 +266,7 @@ impl Agv {
             field_latched: false,
             last_log: None,
             queued: None,
+            order_lost: false,
             pause_hidden_until: None,
             pending: Vec::new(),
             persona: Persona::default(),
