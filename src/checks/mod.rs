@@ -285,6 +285,7 @@ static REGISTRY: &[Check] = &[
     commands::ON_BOARD,
     commands::MODES,
     commands::NOT_ASKED,
+    commands::ON_INFORMATION,
     commands::FIRST_PLACE,
     commands::HEALTH,
     commands::ALIVE,
