@@ -287,6 +287,7 @@ static REGISTRY: &[Check] = &[
     commands::ON_BOARD,
     commands::MODES,
     commands::NOT_ASKED,
+    commands::ON_INFORMATION,
     commands::FIRST_PLACE,
     commands::HEALTH,
     commands::ALIVE,

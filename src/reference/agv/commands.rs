@@ -95,7 +95,7 @@ impl Agv {
             "move-to" if arguments.get("nodeId").is_some() => self.place_on(text("nodeId")),
             "move-to" => self.move_to(arguments),
             // To the vehicle it is the same whether it was moved or only its idea of where it is.
-            "push-out" | "shift-position" => self.push_out(),
+            "push-out" | "shift-position" => self.push_out(arguments.get("by").and_then(Value::as_f64)),
             "place-obstacle" if self.obstacles.len() < MAX_OBSTACLES => {
                 self.obstacles.insert(text("edgeId").to_owned());
             }

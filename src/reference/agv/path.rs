@@ -136,14 +136,15 @@ impl Agv {
     }
 
     /// Somebody pushed it to the left of the way it has before it.
-    pub(super) fn push_out(&mut self) {
+    pub(super) fn push_out(&mut self, by: Option<f64>) {
+        let by = by.unwrap_or(PUSHED);
         let moment = self.moment();
         let mut pose = self.motion.pose(moment);
         let ahead = self.book.nodes.front().map(|stop| &stop.place);
         let ahead = ahead.filter(|place| pose.distance(place.x, place.y) > ON_PATH);
         let heading = ahead.map_or(pose.theta, |place| (place.y - pose.y).atan2(place.x - pose.x));
-        pose.x -= PUSHED * heading.sin();
-        pose.y += PUSHED * heading.cos();
+        pose.x -= by * heading.sin();
+        pose.y += by * heading.cos();
         self.motion.place(pose);
     }
 
