@@ -195,7 +195,10 @@ impl Agv {
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
         let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
         let drives = self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen);
-        let acts = self.actions.iter().any(|action| action.of_order() && action.status.is_active());
+        let acts = self
+            .actions
+            .iter()
+            .any(|action| action.of_order() && action.status.is_active());
         let waits = mode == Mode::Manual && self.waits_at_decision_point() && !self.motion.is_moving() && !acts;
         let keeps = leaves || drives || waits && self.faults.has(F::R2ManualKeepsWaitingOrder);
         let keeps = keeps || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
