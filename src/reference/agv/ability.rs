@@ -211,9 +211,7 @@ impl Agv {
                         | action_kinds::Deed::FactsheetRequest
                         | action_kinds::Deed::LogReport
                 );
-            if listed_refused
-                || (!request_taken && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked))
-            {
+            if listed_refused || (!request_taken && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked)) {
                 return unable("the action is not possible here", &request.path);
             }
             let found = action_kinds::refusal(kind, request, true)

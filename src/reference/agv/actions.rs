@@ -263,9 +263,7 @@ impl Actions {
             let hard = next.iter().any(|id| self.blocking(id) == Some(Blocking::Hard));
             let occupied = self.all.iter().any(|action| {
                 let elsewhere = action.origin != list.origin && faults.has(F::R2HardIgnoresEarlierNode);
-                action.occupies()
-                    && !elsewhere
-                    && (hard && next.len() == 1 || action.request.blocking == Blocking::Hard)
+                action.occupies() && !elsewhere && (hard && next.len() == 1 || action.request.blocking == Blocking::Hard)
             });
             if occupied {
                 continue;

@@ -32,10 +32,7 @@ impl Agv {
             return;
         }
         let active = !self.book.nodes.is_empty() || self.actions.order_unfinished();
-        let acts = self
-            .actions
-            .iter()
-            .any(|action| action.of_order() && action.status.is_active());
+        let acts = self.actions.iter().any(|action| action.of_order() && action.status.is_active());
         let waits = self.waits_at_decision_point() && !self.motion.is_moving() && !acts;
         let active = active
             && !(waits && self.faults.has(F::R2CancelAtDecisionPointRefused))
@@ -120,12 +117,7 @@ impl Agv {
         let base_end = self.book.base_end.1;
         let here = Origin::Node(self.book.last_sequence);
         let waiting = |action: &&Action| action.of_order() && action.status == Status::Waiting;
-        let unbegun = self
-            .actions
-            .iter()
-            .filter(waiting)
-            .map(|action| action.request.id.clone())
-            .collect();
+        let unbegun = self.actions.iter().filter(waiting).map(|action| action.request.id.clone()).collect();
         let queue_survives = faults.has(F::R2QueuedActionsSurviveCancel);
         for action in self.actions.iter_mut().filter(|action| action.of_order()) {
             let deed = action.kind.map(|kind| kind.deed);

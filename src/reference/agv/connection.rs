@@ -453,11 +453,7 @@ impl Agv {
             () if name == "visualization" && self.faults.has(F::R1VisualizationNamesComputer) => "localhost".to_owned(),
             () if name == "connection" && self.faults.has(F::R2ConnectionSerialUpperCase) => {
                 let upper = serial.to_ascii_uppercase();
-                if upper == *serial {
-                    serial.to_ascii_lowercase()
-                } else {
-                    upper
-                }
+                if upper == *serial { serial.to_ascii_lowercase() } else { upper }
             }
             () if self.faults.has(F::OtherSerialNumber) => format!("{serial}0"),
             () if self.faults.has(F::SerialNumberWithSpace) => format!("No. {serial}"),

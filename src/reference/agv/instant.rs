@@ -125,8 +125,9 @@ impl Agv {
         let fit = kind.filter(|kind| kind.scopes.contains(&Scope::Instant) || anywhere);
         let by_hand = self.mode == super::Mode::Semiautomatic && self.faults.has(F::R1SemiautomaticInstantRefused);
         let fit = fit.filter(|_| !by_hand);
-        let fit = fit
-            .filter(|kind| kind.deed != action_kinds::Deed::LogReport || !self.faults.has(F::R2LogReportListedRefused));
+        let fit = fit.filter(|kind| {
+            kind.deed != action_kinds::Deed::LogReport || !self.faults.has(F::R2LogReportListedRefused)
+        });
         let refusal = match (&defect, fit) {
             (Some(defect), _) => Some(format!("{} {}", defect.path, defect.reason)),
             (None, None) => Some("the vehicle does not offer the action as an instant action".to_owned()),

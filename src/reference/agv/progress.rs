@@ -193,10 +193,7 @@ impl Agv {
     fn enter(&mut self, edge: &Edge, stop: &Stop) {
         self.book.entered = true;
         if edge.sequence_id == 1 && self.faults.has(F::R2FirstEdgeActionsFail) {
-            let of_edge = self
-                .actions
-                .iter_mut()
-                .filter(|action| action.origin == Origin::Edge(1));
+            let of_edge = self.actions.iter_mut().filter(|action| action.origin == Origin::Edge(1));
             of_edge.for_each(|action| action.end(super::actions::Status::Failed));
         }
         if self.faults.has(F::NoneAborted) {

@@ -139,9 +139,7 @@ impl Site {
             vehicle.r2_broken += 1;
             vehicle.shunned |= vehicle.r2_broken > 1 && self.faults.has(F::R2TwiceBrokenIsDefective);
         }
-        if presence == Presence::Away
-            && vehicle.presence == Presence::Online
-            && self.faults.has(F::R2ConnectionTopicCleared)
+        if presence == Presence::Away && vehicle.presence == Presence::Online && self.faults.has(F::R2ConnectionTopicCleared)
         {
             self.r2_clear_connection(vehicle);
         }

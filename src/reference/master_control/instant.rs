@@ -62,8 +62,7 @@ impl Site {
         let cancels = |instant: &Instant| instant.sent_at.is_none() && instant.kind() == "cancelOrder";
         let manual = vehicle.state.as_ref().is_some_and(|state| !state.takes_orders());
         let stops = manual && vehicle.instants.iter().any(cancels) && self.faults.has(F::R1CancelInManual);
-        let pause =
-            |instant: &Instant| instant.sent_at.is_none() && matches!(instant.kind(), "startPause" | "stopPause");
+        let pause = |instant: &Instant| instant.sent_at.is_none() && matches!(instant.kind(), "startPause" | "stopPause");
         let pauses = manual && vehicle.instants.iter().any(pause) && self.faults.has(F::R2PausesInEveryMode);
         let despite = service && self.faults.has(F::ActionsInService) || stops || pauses;
         let despite = despite && self.reachable(vehicle);

@@ -138,10 +138,7 @@ impl Site {
 
     /// `r2-enables-after-download`: enables a new map of which no version is enabled.
     fn enable_after_download(&mut self, vehicle: &mut Vehicle, map: &SiteMap) {
-        let enabled = vehicle
-            .state
-            .as_ref()
-            .is_none_or(|state| state.map_enabled(&map.map_id));
+        let enabled = vehicle.state.as_ref().is_none_or(|state| state.map_enabled(&map.map_id));
         if !enabled
             && vehicle.running.is_none()
             && !vehicle.enabling.contains_key(&map.map_id)

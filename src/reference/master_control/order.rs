@@ -137,10 +137,7 @@ impl Site {
         let has = |fault: F| self.faults.has(fault);
         let Some(state) = &vehicle.state else { return };
         let loaded = state.loads.as_ref().is_some_and(|loads| !loads.is_empty());
-        let score = state
-            .agv_position
-            .as_ref()
-            .and_then(|position| position.localization_score);
+        let score = state.agv_position.as_ref().and_then(|position| position.localization_score);
         if let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64) {
             if score.is_some_and(|score| score < 0.5) && has(F::R2LowScoreSlowsDown) {
                 edge["maxSpeed"] = json!(speed / 3.0);

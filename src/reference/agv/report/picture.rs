@@ -235,11 +235,7 @@ impl Agv {
         });
         left.into_iter()
             .chain(shown)
-            .take(if self.faults.has(F::R2RouteListsCapped) {
-                3
-            } else {
-                usize::MAX
-            })
+            .take(if self.faults.has(F::R2RouteListsCapped) { 3 } else { usize::MAX })
             .map(|stop| self.node_state(stop))
             .collect()
     }
@@ -308,13 +304,8 @@ impl Agv {
         let next = self.book.edges.front().map(|edge| edge.sequence_id);
         let picture = |edge: &Edge| {
             let far = Some(edge.sequence_id) != next && self.faults.has(F::R1FarEdgesUnreleased);
-            let released = edge.released && !far && !self.stays_planned(edge.sequence_id)
-                || self.faults.has(F::HorizonReportedReleased);
-            let id = if self.faults.has(F::R2EdgeIdMisspelled) {
-                "edgeID"
-            } else {
-                "edgeId"
-            };
+            let released = edge.released && !far && !self.stays_planned(edge.sequence_id) || self.faults.has(F::HorizonReportedReleased);
+            let id = if self.faults.has(F::R2EdgeIdMisspelled) { "edgeID" } else { "edgeId" };
             let mut picture = json!({
                 id: edge.id,
                 "sequenceId": edge.sequence_id,
@@ -326,11 +317,7 @@ impl Agv {
             }
             picture
         };
-        let most = if self.faults.has(F::R2RouteListsCapped) {
-            3
-        } else {
-            usize::MAX
-        };
+        let most = if self.faults.has(F::R2RouteListsCapped) { 3 } else { usize::MAX };
         left.into_iter().chain(shown).take(most).map(picture).collect()
     }
 
@@ -360,9 +347,7 @@ impl Agv {
             Status::Waiting if self.is_next(action) && self.faults.has(F::R2NextNodeActionsInitializing) => {
                 "INITIALIZING"
             }
-            Status::Waiting
-                if of_horizon && self.waits_at_decision_point() && self.faults.has(F::R2PausedAtDecisionPoint) =>
-            {
+            Status::Waiting if of_horizon && self.waits_at_decision_point() && self.faults.has(F::R2PausedAtDecisionPoint) => {
                 "PAUSED"
             }
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
