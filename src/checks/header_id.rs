@@ -128,9 +128,8 @@ impl IdRises {
         };
         let levels = |topic: &str| topic.split('/').count();
         let mut all = context.topics.iter();
-        let (name, _) = all.find(|(_, own)| {
-            levels(own) == levels(topic) && own.rsplit('/').next() == topic.rsplit('/').next()
-        })?;
+        let (name, _) =
+            all.find(|(_, own)| levels(own) == levels(topic) && own.rsplit('/').next() == topic.rsplit('/').next())?;
         let id = entry.json()?.get("headerId")?.as_u64()?;
         self.overall.insert(name.clone(), u32::try_from(id).ok()?)
     }

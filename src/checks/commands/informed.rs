@@ -92,10 +92,14 @@ mod tests {
     fn answered(after: &[Option<f64>]) -> Vec<String> {
         let mut trace = Trace::master_control();
         for after in after {
-            trace.wait(10.0).shows(&json!({ "information": [{ "infoType": "any" }] }));
+            trace
+                .wait(10.0)
+                .shows(&json!({ "information": [{ "infoType": "any" }] }));
             if let Some(after) = after {
                 let action = json!({ "actionId": "1", "actionType": "stateRequest" });
-                trace.wait(*after).commands("instantActions", &json!({ "actions": [action] }));
+                trace
+                    .wait(*after)
+                    .commands("instantActions", &json!({ "actions": [action] }));
             }
             trace.wait(10.0).shows(&json!({ "information": [] }));
         }

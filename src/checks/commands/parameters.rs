@@ -55,7 +55,11 @@ impl Running for Values {
                 let all: Option<Vec<String>> = sheets.iter().map(|sheet| wanted(sheet)).collect();
                 if let Some(wanted) = all.and_then(|all| all.into_iter().next()) {
                     let shown = show(value);
-                    let text = format!("parameter {} of {} is {shown}, not of type {wanted}", quote(key), quote(kind));
+                    let text = format!(
+                        "parameter {} of {} is {shown}, not of type {wanted}",
+                        quote(key),
+                        quote(kind)
+                    );
                     found.broken("BP-05", text);
                 }
             }
