@@ -79,7 +79,7 @@ R2CurrentMapDeletedWhenIdle "r2-current-map-deleted-when-idle" ["MAP-32", "MAP-1
 R2EnableRemovesOldVersion "r2-enable-removes-old-version" ["MAP-31", "MAP-24"] "Enabling a version removes the other versions of that map.";
 R2BrokenDownloadListed "r2-broken-download-listed" ["MAP-19", "MAP-21"] "A map whose download failed is listed in maps all the same.";
 R2InitPositionWithoutNodeTaken "r2-init-position-without-node-taken" ["ACT-25", "ACT-24"] "initPosition without lastNodeId is FINISHED and clears lastNodeId.";
-R2BadParameterInstantFinished "r2-bad-parameter-instant-finished" ["IACT-06"] "An instant action with a missing or wrong parameter is FINISHED although nothing was done.";
+R2BadParameterInstantFinished "r2-bad-parameter-instant-finished" ["IACT-06", "ACT-25"] "An instant action with a missing or wrong parameter is FINISHED although nothing was done.";
 R2InstantWaitsForRunningAction "r2-instant-waits-for-running-action" ["IACT-05"] "As long as an action of the order is under way instant actions wait, except pause and cancelOrder.";
 R2SameTypeInMessageDropped "r2-same-type-in-message-dropped" ["IACT-07", "IACT-03"] "Of several actions of one type in an instantActions message only the first is taken.";
 R2BusyRefusalUnreferenced "r2-busy-refusal-unreferenced" ["BP-01"] "The error for a new order while another one is active has no errorReferences at all.";

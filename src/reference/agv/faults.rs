@@ -24,7 +24,7 @@ macro_rules! faults {
 
 with_blind_faults! { faults!
     // Transport
-    OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
+    OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-02"] "Throws its order away when the link breaks.";
     UpdateForgottenOnLinkLoss "update-forgotten-on-link-loss" ["MQTT-03", "STATE-12", "STATE-MSG-13"] "Goes back to the first orderUpdateId of its order when the link breaks.";
     ActionsForgottenOnLinkLoss "actions-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-10"] "Forgets the actions of its order when the link breaks.";
     ActionEndMissedOffline "action-end-missed-offline" ["MQTT-04"] "Leaves an action RUNNING for ever that ends while the link is down.";
