@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, device_publish, remark, says_broken, show, unclear};
+use super::traffic::{Traffic, broken, remark, says_broken, show, unclear};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
@@ -18,7 +18,7 @@ pub(super) const ID_RISES: Check = Check {
     decides: &["HDR-02"],
     doc: "headerId is a whole number from 0 to 4294967295 that rises by one with each message of a topic. Any start \
           value and a restart of the count after a new connection are accepted, but one after a link that only the \
-          harness has broken is a warning, and so is one count for the topics of all vehicles; the last will is exempt. At the tap \
+          harness has broken is a warning; the last will is exempt. At the tap \
           the PUBLISH packets count; a subscriber cannot tell a gap from a lost message, which is inconclusive.",
     arguments: &[],
     start: |_| Box::new(IdRises::default()),
@@ -34,8 +34,6 @@ struct IdRises {
     last: BTreeMap<String, u32>,
     /// The last ids before a link that only the harness has broken.
     before_cut: BTreeMap<String, u32>,
-    /// The last id per topic name over all vehicles.
-    overall: BTreeMap<String, u32>,
 }
 
 impl Running for IdRises {
@@ -58,7 +56,6 @@ impl Running for IdRises {
             }
             _ => {}
         }
-        let shared = self.shared(entry, context);
         let Some(message) = self.traffic.published(entry, context) else {
             return false;
         };
@@ -95,10 +92,7 @@ impl Running for IdRises {
             return true;
         }
         let text = format!("headerId {id} follows {before} on {}", message.name);
-        if shared.is_some_and(|last| last != before && id == last.wrapping_add(1)) {
-            let text = format!("{text}: the topics of all vehicles are counted together");
-            findings.push(remark("HDR-02", entry.seq(), text));
-        } else if self.traffic.tap || (again && id > 1) {
+        if self.traffic.tap || (again && id > 1) {
             findings.push(broken("HDR-02", entry.seq(), text));
         } else if again || id < before {
             findings.push(unclear(
@@ -118,22 +112,6 @@ impl Running for IdRises {
 }
 
 impl IdRises {
-    /// The id before this one on the topics of that name, whatever vehicle they are for.
-    fn shared(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<u32> {
-        let topic = match entry.event() {
-            Event::Message {
-                topic, retain: false, ..
-            } if !self.traffic.tap => topic,
-            _ => device_publish(entry)?.1,
-        };
-        let levels = |topic: &str| topic.split('/').count();
-        let mut all = context.topics.iter();
-        let (name, _) =
-            all.find(|(_, own)| levels(own) == levels(topic) && own.rsplit('/').next() == topic.rsplit('/').next())?;
-        let id = entry.json()?.get("headerId")?.as_u64()?;
-        self.overall.insert(name.clone(), u32::try_from(id).ok()?)
-    }
-
     fn read(id: Option<&Value>, topic: &str, entry: &Entry, findings: &mut Vec<CheckFinding>) -> Option<u32> {
         // A missing headerId is another requirement's business.
         let id = id?;
@@ -163,8 +141,7 @@ mod tests {
     use serde_json::json;
 
     use super::super::trace::Trace;
-    use crate::journal::Payload;
-    use crate::journal::event::{Direction, LinkFault, Packet};
+    use crate::journal::event::LinkFault;
 
     const CHECK: &str = "header/id-rises";
 
@@ -247,33 +224,5 @@ mod tests {
         trace.fault(LinkFault::Restore);
         trace.publish(1, "state", 0, false, &json!({ "headerId": 11 }));
         assert!(trace.judge(CHECK).findings.is_empty());
-    }
-
-    #[test]
-    fn one_count_for_the_topics_of_all_vehicles_is_a_warning_only() {
-        let judged = |ids: [u32; 4]| {
-            let mut trace = Trace::master_control_at_tap();
-            trace.connect(1, None, 15, 4);
-            for (at, id) in ids.into_iter().enumerate() {
-                let own = trace.topic("order");
-                let mut levels: Vec<&str> = own.split('/').collect();
-                if at % 2 == 1 {
-                    levels[3] = "another";
-                }
-                let packet = Packet::Publish {
-                    topic: levels.join("/"),
-                    qos: 0,
-                    retain: false,
-                    dup: false,
-                    packet_id: None,
-                    payload: Payload::keep(bytes::Bytes::from(json!({ "headerId": id }).to_string())),
-                };
-                trace.packet(1, Direction::FromDevice, packet);
-            }
-            trace.judge(CHECK).summary()
-        };
-        assert!(judged([0, 0, 1, 1]).is_empty());
-        assert_eq!(judged([0, 1, 2, 3]), ["HDR-02 warning"]);
-        assert_eq!(judged([0, 1, 3, 4]), ["HDR-02"]);
     }
 }

@@ -11,8 +11,6 @@ mod blocking;
 mod commands;
 mod connection;
 mod connection_crash;
-mod connection_offline;
-mod continuity;
 mod errors;
 mod errors_event;
 mod errors_ready;
@@ -21,26 +19,16 @@ mod factsheet_actions;
 mod fleet;
 mod header;
 mod header_id;
-mod instant_answers;
-mod instant_requests;
-mod linked_state;
 mod message;
 mod motion;
-mod motion_signs;
 mod mqtt;
 mod orders;
-mod state_action_ids;
 mod state_actions;
 mod state_battery;
 mod state_bursts;
 mod state_driving;
-mod state_known;
-mod state_loads;
-mod state_map_changes;
 mod state_maps;
-mod state_node_positions;
 mod state_order;
-mod state_pause_stands;
 mod state_paused;
 mod state_period;
 mod state_place;
@@ -183,37 +171,22 @@ static REGISTRY: &[Check] = &[
     connection::ONLINE_AFTER_CONNECT,
     connection::VALUES,
     connection_crash::STAYS,
-    connection_offline::SAYS_OFFLINE,
     state_period::PERIOD,
     state_period::OWN_LIMITS,
     state_bursts::BURSTS,
-    state_action_ids::ACTION_IDS,
     state_actions::TRANSITIONS,
     state_actions::KEPT,
     state_order::ORDER_KEPT,
-    state_known::ORDER_KNOWN,
-    state_known::UPDATE_ID_RISES,
-    state_known::NOT_REPLACED,
     state_predefined::STATUSES,
     state_predefined::RESULTS,
-    linked_state::LINKED_STATE,
-    instant_answers::ANSWERED,
-    instant_answers::TOGETHER,
-    instant_answers::BEGINS,
-    instant_answers::SCOPE,
-    instant_requests::REQUESTS_MET,
     state_route::REMAINING_ROUTE,
     state_route::LAST_NODE,
-    state_node_positions::NODE_POSITIONS,
-    state_node_positions::JOINT_POSITION,
     state_triggers::TRIGGERS,
     blocking::BLOCKING,
     state_paused::PAUSED,
-    state_pause_stands::PAUSE_STANDS,
     state_place::LAST_NODE_PLACE,
     state_values::IDLE_EMPTY,
     state_maps::MAPS,
-    state_map_changes::MAP_CHANGES,
     state_values::POSITION_RANGE,
     state_values::IDENTIFIERS,
     state_driving::DRIVING,
@@ -222,7 +195,6 @@ static REGISTRY: &[Check] = &[
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
     state_battery::LEVELS,
-    state_loads::LOADS,
     visualization::RATE,
     visualization::PUBLISHED,
     visualization_pose::POSITION,
@@ -230,7 +202,6 @@ static REGISTRY: &[Check] = &[
     errors_ready::READY,
     errors_event::ON_EVENT,
     factsheet::CONSISTENCY,
-    factsheet::LIMITS,
     factsheet_actions::PREDEFINED,
     motion::EDGE_SPEED,
     motion::EDGE_ROTATION_SPEED,
@@ -245,8 +216,6 @@ static REGISTRY: &[Check] = &[
     motion::NODE_THETA,
     motion::AXES,
     motion::VELOCITY_SIGN,
-    motion_signs::VELOCITY_AXES,
-    motion_signs::TURN_SIGN,
     motion::MODE_SPEED,
     commands::NODES_AND_EDGES,
     commands::RELEASED,
@@ -284,10 +253,8 @@ static REGISTRY: &[Check] = &[
     commands::ENABLED,
     commands::DOWNLOADS,
     commands::DUPLICATES,
-    commands::ON_BOARD,
     commands::MODES,
     commands::NOT_ASKED,
-    commands::ON_INFORMATION,
     commands::FIRST_PLACE,
     commands::HEALTH,
     commands::ALIVE,

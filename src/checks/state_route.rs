@@ -14,10 +14,10 @@ use crate::journal::Entry;
 /// `state/remaining-route`.
 pub(super) const REMAINING_ROUTE: Check = Check {
     name: "state/remaining-route",
-    decides: &["STATE-12", "STATE-MSG-13", "NODE-03", "ORD-FLOW-09"],
+    decides: &["STATE-12", "STATE-MSG-13", "NODE-03"],
     doc: "nodeStates and edgeStates list, in sequence, exactly what the vehicle has still to traverse of the order \
           whose ids the state shows, horizon included, released as in the order. The first node may be listed or \
-          not. None stands there twice behind an update. Not judged after a cancelOrder, a change of mode, a fatal error or a failed action.",
+          not. Not judged after a cancelOrder, a change of mode, a fatal error or a failed action.",
     arguments: &[],
     start: |_| Box::new(RemainingRoute::default()),
 };
@@ -181,27 +181,9 @@ impl RemainingRoute {
         let mut found = Vec::new();
         let remainder = self.remainder(sent, progress, |order| &order.nodes);
         compare("nodeStates", "node", &remainder, nodes, (progress, seq), &mut found);
-        self.twice(sent, nodes, seq, &mut found);
         let remainder = self.remainder(sent, progress, |order| &order.edges);
         compare("edgeStates", "edge", &remainder, edges, (progress, seq), &mut found);
         found
-    }
-
-    /// What more is broken where an update made the vehicle list a visit twice.
-    fn twice(&self, sent: &SentOrder, listed: &[Element], seq: u64, found: &mut Vec<CheckFinding>) {
-        if found.is_empty() {
-            return;
-        }
-        let twice = listed
-            .iter()
-            .enumerate()
-            .find(|(at, element)| listed[..*at].iter().any(|other| other.sequence == element.sequence));
-        if let Some((_, element)) =
-            twice.filter(|_| self.adopted.len() > 1 && self.adopted.last() == Some(&sent.update))
-        {
-            let text = format!("after an update, nodeStates lists node {} twice", quote(&element.id));
-            found.insert(0, broken("ORD-FLOW-09", seq, text));
-        }
     }
 
     /// The sequenceId the vehicle has reached in the order; `None` while it has not begun.

@@ -12,13 +12,11 @@ use super::traffic::{Traffic, broken, device_publish, quote, remark};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::{Event, Packet};
+use crate::journal::event::Event;
 use crate::pack::Role;
 
 /// How many different topics are remembered; a device that invents more is judged on the first ones.
 const TOPICS: usize = 64;
-/// How many order messages are remembered.
-const ORDERS: usize = 1024;
 
 /// `topic/names`.
 pub(super) const NAMES: Check = Check {
@@ -26,8 +24,7 @@ pub(super) const NAMES: Check = Check {
     decides: &["TOPIC-01", "TOPIC-02", "TOPIC-03"],
     doc: "The last level of a protocol topic is spelled exactly as defined. Topics whose last level is no variant of \
           a defined name are the vendor's own and not judged, unless what belongs on a defined one is published there \
-          and, for thirty seconds, never where it belongs. An order of a master control belongs on its topic by its \
-          orderId and orderUpdateId, an instant action by its actionId. Where only the levels before the name differ, that is a warning.",
+          and, for thirty seconds, never where it belongs. Where only the levels before the name differ, that is a warning.",
     arguments: &[],
     start: |_| Box::new(Names::default()),
 };
@@ -46,8 +43,7 @@ pub(super) const STRUCTURE: Check = Check {
 pub(super) const OWN_SIDE: Check = Check {
     name: "topic/own-side",
     decides: &["TOPIC-15"],
-    doc: "The device publishes only on the topics of its own side, and has no last will on one of the other side. Only the \
-          tap knows who published.",
+    doc: "The device publishes only on the topics of its own side. Only the tap knows who published.",
     arguments: &[],
     start: |_| Box::new(OwnSide::default()),
 };
@@ -71,40 +67,6 @@ struct Names {
     proper: BTreeSet<String>,
     /// What looks like a message of ours on a topic of another name: by name, where, entry, time, and how often.
     astray: BTreeMap<&'static str, (String, u64, Moment, u32)>,
-    /// What a master control has published where it belongs.
-    orders: BTreeSet<Sent>,
-    /// What it has published elsewhere below the levels of the vehicle only: where, entry, time.
-    strays: BTreeMap<Sent, (String, u64, Moment)>,
-}
-
-/// What tells a message of a master control wherever it is published.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Sent {
-    /// orderId and orderUpdateId.
-    Order(String, u64),
-    /// The actionId of its first instant action.
-    Instant(String),
-}
-
-impl Sent {
-    fn read(message: &Value) -> Option<Self> {
-        let short = |value: &Value| -> Option<String> { Some(value.as_str()?.chars().take(256).collect()) };
-        if message.get("nodes").is_some_and(Value::is_array) {
-            let update = message.get("orderUpdateId").and_then(Value::as_u64)?;
-            return Some(Self::Order(short(message.get("orderId")?)?, update));
-        }
-        let action = message.get("actions")?.as_array()?.first()?;
-        let kind = action.get("actionType").is_some_and(Value::is_string);
-        Some(Self::Instant(short(action.get("actionId")?)?)).filter(|_| kind && message.get("headerId").is_some())
-    }
-
-    /// The topic where it belongs.
-    fn topic(&self) -> &'static str {
-        match self {
-            Self::Order(..) => "order",
-            Self::Instant(_) => "instantActions",
-        }
-    }
 }
 
 /// Members that tell a message of a vehicle wherever it is published.
@@ -127,11 +89,7 @@ pub(super) fn looks_like(message: &Value) -> Option<&'static str> {
 impl Names {
     /// Notes where the device publishes what.
     fn note(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
-        if topic.len() > 1024 {
-            return;
-        }
-        if context.role == Role::MasterControl {
-            self.note_order(topic, entry, context);
+        if context.role != Role::Agv || topic.len() > 1024 {
             return;
         }
         if let Some(name) = context.topic_name(topic) {
@@ -143,52 +101,6 @@ impl Names {
         };
         let first = || (topic.to_owned(), entry.seq(), entry.at().moment, 0);
         self.astray.entry(name).or_insert_with(first).3 += 1;
-    }
-
-    /// Notes where a master control publishes its orders and instant actions.
-    fn note_order(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
-        let Some(key) = entry.json().and_then(Sent::read) else {
-            return;
-        };
-        let belongs = key.topic();
-        if context.topic_name(topic) == Some(belongs) {
-            self.strays.remove(&key);
-            if self.orders.len() == ORDERS {
-                self.orders.pop_first();
-            }
-            self.orders.insert(key);
-            return;
-        }
-        let above = |topic: &str| topic.rsplit_once('/').map(|(above, _)| above.to_owned());
-        let beside = context
-            .topics
-            .get(belongs)
-            .is_some_and(|usual| above(usual) == above(topic));
-        if beside && context.topic_name(topic).is_none() && !self.orders.contains(&key) && self.strays.len() < ORDERS {
-            let place = (topic.to_owned(), entry.seq(), entry.at().moment);
-            self.strays.entry(key).or_insert(place);
-        }
-    }
-
-    /// What came on a topic beside its own, and on its own never.
-    fn strayed(&mut self, now: Moment, patience: Duration, findings: &mut Vec<CheckFinding>) {
-        let due = |since: &Moment| now.since(*since) >= patience;
-        let late: Vec<_> = self.strays.iter().filter(|(_, (.., since))| due(since)).collect();
-        let late: Vec<_> = late.into_iter().map(|(key, _)| key.clone()).collect();
-        for key in late {
-            let Some((topic, seq, _)) = self.strays.remove(&key) else {
-                continue;
-            };
-            if self.seen.first(&topic) {
-                let what = match &key {
-                    Sent::Order(id, update) => format!("order {}, orderUpdateId {update},", quote(id)),
-                    Sent::Instant(id) => format!("the instant action {}", quote(id)),
-                };
-                let (topic, belongs) = (quote(&topic), key.topic());
-                let text = format!("{what} is published on {topic}, which is no topic name, and not as {belongs}");
-                findings.push(broken("TOPIC-01", seq, text));
-            }
-        }
     }
 
     /// Messages that come on another topic, and never on their own.
@@ -226,14 +138,11 @@ impl Names {
 impl Running for Names {
     fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         self.astray(end, context, findings);
-        // What came at the very last may still be on its way to the other topic.
-        self.strayed(end, Duration::from_secs(2), findings);
     }
 
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.astray(entry.at().moment, context, findings);
-        self.strayed(entry.at().moment, ELSEWHERE, findings);
         let topic = match entry.event() {
             Event::Message {
                 topic, retain: false, ..
@@ -406,23 +315,6 @@ struct OwnSide {
 impl Running for OwnSide {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
-        let owner = match context.role {
-            Role::Agv => "master control",
-            Role::MasterControl => "the vehicle",
-        };
-        if let Event::Packet {
-            packet: Packet::Connect { will: Some(will), .. },
-            ..
-        } = entry.event()
-        {
-            let name = context.topic_name(&will.topic);
-            let rule = name.and_then(|name| context.pack.topic(name));
-            if let Some(name) = name.filter(|_| rule.is_some_and(|rule| rule.publisher != context.role)) {
-                let text = format!("the device has a last will on {name}, which belongs to {owner}");
-                findings.push(broken("TOPIC-15", entry.seq(), text));
-            }
-            return name.is_some();
-        }
         let Some((_, topic, ..)) = device_publish(entry) else {
             return false;
         };
@@ -430,6 +322,10 @@ impl Running for OwnSide {
             return false;
         };
         if self.traffic.published(entry, context).is_none() {
+            let owner = match context.role {
+                Role::Agv => "master control",
+                Role::MasterControl => "the vehicle",
+            };
             let text = format!("the device publishes on {name}, which belongs to {owner}");
             findings.push(broken("TOPIC-15", entry.seq(), text));
         }
@@ -608,42 +504,5 @@ mod tests {
         );
         let outcome = trace.judge("topic/own-side");
         assert!(outcome.findings.is_empty() && outcome.judged == 0);
-    }
-
-    #[test]
-    fn a_last_will_on_a_topic_of_the_vehicle_is_foreign() {
-        let mut trace = Trace::master_control_at_tap();
-        let will = trace.will();
-        trace.connect(1, Some(will), 15, 4);
-        assert_eq!(trace.judge("topic/own-side").summary(), ["TOPIC-15"]);
-        let mut vehicle = Trace::tap();
-        vehicle.connected(1);
-        assert!(vehicle.judge("topic/own-side").findings.is_empty());
-    }
-
-    #[test]
-    fn instant_actions_belong_on_their_topic() {
-        let actions = json!({ "headerId": 1, "actions": [{ "actionId": "a", "actionType": "enableMap" }] });
-        let judged = |names: &[&str]| {
-            let mut trace = Trace::master_control_at_tap();
-            trace.connect(1, None, 15, 4);
-            for name in names {
-                let topic = trace.topic("instantActions").replace("instantActions", name);
-                let packet = Packet::Publish {
-                    topic,
-                    qos: 0,
-                    retain: false,
-                    dup: false,
-                    packet_id: None,
-                    payload: crate::journal::Payload::keep(bytes::Bytes::from(actions.to_string())),
-                };
-                trace.packet(1, Direction::FromDevice, packet);
-            }
-            trace.wait(60.0).shows(&json!({}));
-            trace.judge("topic/names").summary()
-        };
-        assert_eq!(judged(&["mapActions"]), ["TOPIC-01"]);
-        assert!(judged(&["instantActions", "copy"]).is_empty());
-        assert!(judged(&["copy", "instantActions"]).is_empty());
     }
 }

@@ -294,13 +294,6 @@ impl Trace {
         self.add(Source::Harness, None, Event::Fault { fault })
     }
 
-    /// The harness notices that it was late.
-    pub fn late(&mut self, seconds: f64) -> &mut Self {
-        let micros = u64::try_from(std::time::Duration::from_secs_f64(seconds).as_micros()).expect("a short time");
-        let of = "timer".to_owned();
-        self.add(Source::Harness, None, Event::Lag { micros, of })
-    }
-
     pub fn hook(&mut self) -> &mut Self {
         let event = Event::Hook {
             hook: "power-cycle".into(),

@@ -151,7 +151,7 @@ impl Composer {
         let mut message = self.header(&send.topic, ground, now);
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
         if !send.actions.is_empty() {
-            let list = self.actions(&send.actions, true, bindings, actions)?;
+            let list = self.actions(&send.actions, bindings, actions)?;
             message.insert("actions".to_owned(), Value::Array(list));
         }
         if let Some(route) = &send.route {
@@ -165,7 +165,7 @@ impl Composer {
             message.insert("orderUpdateId".to_owned(), json!(0));
             let mut placed = BTreeMap::new();
             for (at, (place, list)) in route.actions.iter().enumerate() {
-                placed.insert(at, (place.clone(), self.actions(list, false, bindings, actions)?));
+                placed.insert(at, (place.clone(), self.actions(list, bindings, actions)?));
             }
             let builder = RouteBuilder {
                 course: bindings.get("course"),
@@ -198,7 +198,6 @@ impl Composer {
     fn actions(
         &mut self,
         list: &[SendAction],
-        instant: bool,
         bindings: &Bindings,
         named: &mut Vec<(String, String)>,
     ) -> Result<Vec<Value>, ComposeError> {
@@ -225,11 +224,7 @@ impl Composer {
             }
             let action_type = action.action.bind(bindings)?;
             let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
-            let blocking = match blocking {
-                Some(said) if !instant => said,
-                // How an instant action blocks is nothing a test is about.
-                said => usual_blocking(&action_type, said.unwrap_or_else(|| json!("HARD")), bindings),
-            };
+            let blocking = blocking.unwrap_or_else(|| usual_blocking(&action_type, bindings));
             all.push(json!({
                 "actionType": action_type,
                 "actionId": id,
@@ -284,9 +279,10 @@ fn timestamp(now: Stamp) -> String {
     format!("{:.2}", now.utc)
 }
 
-/// How an action blocks where a test does not care: the usual way, or the first type its factsheet lists when the usual
-/// one is not among them (FACT-15).
-fn usual_blocking(action_type: &Value, usual: Value, bindings: &Bindings) -> Value {
+/// How an action blocks where a test does not care: HARD, or the first type its factsheet lists when HARD is not among
+/// them (FACT-15).
+fn usual_blocking(action_type: &Value, bindings: &Bindings) -> Value {
+    let usual = json!("HARD");
     let listed = bindings
         .get("device.factsheet.protocolFeatures.agvActions")
         .and_then(Value::as_array);

@@ -21,8 +21,6 @@ pub(super) struct Open {
     pub ended: u64,
     /// What was waited for.
     pub waited: Option<Waited>,
-    /// The vehicle has reported a new error since the message the step is about: it says itself that it did not obey.
-    pub refused: bool,
     /// What it says about time, if it is a finding about time.
     pub of_time: Option<Timing>,
 }
@@ -58,7 +56,6 @@ impl Hidden {
             && member == Some(self.member.as_str())
             && !self.decides.iter().any(|id| about.contains(id))
             && self.seq <= open.ended
-            && !(open.refused && open.clause.holds == Holds::No)
     }
 }
 
@@ -125,7 +122,6 @@ mod tests {
             ended: 30,
             waited: None,
             of_time: None,
-            refused: false,
         }
     }
 
@@ -160,13 +156,6 @@ mod tests {
         let mut came = clause("ORD-06", "orderId");
         came.clause.witness = Some(20);
         assert!(!is_hidden(came, 15));
-    }
-
-    #[test]
-    fn what_the_vehicle_says_it_refused_is_seen() {
-        let mut refused = clause("ORD-06", "orderId");
-        refused.refused = true;
-        assert!(!is_hidden(refused, 15));
     }
 
     #[test]

@@ -139,7 +139,7 @@ pub const HOOKS: &[HookInfo] = &[
     ),
     master_control(
         "dispatch",
-        &["vehicle", "from", "to", "loadType", "action", "parameters"],
+        &["vehicle", "from", "to", "loadType", "action"],
         "A transport was ordered.",
     ),
     master_control(

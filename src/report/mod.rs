@@ -18,4 +18,3 @@ pub mod sequence;
 pub mod sources;
 pub mod statement;
 pub mod text;
-pub mod undecided;

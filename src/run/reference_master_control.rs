@@ -117,9 +117,9 @@ impl ReferenceMasterControl {
             vehicle.hurry();
         }
         self.time.drive = Duration::from_secs(3);
-        self.time.quiet = Duration::from_millis(200);
+        self.time.quiet = Duration::from_millis(300);
         // What the tests let pass so that nobody is accused of what was under way; here nothing is for long.
-        self.time.slow = Duration::from_millis(400);
+        self.time.slow = Duration::from_millis(650);
         self.time.settle = Duration::from_millis(70);
         self.time.notice = Duration::from_millis(50);
         self.config.reconnect_delay = Duration::from_millis(100);

@@ -11,7 +11,6 @@ mod fields;
 mod grammar;
 mod lint;
 mod load;
-mod matrix;
 pub mod model;
 mod read;
 mod steps;

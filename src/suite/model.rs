@@ -44,12 +44,12 @@ pub struct Test {
     pub source: Arc<Source>,
     /// The names of course nodes it uses, in order of appearance, and the pairs it drives.
     pub course: CourseNeed,
-    /// Where it comes from, when it is one of many cases of which a run takes some.
+    /// What it breaks, when it is one of many cases that come from a schema.
     pub drawn: Option<Drawn>,
 }
 
 impl Test {
-    /// What it is known by where the cases that a run draws from count as one: its table, else its id.
+    /// What it is known by where the cases of a schema count as one: its table, else its id.
     #[must_use]
     pub fn table(&self) -> &str {
         match self.drawn {
@@ -156,7 +156,7 @@ pub enum Need {
 }
 
 pub use crate::course::CourseNeed;
-pub use drawn::{Drawn, Kind};
+pub use drawn::Drawn;
 pub use monitor::{About, Monitor, Rule};
 pub use serving::ServeBehaviour;
 pub use vehicle::{VehicleStep, Which};

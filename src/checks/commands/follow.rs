@@ -1,6 +1,6 @@
 //! Orders and their updates, one after the other: what may change and what must stay.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use serde_json::Value;
 
@@ -12,7 +12,6 @@ use crate::checks::traffic::{Traffic, elements, quote, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::Event;
 
 /// `commands/updates`.
 pub(in crate::checks) const UPDATES: Check = Check {
@@ -80,12 +79,10 @@ struct Order {
     id: String,
     sent: VecDeque<Sent>,
     /// Ids of all released elements by sequenceId; bounded.
-    base: BTreeMap<u64, String>,
+    base: std::collections::BTreeMap<u64, String>,
     last_used: Moment,
     /// Whether a state has shown that nothing is left of it.
     done: bool,
-    /// The same, and nobody has done anything to the vehicle meanwhile.
-    ended: bool,
 }
 
 struct Follow {
@@ -94,8 +91,6 @@ struct Follow {
     vehicle: Vehicle,
     /// Oldest first; the one sent last is at the end.
     orders: VecDeque<Order>,
-    /// Numbers and contents of what was sent before the link was disturbed, by orderId.
-    numbers: BTreeMap<String, Vec<(u64, u64)>>,
 }
 
 /// The released elements of a message: sequenceId and id.
@@ -124,10 +119,9 @@ impl Order {
         let mut order = Self {
             id,
             sent: VecDeque::new(),
-            base: BTreeMap::new(),
+            base: std::collections::BTreeMap::new(),
             last_used: now,
             done: false,
-            ended: false,
         };
         order.take(message, update, now);
         order
@@ -149,7 +143,6 @@ impl Order {
         }
         self.last_used = now;
         self.done = false;
-        self.ended = false;
     }
 
     fn newest(&self) -> Option<u64> {
@@ -164,41 +157,7 @@ impl Follow {
             traffic: Traffic::default(),
             vehicle: Vehicle::default(),
             orders: VecDeque::new(),
-            numbers: BTreeMap::new(),
         }
-    }
-
-    /// The link is disturbed: where orders go on is not known any more, but numbers that were given are.
-    fn interrupted(&mut self) {
-        for order in self.orders.drain(..) {
-            if self.numbers.len() == ORDERS {
-                self.numbers.pop_first();
-            }
-            let known = self.numbers.entry(order.id).or_default();
-            known.extend(order.sent.iter().map(|sent| (sent.update, sent.print)));
-            known.truncate(MESSAGES);
-        }
-    }
-
-    /// An order that goes on behind a disturbance with a number that was given before.
-    fn falls_back(&self, message: &Value, id: &str, update: u64, found: &mut Found<'_>) -> bool {
-        let Some(known) = self.numbers.get(id).filter(|_| self.focus == Focus::Updates) else {
-            return false;
-        };
-        let print = content(message);
-        let again = known.contains(&(update, print));
-        let first = in_sequence(message, "nodes")
-            .first()
-            .and_then(|node| number(node, "sequenceId"));
-        let newest = known.iter().map(|(update, _)| *update).max().unwrap_or_default();
-        if again || first.is_none_or(|first| first == 0) {
-            return false;
-        }
-        if update <= newest {
-            let text = format!("orderUpdateId {update} comes behind the lost link, and was at {newest} before");
-            found.broken("ORD-UPD-04", text);
-        }
-        true
     }
 
     fn message(&mut self, message: &Value, entry: &Entry, context: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
@@ -207,7 +166,7 @@ impl Follow {
         };
         let now = entry.at().moment;
         let Some(at) = self.orders.iter().position(|order| order.id == id) else {
-            let judged = self.falls_back(message, &id, update, found) || self.unknown(message, &id, found);
+            let judged = self.unknown(message, &id, found);
             if self.orders.len() == ORDERS {
                 self.orders.pop_front();
             }
@@ -230,13 +189,7 @@ impl Follow {
         let first = in_sequence(message, "nodes")
             .first()
             .and_then(|node| number(node, "sequenceId"));
-        let behind_its_end = order.ended
-            && order
-                .sent
-                .back()
-                .and_then(|sent| sent.end.as_ref())
-                .is_some_and(|end| end.sequence > 0);
-        let starts_anew = first == Some(0) && (update == 0 || Some(update) <= order.newest() || behind_its_end);
+        let starts_anew = first == Some(0) && (update == 0 || Some(update) <= order.newest());
         let judged = if (order.done || !is_newest) && starts_anew {
             self.reused(&order, now, found);
             order = Order::begin(id, message, update, now);
@@ -460,18 +413,11 @@ impl Running for Follow {
         self.traffic.note(entry);
         match self.vehicle.note(entry, context) {
             // What was sent may have been lost, or the vehicle has given its order up without a word.
-            outside @ (Outside::Moved | Outside::Lost) => {
+            Outside::Moved | Outside::Lost => {
                 for order in &mut self.orders {
                     order.done = true;
                 }
-                let link = matches!(entry.event(), Event::Fault { .. });
-                if outside == Outside::Moved || !link {
-                    self.numbers.clear();
-                }
                 if self.vehicle.states.is_empty() && self.focus != Focus::Ids {
-                    if link {
-                        self.interrupted();
-                    }
                     self.orders.clear();
                 }
             }
@@ -487,7 +433,6 @@ impl Running for Follow {
             && order.newest() <= Some(seen.update)
         {
             order.done = true;
-            order.ended = true;
         }
         if self.traffic.disturbed {
             return false;

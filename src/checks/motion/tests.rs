@@ -382,21 +382,6 @@ fn the_orientation_of_a_node_is_compared_the_short_way_round() {
     arrived(json!({}), run, (4.0, 4.0, 0.0)).not_judged(check);
 }
 
-#[test]
-fn a_vehicle_may_turn_on_the_last_node_after_it_has_reported_it() {
-    let check = "motion/node-theta";
-    let node = json!({ "nodePosition": { "theta": 0.0 } });
-    let on_node = |theta: f64| {
-        let mut drive = Drive::ordered([json!({}), json!({}), node.clone()], [json!({}), json!({})]);
-        drive.seen(0.0, 2, (4.0, 2.0, FRAC_PI_2), Some((1.0, 0.0)));
-        drive.seen(2.0, 3, (4.0, 4.0, FRAC_PI_2), Some((0.3, 0.0)));
-        drive.seen(2.0, 3, (4.0, 4.0, theta), Some((0.0, 0.0)));
-        drive
-    };
-    on_node(0.0).wrong(check, &["- warning"]);
-    on_node(FRAC_PI_2).wrong(check, &["-"]);
-}
-
 const AXES: &str = "motion/axes";
 
 /// At rest on n1, then by order on n2, at the reported places.

@@ -41,7 +41,7 @@ impl Agv {
         if let Some(path) = order
             .unsupported
             .iter()
-            .find(|path| !usable(path) && !(path.ends_with("minHeight") && self.faults.has(F::R2MinHeightIgnored)))
+            .find(|path| !usable(path))
             .filter(|_| !self.faults.has(F::UnsupportedFieldIgnored))
         {
             return Err(Refusal::at_field(
@@ -123,9 +123,6 @@ impl Agv {
                 .naming("mapId", &place.map_id)
                 .naming("nodeId", &node.id))
         };
-        if !node.released && self.faults.has(F::R2MapOfHorizonUnchecked) {
-            return Ok(());
-        }
         if self.faults.has(F::UnknownMapAccepted) {
             return Ok(());
         }
@@ -175,11 +172,8 @@ impl Agv {
     }
 
     fn check_actions(&self, order: &Order, known: usize) -> Result<(), Refusal> {
-        let all = !self.faults.has(F::R2HorizonActionsUnchecked);
-        let nodes = order.nodes.iter().skip(known).filter(|node| node.released || all);
-        let nodes = nodes.flat_map(|node| &node.actions);
-        let edges = order.edges.iter().filter(|edge| edge.released || all);
-        let edges = edges.flat_map(|edge| &edge.actions);
+        let nodes = order.nodes.iter().skip(known).flat_map(|node| &node.actions);
+        let edges = order.edges.iter().flat_map(|edge| &edge.actions);
         let scoped = nodes
             .map(|action| (action, Scope::Node))
             .chain(edges.map(|action| (action, Scope::Edge)));
@@ -204,16 +198,7 @@ impl Agv {
                     kind.deed,
                     action_kinds::Deed::FinePositioning | action_kinds::Deed::DetectObject
                 );
-            let request_taken = self.faults.has(F::R2RequestsOnNodesTaken)
-                && matches!(
-                    kind.deed,
-                    action_kinds::Deed::StateRequest
-                        | action_kinds::Deed::FactsheetRequest
-                        | action_kinds::Deed::LogReport
-                );
-            if listed_refused
-                || (!request_taken && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked))
-            {
+            if listed_refused || (!kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked)) {
                 return unable("the action is not possible here", &request.path);
             }
             let found = action_kinds::refusal(kind, request, true)

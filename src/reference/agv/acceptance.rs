@@ -32,15 +32,12 @@ impl Agv {
         if self.ignores_order() {
             return;
         }
-        if self.loses_order() {
-            return;
-        }
         self.report.order_received = true;
         let message = if payload.len() > self.config.max_message {
             Err(Refusal::new(Rule::Malformed, "the message is too long"))
         } else {
             serde_json::from_slice::<Value>(payload)
-                .map_err(|error| Refusal::new(Rule::Malformed, &format!("the message is not JSON: {error}")))
+                .map_err(|_| Refusal::new(Rule::Malformed, "the message is not JSON"))
         };
         if message.is_err() && self.faults.has(F::R1UnreadableOrderDropped) {
             return;
@@ -58,33 +55,7 @@ impl Agv {
             return;
         }
         if let Err(refusal) = result {
-            if refusal.is_of_busy() && self.faults.has(F::R2RefusedOrderQueued) {
-                self.queued = message.as_ref().ok().cloned();
-            }
             self.refuse(message.as_ref().unwrap_or(&Value::Null), refusal);
-        }
-    }
-
-    /// `order-after-refusal-lost`: the first one after a refusal.
-    fn loses_order(&mut self) -> bool {
-        let loses = self.faults.has(F::OrderAfterRefusalLost)
-            && !self.is_busy()
-            && self.errors.lists_refusals()
-            && !self.order_lost;
-        self.order_lost = loses;
-        loses
-    }
-
-    /// `r2-refused-order-queued`: begins the order that came too early.
-    pub(super) fn begin_queued(&mut self) {
-        if self.queued.is_none() || self.is_busy() {
-            return;
-        }
-        self.flush();
-        if let Some(message) = self.queued.take()
-            && self.order_decided(&message).is_ok()
-        {
-            self.settle();
         }
     }
 
@@ -94,9 +65,6 @@ impl Agv {
         let mut order = Order::read(mended.as_ref().unwrap_or(&taken))?;
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
-        }
-        if !order.nodes.is_empty() && self.faults.has(F::R2SurplusEdgeDropped) {
-            order.edges.truncate(order.nodes.len() - 1);
         }
         let tolerated = |defect: &Defect| {
             let unchecked = match defect.path.rsplit('.').next() {
@@ -168,10 +136,6 @@ impl Agv {
         if self.faults.has(F::R1DuplicateClearsErrors) {
             self.errors.new_order();
         }
-        if self.waits_at_decision_point() && self.faults.has(F::R2DuplicateReleasesHorizon) {
-            self.book.unbound = true;
-        }
-        self.book.stunned |= self.is_busy() && self.faults.has(F::DuplicateHaltsDriving);
         if self.is_busy() && self.faults.has(F::R1DuplicateRepeatsActions) {
             self.repeat_actions(self.book.last_sequence);
         }
@@ -289,9 +253,6 @@ impl Agv {
         if self.persona.lost {
             return false;
         }
-        if node.id == self.book.last_node && self.faults.has(F::R2LastNodeTrusted) {
-            return true;
-        }
         let temporary = self.faults.has(F::TemporaryNodeRefused)
             && self.config.node(&node.id).is_none()
             && node.id != self.book.last_node;
@@ -323,7 +284,6 @@ impl Agv {
             self.errors.new_order();
         }
         self.latched = false;
-        self.field_latched = false;
         self.actions.drop_lists();
         if self.faults.has(F::OldActionStatesKept) {
             let ids: Vec<&str> = order.actions().map(|action| action.id.as_str()).collect();
@@ -331,11 +291,9 @@ impl Agv {
         } else {
             let dropped = self.faults.has(F::RunningInstantDropped);
             let cancel_stays = self.faults.has(F::R1CancelOutlivesOrder);
-            let failed_stay = self.faults.has(F::R2FailedActionsOutliveOrder);
             self.actions.retain(|action| {
                 let stays = cancel_stays && action.request.action_type == "cancelOrder";
-                let failed = action.of_order() && action.status == super::actions::Status::Failed;
-                failed && failed_stay || !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
+                !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
             });
         }
         let moment = self.moment();
@@ -350,10 +308,7 @@ impl Agv {
         }
         let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
         let last_update = self.book.has_order().then_some(self.book.update_id);
-        let after_cancel = self.book.cancelled && self.faults.has(F::R2OrderAfterCancelNotDriven);
         self.book = super::book::Book::empty(last.0);
-        let in_pause = (self.holds.pause || self.holds.button) && self.faults.has(F::R2OrderInPauseNeverStarts);
-        self.book.stunned = after_cancel || in_pause;
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
         let carried = last_update.filter(|_| self.faults.has(F::UpdateIdCarriedOver));
@@ -380,9 +335,6 @@ impl Agv {
         if self.takes(T::R1SetsOutLate) {
             self.lingers_until = Some(self.moment() + std::time::Duration::from_millis(700));
         }
-        if self.takes(T::R2AdoptsBeforeDriving) {
-            self.flush();
-        }
     }
 
     pub(super) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
@@ -390,9 +342,6 @@ impl Agv {
         for node in nodes {
             while let Some(edge) = edges.next_if(|edge| edge.sequence_id < node.sequence_id) {
                 self.push_edge(edge);
-            }
-            if !node.released {
-                self.book.planned.insert(node.sequence_id);
             }
             if node.released {
                 self.book.base_end = (node.id.clone(), node.sequence_id);
@@ -412,9 +361,6 @@ impl Agv {
 
     fn push_edge(&mut self, edge: Edge) {
         self.push_actions(edge.actions.clone(), Origin::Edge(edge.sequence_id));
-        if !edge.released {
-            self.book.planned.insert(edge.sequence_id);
-        }
         self.book.edges.push_back(edge);
     }
 

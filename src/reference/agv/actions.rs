@@ -250,7 +250,7 @@ impl Actions {
     }
 
     /// Ids of actions that can begin now, if any.
-    pub(super) fn startable(&mut self, faults: Faults) -> Vec<String> {
+    pub(super) fn startable(&mut self) -> Vec<String> {
         for index in 0..self.lists.len() {
             let list = &self.lists[index];
             let open = list
@@ -262,10 +262,7 @@ impl Actions {
             };
             let hard = next.iter().any(|id| self.blocking(id) == Some(Blocking::Hard));
             let occupied = self.all.iter().any(|action| {
-                let elsewhere = action.origin != list.origin && faults.has(F::R2HardIgnoresEarlierNode);
-                action.occupies()
-                    && !elsewhere
-                    && (hard && next.len() == 1 || action.request.blocking == Blocking::Hard)
+                action.occupies() && (hard && next.len() == 1 || action.request.blocking == Blocking::Hard)
             });
             if occupied {
                 continue;

@@ -32,14 +32,6 @@ impl Agv {
             return;
         }
         let active = !self.book.nodes.is_empty() || self.actions.order_unfinished();
-        let acts = self
-            .actions
-            .iter()
-            .any(|action| action.of_order() && action.status.is_active());
-        let waits = self.waits_at_decision_point() && !self.motion.is_moving() && !acts;
-        let active = active
-            && !(waits && self.faults.has(F::R2CancelAtDecisionPointRefused))
-            && !(self.book.nodes.is_empty() && self.faults.has(F::R2CancelOfActingOrderRefused));
         if !active || self.book.cancel.is_some() || self.book.cancelled {
             self.nothing_to_cancel(action_id);
             return;
@@ -72,13 +64,6 @@ impl Agv {
 
     /// No order, or one that was cancelled before (ORD-CANCEL-18 to ORD-CANCEL-20).
     fn nothing_to_cancel(&mut self, action_id: &str) {
-        let complete = self.book.has_order() && self.book.nodes.is_empty() && !self.book.cancelled;
-        if complete && self.faults.has(F::R2CompletedOrderCancelFinished) {
-            if let Some(action) = self.actions.get_mut(action_id) {
-                action.end(Status::Finished);
-            }
-            return;
-        }
         let again = self.book.cancelled && self.faults.has(F::R1SecondCancelFinished);
         let status = if again || self.faults.has(F::IdleCancelFinished) {
             Status::Finished
@@ -118,15 +103,6 @@ impl Agv {
     fn stop_actions(&mut self) {
         let (faults, interruptible) = (self.faults, self.config.interruptible);
         let base_end = self.book.base_end.1;
-        let here = Origin::Node(self.book.last_sequence);
-        let waiting = |action: &&Action| action.of_order() && action.status == Status::Waiting;
-        let unbegun = self
-            .actions
-            .iter()
-            .filter(waiting)
-            .map(|action| action.request.id.clone())
-            .collect();
-        let queue_survives = faults.has(F::R2QueuedActionsSurviveCancel);
         for action in self.actions.iter_mut().filter(|action| action.of_order()) {
             let deed = action.kind.map(|kind| kind.deed);
             let ends = match deed {
@@ -143,7 +119,6 @@ impl Agv {
                     action.end(Status::Finished);
                 }
                 _ if survives(action, faults) => {}
-                Status::Waiting if queue_survives && action.origin == here => {}
                 Status::Waiting if !faults.has(F::CancelLeavesWaiting) => action.end(Status::Failed),
                 status if status.is_active() && ends => action.end(interrupted(action, faults)),
                 status if status.is_active() && faults.has(F::CancelFailsEarly) => action.masked = Some(Status::Failed),
@@ -151,13 +126,7 @@ impl Agv {
                 _ => {}
             }
         }
-        if !queue_survives {
-            self.actions.drop_lists();
-        }
-        if faults.has(F::R2CancelDropsWaiting) {
-            let unbegun: Vec<String> = unbegun;
-            self.actions.retain(|action| !unbegun.contains(&action.request.id));
-        }
+        self.actions.drop_lists();
     }
 
     /// Ends the cancellation once nothing moves or runs any more (ORD-CANCEL-07, ORD-CANCEL-11).

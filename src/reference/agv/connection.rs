@@ -28,8 +28,6 @@ pub(super) struct Connection {
     header_ids: BTreeMap<&'static str, u32>,
     /// The factsheet that is published now was asked for.
     pub(super) factsheet_asked: bool,
-    /// It has answered a factsheetRequest (`r2-factsheet-only-once` only).
-    pub(super) factsheet_given: bool,
     /// When to say ONLINE (`online-late` only).
     pub(super) online_at: Option<Moment>,
     /// The time of the first message (`timestamp-stands-still` only).
@@ -47,7 +45,6 @@ impl Connection {
             sessions: 0,
             header_ids: BTreeMap::new(),
             factsheet_asked: false,
-            factsheet_given: false,
             online_at: None,
             first: None,
         }
@@ -141,32 +138,17 @@ impl Agv {
         } else {
             &["order", "instantActions"]
         };
-        let mut topics: Vec<String> = wanted
+        let subscriptions = wanted
             .iter()
             .filter_map(|name| self.config.topic(name))
-            .map(str::to_owned)
-            .collect();
-        if self.takes(T::R2SubscribesWithWildcard) && wanted.len() == 2 {
-            // Its own messages come back to it; it has no use for them.
-            for topic in &mut topics {
-                if let Some((above, _)) = topic.rsplit_once('/') {
-                    *topic = format!("{above}/+");
-                }
-            }
-            topics.dedup();
-        }
-        let qos = u8::from(self.takes(T::SubscribesWithQosOne));
-        let subscriptions = topics.into_iter().map(|topic| (topic, qos));
+            .map(|topic| (topic.to_owned(), u8::from(self.takes(T::SubscribesWithQosOne))));
         ConnectOptions {
             level: match () {
                 () if self.faults.has(F::OldMqtt) => 3,
                 () if self.takes(T::NewestMqtt) => 5,
                 () => 4,
             },
-            client_id: match self.takes(T::R2ClientIdChanges) {
-                true => format!("{}-{}", self.config.serial_number, self.connection.sessions),
-                false => format!("{}.{}", self.config.manufacturer, self.config.serial_number),
-            },
+            client_id: format!("{}.{}", self.config.manufacturer, self.config.serial_number),
             keep_alive,
             clean_session: !self.takes(T::SessionKept),
             will,
@@ -188,17 +170,7 @@ impl Agv {
         }
         self.connection.attempt_at = None;
         self.connection.shut_down = false;
-        if !first && self.is_busy() && self.faults.has(F::R2NodeActionsRepeatedAfterReconnect) {
-            self.repeat_actions(self.book.last_sequence);
-        }
-        let on_request = self.takes(T::R1FactsheetOnRequestOnly);
-        if !on_request && self.takes(T::R2FactsheetBeforeOnline) {
-            self.publish_factsheet();
-        }
-        let unsaid = !first && self.is_busy() && self.faults.has(F::R2OnlineNotSaidMidOrder);
-        if unsaid {
-            // It says nothing on this connection.
-        } else if !first && self.faults.has(F::OnlineLate) {
+        if !first && self.faults.has(F::OnlineLate) {
             self.connection.online_at = Some(self.moment() + Duration::from_secs(25));
         } else if !self.faults.has(F::NoOnline) && (first || !self.faults.has(F::NoOnlineAfterReconnect)) {
             let online = if self.faults.has(F::ConnectionStateConnected) {
@@ -210,16 +182,10 @@ impl Agv {
                 self.publish_connection(online);
             }
         }
-        let before = self.takes(T::R2FactsheetBeforeOnline);
-        let after = !before && self.takes(T::R2FactsheetAfterState);
-        if !on_request && !before && !after {
+        if !self.takes(T::R1FactsheetOnRequestOnly) {
             self.publish_factsheet();
         }
         self.start_reporting(first);
-        if !on_request && after {
-            self.flush();
-            self.publish_factsheet();
-        }
     }
 
     /// The link broke. The order goes on (MQTT-03, MQTT-04).
@@ -234,12 +200,6 @@ impl Agv {
                 super::actions::Origin::Node(id) | super::actions::Origin::Edge(id) => !gone.contains(&id),
                 super::actions::Origin::Instant => true,
             });
-        }
-        if self.faults.has(F::R2LoadForgottenWithLink) {
-            self.loads.clear();
-        }
-        if self.book.cancelled && self.faults.has(F::R2CancelledIdLostWithLink) {
-            self.book.order_id.clear();
         }
         if self.faults.has(F::R1EndedActionsLostWithLink) {
             self.actions.retain(|action| !action.status.is_terminal());
@@ -314,21 +274,6 @@ impl Agv {
         }
     }
 
-    /// `r2-acknowledges-on-instant-actions`: answers master control on its own topic.
-    pub(super) fn acknowledge_instant_actions(&mut self) {
-        let mut message = self.header("connection", false);
-        message.insert("actions".into(), json!([]));
-        if let Some(topic) = self.config.topic("instantActions").filter(|_| self.connection.online) {
-            let publication = Publication {
-                topic: topic.to_owned(),
-                payload: Value::Object(message).to_string().into_bytes(),
-                qos: 0,
-                retain: false,
-            };
-            self.pending.push(Output::Publish(publication));
-        }
-    }
-
     /// Publishes a message: the header, then the body. Nothing is published, or counted, while offline.
     ///
     /// `mangle` are replacements in the text of the message, for defects that no JSON writer produces.
@@ -375,7 +320,6 @@ impl Agv {
                 if self.faults.has(F::FactsheetQosTwo) { 2 } else { 0 },
                 self.config.has("retainedFactsheet") && !self.faults.has(F::FactsheetNotRetained),
             ),
-            "state" if !self.errors.is_empty() && self.faults.has(F::R2WarnedStateQosOne) => (1, false),
             "state" => (u8::from(self.faults.has(F::StateQosOne)), false),
             _ => (0, false),
         };
@@ -425,10 +369,7 @@ impl Agv {
         if counts && !(name == "state" && self.faults.has(F::HeaderIdConstant)) {
             *next = next.wrapping_add(1);
         }
-        let zeroed = name == "visualization" && self.faults.has(F::R2VisualizationHeaderIdZero);
-        let header_id = if zeroed {
-            json!(0)
-        } else if self.faults.has(F::HeaderIdAsText) {
+        let header_id = if self.faults.has(F::HeaderIdAsText) {
             json!(id.to_string())
         } else {
             json!(id)
@@ -451,14 +392,6 @@ impl Agv {
         let serial = &self.config.serial_number;
         let serial_number = match () {
             () if name == "visualization" && self.faults.has(F::R1VisualizationNamesComputer) => "localhost".to_owned(),
-            () if name == "connection" && self.faults.has(F::R2ConnectionSerialUpperCase) => {
-                let upper = serial.to_ascii_uppercase();
-                if upper == *serial {
-                    serial.to_ascii_lowercase()
-                } else {
-                    upper
-                }
-            }
             () if self.faults.has(F::OtherSerialNumber) => format!("{serial}0"),
             () if self.faults.has(F::SerialNumberWithSpace) => format!("No. {serial}"),
             () => serial.clone(),
@@ -468,9 +401,6 @@ impl Agv {
         let timestamp = match timestamp {
             Value::String(text) if name == "factsheet" && self.faults.has(F::R1FactsheetDated) => {
                 json!(text.split('T').next().unwrap_or_default())
-            }
-            Value::String(text) if name == "connection" && self.faults.has(F::R2ConnectionTimestampSpaced) => {
-                json!(text.replacen('T', " ", 1))
             }
             timestamp => timestamp,
         };

@@ -187,9 +187,6 @@ impl Agv {
     pub(super) fn fail(&mut self, id: &str, problem: &Problem) {
         if let Some(action) = self.actions.get_mut(id) {
             action.end(Status::Failed);
-            if self.config.tolerances.has(T::R2FailuresDescribed) {
-                action.result = Some(problem.reason.clone());
-            }
         }
         if problem.silent {
             return;
@@ -235,10 +232,6 @@ impl Agv {
             Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
                 let (id, version) = (action.text("mapId"), action.text("mapVersion"));
-                let busy = !self.book.nodes.is_empty() || self.actions.order_unfinished();
-                if busy && self.maps.has_version(id, version) && self.faults.has(F::R2EnableIgnoredMidOrder) {
-                    return Outcome::Done(None);
-                }
                 if self.maps.has_version(id, version) && self.faults.has(F::R1EnableInTwoStates) {
                     self.maps.disable_all(id);
                     self.flush();
@@ -271,10 +264,6 @@ impl Agv {
             Deed::LogReport => {
                 self.logs += 1;
                 let name = format!("log-{}.txt", self.logs);
-                if self.tells_logs() {
-                    self.last_log = Some((action.request.id.clone(), name));
-                    return Outcome::Done(None);
-                }
                 Outcome::Done(Some(name).filter(|_| !self.faults.has(F::LogNameMissing)))
             }
             Deed::Pick => self.pick(action).into(),
@@ -283,9 +272,7 @@ impl Agv {
             Deed::FinePositioning => self.align(action).into(),
             Deed::FactsheetRequest => {
                 let mid_order = self.is_busy() && self.faults.has(F::R1FactsheetNotMidOrder);
-                let again = std::mem::replace(&mut self.connection.factsheet_given, true);
-                let again = again && self.faults.has(F::R2FactsheetOnlyOnce);
-                if !self.faults.has(F::FactsheetRequestUnanswered) && !mid_order && !again {
+                if !self.faults.has(F::FactsheetRequestUnanswered) && !mid_order {
                     self.connection.factsheet_asked = true;
                     self.publish_factsheet();
                     self.connection.factsheet_asked = false;
@@ -302,11 +289,6 @@ impl Agv {
                 Outcome::Open
             }
         }
-    }
-
-    /// Whether the name of a log is in the information instead of the result of its action.
-    pub(super) fn tells_logs(&self) -> bool {
-        self.takes(T::R2LogNameInInformation) && !self.takes(T::R1InformationOmitted)
     }
 
     /// Whether a switch forbids what a message asks for (ACT-16).
@@ -334,9 +316,6 @@ impl Agv {
         }
         if self.faults.has(F::PauseDropsOrder) {
             self.give_up_order();
-        }
-        if !self.holds.pause && self.faults.has(F::R2PausedFlagLate) {
-            self.pause_hidden_until = Some(self.moment() + Duration::from_millis(1_500));
         }
         self.set_holds(|holds| holds.pause = true);
         Outcome::Done(None)
@@ -370,10 +349,6 @@ impl Agv {
         self.book.unbound |= waits && self.holds.pause && self.faults.has(F::R1HorizonDrivenAfterPause);
         self.book.hurried |= self.book.entered && self.holds.pause && self.faults.has(F::R1MaxSpeedForgottenInPause);
         self.book.heedless = false;
-        self.book.unblocked |= self.holds.pause && self.faults.has(F::R2BlockingForgottenAfterPause);
-        if self.holds.pause && self.faults.has(F::R2PauseForgetsQueue) {
-            self.actions.drop_lists();
-        }
         self.set_holds(|holds| holds.pause = false);
         if self.faults.has(F::PausedOrderSurvivesCancel)
             && let Some(order) = self.remembered.take()
@@ -516,9 +491,7 @@ impl Agv {
         let here = self.motion.pose(self.moment()).map_id;
         let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
         let ahead = !self.faults.has(F::R1MapOfOrderDeleted);
-        let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
-        let free = idle && self.faults.has(F::R2CurrentMapDeletedWhenIdle);
-        let used = |map_id: &str| here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
+        let used = |map_id: &str| here == map_id || ahead && needed.iter().any(|needed| needed == map_id);
         let result = self
             .maps
             .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);

@@ -147,10 +147,6 @@ impl Agv {
             self.finish(action_id, None);
             return;
         }
-        if self.faults.has(F::R2BrokenDownloadListed) {
-            let (id, version) = (action.text("mapId"), action.text("mapVersion"));
-            self.maps.store(id, version, self.faults);
-        }
         if self.faults.has(F::R1FailedDownloadPurges) {
             self.maps.purge(action.text("mapId"));
         }

@@ -89,16 +89,6 @@ impl Errors {
         });
     }
 
-    /// `r2-rejection-cleared-by-instant-action`: forgets what was refused.
-    pub(super) fn forget_refusals(&mut self) {
-        self.active.retain(|error| error.life != Life::UntilNewOrder);
-    }
-
-    /// Whether anything that was refused is still listed.
-    pub(super) fn lists_refusals(&self) -> bool {
-        self.active.iter().any(|error| error.life == Life::UntilNewOrder)
-    }
-
     /// The emergency stop was released.
     pub(super) fn released(&mut self) {
         self.active.retain(|error| error.life != Life::WhileStopped);
@@ -150,8 +140,7 @@ impl Errors {
             true => self.active.len().saturating_sub(1),
             false => 0,
         };
-        let worst = faults.has(F::R2FatalHidesWarnings) && self.active.iter().any(|error| error.fatal);
-        let shown = self.active.iter().skip(hidden).filter(|error| error.fatal || !worst);
+        let shown = self.active.iter().skip(hidden);
         shown.map(|error| picture_of(error, faults)).collect()
     }
 }
@@ -183,13 +172,6 @@ fn picture_of(error: &ActiveError, faults: Faults) -> Value {
         "errorDescription": error.description,
         "errorLevel": level,
     });
-    let own = error.life == Life::WhileDefective;
-    if let Some(fields) = picture
-        .as_object_mut()
-        .filter(|_| own && faults.has(F::R2OwnErrorLevelMissing))
-    {
-        fields.remove("errorLevel");
-    }
     if faults.has(F::ReferencesAsMap) {
         let map = error.references.iter().map(|(key, value)| (key.clone(), json!(value)));
         picture["errorReferences"] = Value::Object(map.collect());

@@ -45,9 +45,6 @@ impl Agv {
             return;
         }
         let mut body = self.shown_factsheet(self.true_factsheet());
-        if self.faults.has(F::R2FactsheetWithoutGeometry) {
-            body.remove("agvGeometry");
-        }
         if self.faults.has(F::FactsheetWithoutLimits) {
             body.remove("protocolLimits");
         }
@@ -207,10 +204,7 @@ impl Agv {
             .iter()
             .chain(special)
             .chain(zones)
-            .map(|name| match self.faults.has(F::R2OptionalParametersAsNames) {
-                true => json!(name),
-                false => json!({ "parameter": name, "support": support }),
-            })
+            .map(|name| json!({ "parameter": name, "support": support }))
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
         let unlisted = self.faults.has(F::StateRequestUnlisted);
@@ -290,16 +284,11 @@ impl Agv {
             });
             picture.insert("actionParameters".into(), parameters.collect());
         }
-        let told = kind.deed == Deed::LogReport && self.tells_logs();
-        if let Some(result) = kind.result.filter(|_| !told) {
+        if let Some(result) = kind.result {
             picture.insert("resultDescription".into(), json!(result));
         }
         if self.config.has("vehicleConfig") {
-            let types = match self.faults.has(F::R2BlockingTypesLowerCase) {
-                true => json!(["none", "soft", "hard"]),
-                false => json!(["NONE", "SOFT", "HARD"]),
-            };
-            picture.insert("blockingTypes".into(), types);
+            picture.insert("blockingTypes".into(), json!(["NONE", "SOFT", "HARD"]));
         }
         Value::Object(picture)
     }

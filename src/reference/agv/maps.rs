@@ -101,22 +101,12 @@ impl Maps {
         if kept || faults.has(F::EnableWithoutEffect) {
             return Ok(());
         }
-        if faults.has(F::EnableBringsOther) && !self.on_board("depot") {
-            self.all.push(OnboardMap {
-                map_id: "depot".to_owned(),
-                map_version: "1".to_owned(),
-                enabled: false,
-            });
-        }
         for map in &mut self.all {
             if map.map_id == map_id {
                 map.enabled = map.map_version == version || (faults.has(F::TwoMapsEnabled) && map.enabled);
             } else if faults.has(F::EnableDisablesOtherMaps) {
                 map.enabled = false;
             }
-        }
-        if faults.has(F::R2EnableRemovesOldVersion) {
-            self.purge(map_id);
         }
         Ok(())
     }

@@ -181,16 +181,6 @@ pub struct Agv {
     hidden_load: Option<Moment>,
     /// The e-stop is shown until the next order (`r1-e-stop-latched` only).
     latched: bool,
-    /// The field is shown violated until the next order (`r2-field-violation-latched` only).
-    field_latched: bool,
-    /// actionId and name of the last log (`r2-log-name-in-information` only).
-    last_log: Option<(String, String)>,
-    /// An order that was refused and waits all the same (`r2-refused-order-queued` only).
-    queued: Option<serde_json::Value>,
-    /// The last order was lost (`order-after-refusal-lost` only).
-    order_lost: bool,
-    /// The pause is not shown before this (`r2-paused-flag-late` only).
-    pause_hidden_until: Option<Moment>,
     /// What was decided and is still to be handed to the driver.
     pending: Vec<Output>,
     /// How a test told it to behave.
@@ -263,11 +253,6 @@ impl Agv {
             logs: 0,
             hidden_load: None,
             latched: false,
-            field_latched: false,
-            last_log: None,
-            queued: None,
-            order_lost: false,
-            pause_hidden_until: None,
             pending: Vec::new(),
             persona: Persona::default(),
             config,
@@ -305,7 +290,6 @@ impl Agv {
             self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
             self.hidden_load,
-            self.pause_hidden_until,
             self.persona.next_end(),
             self.next_report(),
         ];
@@ -346,12 +330,10 @@ impl Agv {
         }
         self.shadow.take_if(|(end, _)| *end <= moment);
         self.hidden_load = self.hidden_load.filter(|end| *end > moment);
-        self.pause_hidden_until = self.pause_hidden_until.filter(|end| *end > moment);
         self.a_moment_later();
         self.resume_if_due();
         self.attempt_connection();
         self.settle();
-        self.begin_queued();
         self.flush();
     }
 }

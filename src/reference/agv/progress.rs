@@ -60,7 +60,7 @@ impl Agv {
         if self.holds.any() || offline || self.faults.has(F::ActionsIgnored) {
             return false;
         }
-        let ids = self.actions.startable(self.faults);
+        let ids = self.actions.startable();
         for id in &ids {
             self.begin_action(id);
         }
@@ -96,7 +96,6 @@ impl Agv {
             && !self.book.stunned
             && !warned
             && (!self.actions.block_driving(self.faults)
-                || self.book.unblocked
                 || self.book.updated && self.faults.has(F::UpdateBreaksBlocking))
     }
 
@@ -154,8 +153,6 @@ impl Agv {
         let unreached = alone && self.faults.has(F::TemporaryNodeNotReached);
         let undriven = self.faults.has(F::ContinuationNotDriven) && self.book.continued;
         let stuck = self.book.stuck_at == Some(self.book.last_sequence);
-        let parked = !self.connection.online && !self.book.entered && self.faults.has(F::R2NextEdgeNotEnteredOffline);
-        let stuck = stuck || parked && self.book.edge_ahead().is_some();
         if early_end || unreached || undriven || stuck || self.faults.has(F::NeverStarts) {
             return false;
         }
@@ -173,7 +170,7 @@ impl Agv {
         let turns_before = edge.as_ref().is_some_and(|edge| edge.rotation_allowed == Some(false));
         self.charging = false;
         if !aligned && turns_before && !self.book.entered {
-            self.turn_to(theta, edge.as_ref());
+            self.motion.turn(moment, theta, self.rotation_speed(edge.as_ref()));
             return true;
         }
         if let Some(edge) = edge.as_ref().filter(|_| !self.book.entered) {
@@ -184,7 +181,7 @@ impl Agv {
         } else if aligned {
             self.roll(edge.as_ref(), stop, (distance, backwards), curve);
         } else {
-            self.turn_to(theta, edge.as_ref());
+            self.motion.turn(moment, theta, self.rotation_speed(edge.as_ref()));
         }
         true
     }
@@ -192,13 +189,6 @@ impl Agv {
     /// Enters an edge; its actions are triggered, at once if they do not stop the vehicle (NODE-06, NODE-07).
     fn enter(&mut self, edge: &Edge, stop: &Stop) {
         self.book.entered = true;
-        if edge.sequence_id == 1 && self.faults.has(F::R2FirstEdgeActionsFail) {
-            let of_edge = self
-                .actions
-                .iter_mut()
-                .filter(|action| action.origin == Origin::Edge(1));
-            of_edge.for_each(|action| action.end(super::actions::Status::Failed));
-        }
         if self.faults.has(F::NoneAborted) {
             self.actions.leave_node(self.book.last_sequence);
         }
@@ -287,17 +277,6 @@ impl Agv {
         self.faults.has(F::TurnsOnEdge) && !self.book.left.0.as_ref().is_some_and(behind)
     }
 
-    /// Begins to turn. Which way round is the vehicle's own affair.
-    fn turn_to(&mut self, theta: f64, edge: Option<&Edge>) {
-        let (moment, speed) = (self.moment(), self.rotation_speed(edge));
-        let far = motion::wrapped(theta - self.motion.pose(moment).theta).abs() > 0.5;
-        if far && self.takes(T::R2TurnsTheLongWay) {
-            self.motion.turn_round(moment, theta, speed);
-        } else {
-            self.motion.turn(moment, theta, speed);
-        }
-    }
-
     fn rotation_speed(&self, edge: Option<&Edge>) -> f64 {
         let permitted = edge.and_then(|edge| edge.max_rotation_speed);
         let permitted = permitted.filter(|_| !self.faults.has(F::MaxRotationSpeedIgnored));
@@ -325,9 +304,7 @@ impl Agv {
                 }
             })
         });
-        let behind = motion::wrapped(heading - pose.theta).abs() > FRAC_PI_2 + 0.1;
-        let backs_up = behind && edge.is_some() && curve.is_none() && self.takes(T::R2BacksUp);
-        let backwards = relative.map_or(backs_up, |relative| motion::wrapped(relative).abs() > FRAC_PI_2);
+        let backwards = relative.is_some_and(|relative| motion::wrapped(relative).abs() > FRAC_PI_2);
         let theta = if backwards { heading + PI } else { heading };
         (motion::wrapped(theta), backwards)
     }
@@ -352,15 +329,9 @@ impl Agv {
     /// At the position of a node: turns to its orientation, then counts it as traversed (NODE-01).
     fn arrive(&mut self, stop: &Stop) -> bool {
         let position = stop.node.position.as_ref();
-        let ends = stop.node.sequence_id > 0 && stop.node.sequence_id == self.book.base_end.1;
-        let own = (ends && self.takes(T::R2OwnOrientationAtEnd)).then_some(0.0);
         if let Some(theta) = position
-            .and_then(|position| position.theta.or(own))
+            .and_then(|position| position.theta)
             .filter(|_| !self.faults.has(F::ThetaIgnored))
-            .filter(|_| {
-                let fixed = self.book.edge_ahead().and_then(|edge| edge.rotation_allowed) == Some(false);
-                !(fixed && self.faults.has(F::R2NoTurnAfterFixedEdge))
-            })
             .filter(|_| stop.node.sequence_id == self.book.base_end.1 || !self.faults.has(F::R1ThetaAtEndOnly))
         {
             let allowed = position
@@ -374,7 +345,8 @@ impl Agv {
             let off = motion::wrapped(theta - self.motion.pose(self.moment()).theta).abs();
             if off > allowed {
                 let edge = self.book.edge_ahead().cloned();
-                self.turn_to(theta, edge.as_ref());
+                self.motion
+                    .turn(self.moment(), theta, self.rotation_speed(edge.as_ref()));
                 return true;
             }
         }
@@ -394,7 +366,6 @@ impl Agv {
         self.motion.reached = false;
         self.book.entered = false;
         self.book.hurried = false;
-        self.book.unblocked = false;
         let behind = |edge: &Edge| edge.sequence_id < sequence_id;
         while self.book.edges.front().is_some_and(behind) {
             let Some(edge) = self.book.edges.pop_front() else { break };
@@ -407,10 +378,6 @@ impl Agv {
                     super::actions::Status::Finished
                 };
                 self.actions.leave_edge(edge.sequence_id, self.faults, cut);
-            }
-            if self.faults.has(F::R2EdgeActionsForgottenWithEdge) {
-                let origin = Origin::Edge(edge.sequence_id);
-                self.actions.retain(|action| action.origin != origin);
             }
             self.book.left.1 = Some(edge);
         }
@@ -436,19 +403,6 @@ impl Agv {
                 self.actions.trigger(Origin::Edge(ahead), self.faults);
             }
             self.stop_at_decision_point();
-        }
-        let again = self.book.base_end.0 == stop.node.id && self.book.base_end.1 > sequence_id;
-        if again && self.book.cancel.is_none() && self.faults.has(F::R2LoopCutShort) {
-            self.book.drop_route();
-            for action in self.actions.iter_mut() {
-                let behind = match action.origin {
-                    Origin::Node(id) | Origin::Edge(id) => id > sequence_id,
-                    Origin::Instant => false,
-                };
-                if behind {
-                    action.end(super::actions::Status::Failed);
-                }
-            }
         }
         self.book.left.0 = Some(stop);
     }

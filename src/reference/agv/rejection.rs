@@ -47,11 +47,6 @@ impl Refusal {
         self.rule == Rule::Malformed
     }
 
-    /// Whether the vehicle has no time for the order.
-    pub(super) fn is_of_busy(&self) -> bool {
-        self.rule == Rule::OtherOrderActive
-    }
-
     pub(super) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
         self.culprits.push((key.to_owned(), value.into()));
         self
@@ -95,7 +90,6 @@ impl Agv {
             Rule::OtherOrderActive if self.takes(T::R1OwnErrorNames) => "otherOrderActive",
             Rule::Memory => &names.memory,
             Rule::UnknownMap => &names.unknown_map,
-            Rule::OtherOrderActive if self.faults.has(F::BusyRefusalUntyped) => "",
             Rule::OtherOrderActive => &names.other_order_active,
             Rule::StartOutOfRange => &names.start_out_of_range,
             Rule::Outdated if self.faults.has(F::OutdatedUpdateMisnamed) => &names.validation,
@@ -141,9 +135,6 @@ impl Agv {
         if refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorUnreferenced) {
             references.clear();
         }
-        if refusal.rule == Rule::OtherOrderActive && self.faults.has(F::R2BusyRefusalUnreferenced) {
-            references.clear();
-        }
         let error = ActiveError {
             error_type: name.to_owned(),
             fatal,
@@ -177,15 +168,6 @@ impl Agv {
             self.book.update_id = id;
         }
         self.book.stunned |= rule == Rule::Outdated && self.faults.has(F::R1OutdatedHaltsDriving);
-        if self.faults.has(F::RefusalStallsAction) {
-            self.actions
-                .iter_mut()
-                .filter(|action| action.of_order())
-                .for_each(|action| action.due = None);
-        }
-        if self.faults.has(F::RefusedUpdateDropsEdges) {
-            self.book.edges.retain(|edge| edge.released);
-        }
         if rule == Rule::Malformed {
             if message.is_object() && self.faults.has(F::MalformedStopsOrder) {
                 self.give_up_order();
@@ -208,9 +190,6 @@ impl Agv {
                 action.end(Status::Failed);
                 self.actions.push(action);
             }
-        }
-        if self.faults.has(F::R2RejectionLiftsPause) {
-            self.set_holds(|holds| holds.pause = false);
         }
         if self.faults.has(F::RejectionDropsHorizon) {
             self.book.drop_horizon();

@@ -19,9 +19,6 @@ impl Agv {
         if self.refuses_updates_now() {
             return Err(Refusal::new(Rule::BrokenUpdate, "no update is taken now"));
         }
-        if order.nodes.len() == 1 && self.faults.has(F::R2StitchOnlyUpdateRefused) {
-            return Err(Refusal::new(Rule::BrokenUpdate, "the update brings nothing new"));
-        }
         if self.faults.has(F::CompletedNotContinued) && !busy {
             return Err(Refusal::new(Rule::BrokenUpdate, "the order is complete"));
         }
@@ -77,11 +74,6 @@ impl Agv {
         }
         self.book.updated = true;
         self.report.update_received = true;
-        let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);
-        if plans_only && self.faults.has(F::R2HorizonChangeIgnored) {
-            self.book.update_id = order.update_id;
-            return;
-        }
         let keep = if order.nodes.iter().any(|node| !node.released) {
             self.faults.has(F::HorizonAppended)
         } else {
@@ -111,9 +103,6 @@ impl Agv {
         }
         self.append(nodes.collect(), order.edges);
         self.book.dropped.clear();
-        if self.takes(T::R2AdoptsBeforeDriving) {
-            self.flush();
-        }
     }
 
     /// The horizon goes, and the actions that wait there.
@@ -145,9 +134,6 @@ impl Agv {
 
     /// What a faulty vehicle does to its actions, or to those of an update, when it takes the update over.
     fn continue_actions_wrongly(&mut self, order: &mut Order) {
-        if self.faults.has(F::R2MaxSpeedOfUpdateIgnored) {
-            order.edges.iter_mut().for_each(|edge| edge.max_speed = None);
-        }
         if self.faults.has(F::UpdateEdgeActionsLost) {
             order.edges.iter_mut().for_each(|edge| edge.actions.clear());
         }

@@ -89,11 +89,7 @@ impl Site {
         let offered: Vec<ParameterOffer> = offer
             .and_then(|offer| offer.action_parameters.clone())
             .unwrap_or_default();
-        let generous = self.takes(T::R2OptionalParametersFilled) && SCOPES.iter().all(|(name, _)| *name != kind);
-        for parameter in offered
-            .iter()
-            .filter(|parameter| generous || parameter.is_optional != Some(true))
-        {
+        for parameter in offered.iter().filter(|parameter| parameter.is_optional != Some(true)) {
             if !self.faults.has(F::RequiredKeyMissing) || !mandatory.is_empty() {
                 self.supply(vehicle, &mut parameters, &parameter.key, &parameter.value_data_type);
             }
@@ -127,13 +123,10 @@ impl Site {
             action["actionId"] = json!("pause");
         }
         if !parameters.is_empty() || self.takes(T::R1EmptyParameterLists) {
-            let mut list: Vec<Value> = parameters
+            let list: Vec<Value> = parameters
                 .into_iter()
                 .map(|(key, value)| json!({ "key": key, "value": value }))
                 .collect();
-            if self.takes(T::R2ParametersReversed) {
-                list.reverse();
-            }
             action["actionParameters"] = Value::Array(list);
         }
         action
@@ -170,13 +163,6 @@ impl Site {
             "triggerType" => json!("button"),
             "reason" => json!("requested"),
             "duration" => json!(1.0),
-            _ if self.faults.has(F::R2SuppliedValuesAsText) => json!(match data_type {
-                "BOOL" => "true",
-                "NUMBER" | "FLOAT" | "INTEGER" => "1",
-                "OBJECT" => "{}",
-                "ARRAY" => "[]",
-                _ => "default",
-            }),
             _ => match data_type {
                 "BOOL" => json!(true),
                 "NUMBER" | "FLOAT" => json!(1.0),

@@ -6,7 +6,6 @@ use super::Site;
 use super::faults::{FaultName as F, Faults};
 use super::instant::ended;
 use super::seen::State;
-use super::tolerances::ToleranceName as T;
 use super::vehicle::{Cancel, Presence, Transport, Vehicle};
 
 impl Site {
@@ -23,11 +22,6 @@ impl Site {
             vehicle.queue.extend(then);
             return;
         }
-        if !running.accepted && self.faults.has(F::R2CancelForgottenBeforeAcceptance) {
-            vehicle.last_order = vehicle.running.take();
-            vehicle.queue.extend(then);
-            return;
-        }
         if vehicle.presence == Presence::Away && self.faults.has(F::R1CancelLostWhileAway) {
             return;
         }
@@ -39,13 +33,7 @@ impl Site {
             }
             return;
         }
-        let works = vehicle.state.as_ref().is_some_and(|state| {
-            let mut ids = running.actions().filter_map(|action| action["actionId"].as_str());
-            !state.driving && ids.any(|id| state.action(id).is_some_and(|action| !action.is_terminal()))
-        });
-        let replaced = (paused && self.faults.has(F::R1PausedOrderReplaced))
-            || (works && then.is_some() && self.faults.has(F::ReplacedAtWork));
-        if replaced {
+        if paused && self.faults.has(F::R1PausedOrderReplaced) {
             vehicle.last_order = vehicle.running.take();
             vehicle.r1_hasty = true;
             if let Some(transport) = then {
@@ -65,9 +53,6 @@ impl Site {
             let body =
                 json!({ "orderId": running.id, "orderUpdateId": running.update_id + 1, "nodes": [], "edges": [] });
             self.publish(vehicle, "order", &body);
-        }
-        if !paused && self.takes(T::R2PausesBeforeCancel) {
-            vehicle.r2_resume = self.instant(vehicle, "startPause", &Value::Null).is_some();
         }
         let Some(action_id) = self.instant(vehicle, "cancelOrder", &Value::Null) else {
             return;
@@ -112,9 +97,7 @@ pub(super) fn watch_cancel(vehicle: &mut Vehicle, faults: Faults) {
         return;
     }
     vehicle.cancel = None;
-    let over = busy && faults.has(F::R2FailedCancelTakenForDone);
-    vehicle.r1_hasty |= over;
-    if busy && !over {
+    if busy {
         // It could not be called off, and is driven to its end.
         vehicle.queue.extend(cancel.then);
         return;

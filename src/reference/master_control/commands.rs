@@ -111,10 +111,6 @@ impl Site {
             "unblock-edge" => {
                 if let Some(edge) = pair("from", "to") {
                     vehicle.blocked.remove(&edge);
-                    if self.faults.has(F::R2UnblockFreesBothWays) {
-                        let (from, to) = edge;
-                        vehicle.blocked.remove(&(to, from));
-                    }
                 }
             }
             _ => {}
@@ -158,13 +154,6 @@ impl Site {
             return;
         }
         self.dispatch(vehicle, transport);
-        let waits = vehicle.queue.front().is_some_and(|next| next.r1_follows);
-        if self.takes(T::R2LatestTransportFirst)
-            && !waits
-            && let Some(latest) = vehicle.queue.pop_back()
-        {
-            vehicle.queue.push_front(latest);
-        }
     }
 
     /// The running transport, or the next one, is not wanted any more.

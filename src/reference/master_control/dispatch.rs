@@ -89,16 +89,6 @@ impl Site {
         if self.faults.has(F::R1SequenceContinuesOverOrders) {
             running.r1_offset = vehicle.r1_sequence;
         }
-        let ended = vehicle.last_order.as_ref().filter(|_| vehicle.r1_cancelled);
-        if let Some(ended) = ended.filter(|_| self.faults.has(F::R2SequenceContinuesAfterCancel)) {
-            running.r1_offset = ended.r1_offset + 2 * ended.stops.len();
-        }
-        if self.faults.has(F::R2OrderIdFromGoal) {
-            running.id = format!("to-{}", running.transport.to);
-            if running.transport.begun > 0 {
-                running.id = format!("{}-{}", running.id, running.transport.begun);
-            }
-        }
         if self.faults.has(F::R1OrderIdKeptAfterCancel)
             && let Some((id, update)) = &vehicle.r1_kept
         {
@@ -106,11 +96,7 @@ impl Site {
             running.update_id = update + 1;
         }
         let end = self.free_until(vehicle, &running, 0);
-        let released = if self.takes(T::R2WholeWayReleased) {
-            end
-        } else {
-            end.min(self.config.base_length.max(1).saturating_add(1))
-        };
+        let released = end.min(self.config.base_length.max(1).saturating_add(1));
         if released < 2 && running.stops.len() > 1 {
             return;
         }
@@ -124,13 +110,7 @@ impl Site {
         let window = Window {
             first: 0,
             released,
-            end: if self.takes(T::R2HorizonToTheGoal) {
-                end
-            } else if self.takes(T::R2FirstOrderWithoutHorizon) {
-                released
-            } else {
-                end.min(released.saturating_add(self.config.horizon_length))
-            },
+            end: end.min(released.saturating_add(self.config.horizon_length)),
         };
         vehicle.queue.pop_front();
         let Some((message, window)) = self.order_message(vehicle, &running, window) else {
@@ -195,12 +175,6 @@ impl Site {
         if vehicle.shunned {
             return false;
         }
-        let waits = (vehicle.factsheet.is_none() && self.takes(T::R2FactsheetAwaited))
-            || (vehicle.r2_stale && self.takes(T::R2FreshStateAwaited))
-            || (state.is_paused() && self.takes(T::R2NoNewOrderWhilePaused));
-        if waits {
-            return false;
-        }
         if vehicle.r1_moving || (state.informs() && self.faults.has(F::R1InformationHoldsDispatch)) {
             return false;
         }
@@ -240,7 +214,6 @@ impl Site {
         let first = base.saturating_sub(1);
         let blocked = running.legs.iter().enumerate().skip(first).find(|(_, leg)| {
             let used = self.faults.has(F::BlockedEdgeUsed) || vehicle.r1_blind;
-            let used = used || (base > 0 && self.faults.has(F::R2BlockCheckedAtPlanningOnly));
             vehicle.blocked.contains(&(leg.from.clone(), leg.to.clone())) && !used
         });
         blocked.map_or(running.stops.len(), |(index, _)| index + 1)
@@ -253,7 +226,7 @@ impl Site {
             .as_ref()
             .filter(|_| !transport.loaded)
             .unwrap_or(&transport.to);
-        let (mut way, here) = self.start(vehicle, goal, transport.r2_asked_at.as_ref())?;
+        let (mut way, here) = self.start(vehicle, goal)?;
         self.lead(vehicle, &mut way, &here, transport)?;
         if self.takes(T::R1GenerousDeviations) {
             for stop in way.stops.iter_mut().filter(|stop| stop.actions.is_empty()) {
@@ -275,17 +248,8 @@ impl Site {
     }
 
     /// The first node of a new order, and from which node of the layout the way goes on (ORD-03).
-    fn start(
-        &mut self,
-        vehicle: &Vehicle,
-        goal: &str,
-        asked_at: Option<&(String, Option<Position>)>,
-    ) -> Option<(Way, String)> {
+    fn start(&mut self, vehicle: &Vehicle, goal: &str) -> Option<(Way, String)> {
         let mut state = vehicle.state.clone()?;
-        if let Some((node, position)) = asked_at {
-            state.last_node_id.clone_from(node);
-            state.agv_position.clone_from(position);
-        }
         if let Some((node, position)) = &vehicle.r1_before_manual {
             state.last_node_id.clone_from(node);
             state.agv_position.clone_from(position);
@@ -310,37 +274,20 @@ impl Site {
                 self.config.node(&order.stops.get(end)?.id)
             });
             let goal = goal.filter(|_| self.faults.has(F::R1LineGuidedFromBaseEnd));
-            let ended = vehicle.last_order.as_ref().filter(|_| vehicle.r1_cancelled);
-            let next = ended.and_then(|order| {
-                let next = order.stops.get(order.reached(Some(&state)) + 1)?;
-                self.config.node(&next.id)
-            });
-            let goal = goal.or(next.filter(|_| self.faults.has(F::R2LineGuidedFromNextNode)));
             return alone(goal.or(last)?);
         };
         let away = |node: &SiteNode| distance((node.x, node.y), (position.x, position.y));
-        let mapless = self.faults.has(F::R2StartIgnoresMap);
         let stands = |node: &&SiteNode| {
-            (node.map_id == position.map_id || mapless) && away(node) <= node.deviation_xy.unwrap_or(REACH).max(EXACT)
+            node.map_id == position.map_id && away(node) <= node.deviation_xy.unwrap_or(REACH).max(EXACT)
         };
         let near = || {
-            if mapless {
-                return self.config.nodes.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
-            }
             self.config
                 .nearest(position.x, position.y, &position.map_id)
                 .map(|(node, _)| node)
         };
         let wide = |node: &SiteNode, spare: f64| {
             let (mut way, here) = alone(node)?;
-            let least = if self.faults.has(F::R2DeviationHalved) {
-                away(node) / 2.0
-            } else {
-                away(node) + spare
-            };
-            if self.faults.has(F::R2StartNodeMovedToVehicle) {
-                (way.stops[0].x, way.stops[0].y) = (position.x, position.y);
-            }
+            let least = away(node) + spare;
             way.stops[0].deviation_xy = Some(way.stops[0].deviation_xy.map_or(least, |known| known.max(least)));
             Some((way, here))
         };
@@ -368,9 +315,6 @@ impl Site {
 
     /// Begins at a temporary node where the vehicle stands (ORD-CANCEL-17).
     fn between(&mut self, vehicle: &Vehicle, position: &Position, goal: &str) -> Option<(Way, String)> {
-        let seen = vehicle.r2_seen_at.as_ref();
-        let seen = seen.filter(|_| self.faults.has(F::R2TemporaryStartFromVisualization));
-        let position = seen.unwrap_or(position);
         let here = (position.x, position.y);
         let place = |id: &str| self.config.node(id).map(|node| (node.x, node.y));
         let beside = self.config.edges.iter().filter(|edge| {
@@ -477,10 +421,6 @@ impl Site {
         if self.faults.has(F::R1PickAndDropShareId) {
             share_id(way);
         }
-        if self.faults.has(F::R2StateRequestAtGoal) {
-            let action = self.action(vehicle, "stateRequest", &Value::Null);
-            way.stops.last_mut()?.actions.push(action);
-        }
         if self.faults.has(F::CancelOnNode) {
             let action = self.action(vehicle, "startPause", &Value::Null);
             way.stops.last_mut()?.actions.push(action);
@@ -535,7 +475,6 @@ impl Site {
             |name: &str, taken: usize| heedless || taken < sheet.map_or(usize::MAX, |sheet| sheet.limit(&[name]));
         let on_node = self.offers(sheet, kind, "NODE");
         let on_edge = self.offers(sheet, kind, "EDGE");
-        let on_node = on_node || (on_edge && self.faults.has(F::R2EdgeActionOnNode));
         let led = kind == "waitForTrigger" && self.faults.has(F::R1TriggerOnEdge);
         if let Some(leg) = way.legs.last_mut().filter(|leg| {
             let rather = on_edge && self.takes(T::R1ActionsOnEdges) && room("edge.actions", leg.actions.len());
@@ -549,11 +488,7 @@ impl Site {
             .last_mut()
             .filter(|stop| on_node && room("node.actions", stop.actions.len()))
         {
-            let mut action = self.action(vehicle, kind, given);
-            if self.faults.has(F::R2ActionIdOfStation) {
-                action["actionId"] = json!(format!("{kind}-{}", stop.id));
-            }
-            stop.actions.push(action);
+            stop.actions.push(self.action(vehicle, kind, given));
         } else if let Some(leg) = way
             .legs
             .last_mut()
@@ -584,15 +519,12 @@ impl Site {
             let limit = sheet.limit(&[name]);
             if self.faults.has(ignored) { usize::MAX } else { limit }
         };
-        let on_nodes = way.stops.iter().flat_map(|stop| &stop.actions);
-        let actions = on_nodes.chain(way.legs.iter().flat_map(|leg| &leg.actions));
+        let actions = || way.stops.iter().flat_map(|stop| &stop.actions);
         let parameters = |action: &Value| action["actionParameters"].as_array().map_or(0, Vec::len);
-        let most = actions.map(parameters).max().unwrap_or_default();
-        let busiest = way.legs.iter().map(|leg| leg.actions.len()).max().unwrap_or_default();
+        let most = actions().map(parameters).max().unwrap_or_default();
         let zero = sheet.has_zeros && self.faults.has(F::ZeroIsALimit);
         !zero
             && Running::busiest(&way.stops) <= limit("node.actions", F::NodeActionsIgnored)
-            && busiest <= limit("edge.actions", F::NodeActionsIgnored)
             && most <= limit("actions.actionsParameters", F::ParametersIgnored)
     }
 }

@@ -83,9 +83,6 @@ impl Site {
             }
             Fate::Over => {
                 vehicle.last_order = Some(running);
-                if self.faults.has(F::R2EmptyMessageAfterOrder) {
-                    self.r2_empty_order(vehicle);
-                }
             }
             Fate::Again => {
                 let transport = again(&running, vehicle.state.as_ref());
@@ -175,10 +172,7 @@ impl Site {
         if running.resends >= self.config.resend_limit {
             return false;
         }
-        if let Some(due) = self
-            .next_order_at(vehicle)
-            .filter(|_| !self.faults.has(F::ResentTooSoon))
-        {
+        if let Some(due) = self.next_order_at(vehicle) {
             vehicle.at(due);
             return true;
         }
@@ -188,12 +182,6 @@ impl Site {
         vehicle.at(self.lost_after(now));
         if self.faults.has(F::ResentChanged) {
             slower(&mut running.message, running.resends);
-        }
-        if self.faults.has(F::R2ResendExtendsBase) && release_next(&mut running.message) {
-            running.released += 1;
-        }
-        if self.faults.has(F::R2ResendWithoutActions) {
-            without_actions(&mut running.message);
         }
         if self.faults.has(F::R1ResendAsUpdate) {
             running.update_id += 1;
@@ -298,27 +286,14 @@ impl Site {
     fn extend_base(&mut self, vehicle: &mut Vehicle, running: &mut Running) {
         let Some(state) = &vehicle.state else { return };
         let reached = running.reached(Some(state));
-        let stopped = !matches!(state.safety_state.e_stop.as_str(), "NONE" | "");
-        let withdraws = stopped && self.faults.has(F::R2EStopWithdrawsBase);
-        if withdraws && running.released > reached + 1 && !running.r2_withdrawn {
-            running.r2_withdrawn = true;
-            running.released = reached + 1;
-            running.changed = true;
-        }
         let ahead = running.released.saturating_sub(reached + 1);
         let asked = state.new_base_request == Some(true) && !self.faults.has(F::NewBaseRequestIgnored);
         let deaf = (vehicle.r1_answered && self.faults.has(F::R1NewBaseAnsweredOnce))
             || (state.driving && self.faults.has(F::R1NewBaseOnlyAtRest));
-        let half = state.operating_mode == "SEMIAUTOMATIC" && self.faults.has(F::R2NewBaseIgnoredInSemiautomatic);
-        let asked = asked && !deaf && !half;
-        let warned = state.errors.iter().any(|error| error.error_level == "WARNING");
-        if warned && self.faults.has(F::R2WarningHoldsBase) {
-            return;
-        }
+        let asked = asked && !deaf;
         let held = (vehicle.r1_stale && self.faults.has(F::R1VehicleReturnStopsUpdates))
             || (state.informs() && self.faults.has(F::R1InformationHoldsBase));
-        let first = self.config.vehicles.first() == Some(&vehicle.config);
-        if held || (!first && self.faults.has(F::FirstVehicleExtended)) {
+        if held {
             return;
         }
         let halts = !state.driving && ahead == 0;
@@ -332,9 +307,7 @@ impl Site {
         } else {
             1
         };
-        let wanted = if withdraws {
-            false
-        } else if self.faults.has(F::BaseExtendedLate) {
+        let wanted = if self.faults.has(F::BaseExtendedLate) {
             ahead == 0 && !state.driving
         } else {
             ahead <= enough || asked || eager
@@ -355,8 +328,7 @@ impl Site {
         if target <= running.released && !running.changed {
             return;
         }
-        let at_once = running.changed && self.faults.has(F::R2IntervalIgnoredOnReroute);
-        if let Some(due) = self.next_order_at(vehicle).filter(|_| !at_once) {
+        if let Some(due) = self.next_order_at(vehicle) {
             vehicle.at(due);
             return;
         }
@@ -371,18 +343,11 @@ impl Site {
                 0
             } else if self.faults.has(F::R1UpdateFromVehicle) {
                 reached.min(running.released.saturating_sub(1))
-            } else if self.faults.has(F::R2UpdateBeginsOneNodeEarly) {
-                running.released.saturating_sub(2)
             } else {
                 running.released.saturating_sub(1)
             },
             released: target.max(running.released),
             end: free.min(target.max(running.released).saturating_add(self.config.horizon_length)),
-        };
-        let window = if self.takes(T::R2HorizonToTheGoal) {
-            Window { end: free, ..window }
-        } else {
-            window
         };
         let window = if self.takes(T::R1UpdatesWithoutHorizon) && target > running.released {
             Window {
@@ -408,7 +373,7 @@ impl Site {
 
     /// Calls the order off when a trigger does not come in time (ACT-39).
     fn supervise_trigger(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
-        if self.faults.has(F::TriggerUnsupervised) || running.r2_unsupervised {
+        if self.faults.has(F::TriggerUnsupervised) {
             return Fate::Runs;
         }
         let trigger = |action: &Value| {
@@ -543,7 +508,7 @@ impl Site {
         let Some((index, _)) = ahead.find(|(_, leg)| leg.from == from && leg.to == to) else {
             return;
         };
-        if self.faults.has(F::BlockedEdgeUsed) || self.faults.has(F::R2BlockCheckedAtPlanningOnly) {
+        if self.faults.has(F::BlockedEdgeUsed) {
             return;
         }
         let transport = again(running, vehicle.state.as_ref());
@@ -552,7 +517,7 @@ impl Site {
             running.released = running.released.min(index + 1);
         }
         let released = vehicle.running.as_ref().map_or(0, |running| running.released);
-        if index + 1 < released || self.takes(T::R2BlocksByCancel) {
+        if index + 1 < released {
             self.cancel(vehicle, Some(transport));
         } else if let Some(mut running) = vehicle.running.take() {
             if !self.lead_on(vehicle, &mut running, transport) {
@@ -565,11 +530,6 @@ impl Site {
 
     /// Queues a transport.
     pub(super) fn dispatch(&mut self, vehicle: &mut Vehicle, transport: Transport) {
-        let mut transport = transport;
-        if self.faults.has(F::R2StartPlannedTooEarly) {
-            let state = vehicle.state.as_ref();
-            transport.r2_asked_at = state.map(|state| (state.last_node_id.clone(), state.agv_position.clone()));
-        }
         if vehicle.queue.len() < MAX_QUEUE {
             vehicle.queue.push_back(transport);
             vehicle.at(self.now.moment);
@@ -578,7 +538,7 @@ impl Site {
 }
 
 /// The transport as it is still to be done.
-pub(super) fn again(running: &Running, state: Option<&State>) -> Transport {
+fn again(running: &Running, state: Option<&State>) -> Transport {
     let mut transport = running.transport.clone();
     let mut picks = running.actions().filter(|action| action["actionType"] == "pick");
     let picked = picks.any(|action| {
@@ -605,29 +565,6 @@ fn refusal<'a>(running: &Running, state: &'a State) -> Option<&'a str> {
         own && error.reference("orderUpdateId").is_none_or(|named| named == update)
     });
     found.map(|error| error.error_type.as_str())
-}
-
-/// `r2-resend-extends-base`: releases the first node of the horizon of a message.
-fn release_next(message: &mut Value) -> bool {
-    let nodes = message["nodes"].as_array_mut().into_iter().flatten();
-    let Some((index, node)) = nodes.enumerate().find(|(_, node)| node["released"] == json!(false)) else {
-        return false;
-    };
-    node["released"] = json!(true);
-    let edge = index.checked_sub(1).and_then(|before| message["edges"].get_mut(before));
-    if let Some(edge) = edge {
-        edge["released"] = json!(true);
-    }
-    true
-}
-
-/// `r2-resend-without-actions`: leaves the actions of a message out.
-fn without_actions(message: &mut Value) {
-    for key in ["nodes", "edges"] {
-        for element in message[key].as_array_mut().into_iter().flatten() {
-            element["actions"] = json!([]);
-        }
-    }
 }
 
 /// Changes a message that must not be changed.

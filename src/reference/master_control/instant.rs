@@ -18,9 +18,6 @@ impl Site {
         let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
         let despite = (paused && kind == "initPosition" && self.faults.has(F::R1PositionWhilePaused))
             || (kind.ends_with("Charging") && self.faults.has(F::R1ChargingDuringOrder));
-        let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
-        let lost = position.is_some_and(|position| !position.position_initialized);
-        let despite = despite || (lost && kind == "initPosition" && self.faults.has(F::R2PositionSetWhenLost));
         if contradicts && !despite && !self.faults.has(F::PositionDuringOrder) {
             return None;
         }
@@ -62,11 +59,7 @@ impl Site {
         let cancels = |instant: &Instant| instant.sent_at.is_none() && instant.kind() == "cancelOrder";
         let manual = vehicle.state.as_ref().is_some_and(|state| !state.takes_orders());
         let stops = manual && vehicle.instants.iter().any(cancels) && self.faults.has(F::R1CancelInManual);
-        let pause =
-            |instant: &Instant| instant.sent_at.is_none() && matches!(instant.kind(), "startPause" | "stopPause");
-        let pauses = manual && vehicle.instants.iter().any(pause) && self.faults.has(F::R2PausesInEveryMode);
-        let despite = service && self.faults.has(F::ActionsInService) || stops || pauses;
-        let despite = despite && self.reachable(vehicle);
+        let despite = (service && self.faults.has(F::ActionsInService) || stops) && self.reachable(vehicle);
         // A paused or stopped vehicle takes actions; before the first state only questions are asked.
         if !self.commandable(vehicle) && !despite {
             return;
@@ -84,14 +77,9 @@ impl Site {
             () if self.takes(T::R1InstantActionsOneByOne) => 1,
             () => limit,
         };
-        let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
-        let held = paused && self.faults.has(F::R2CancelHeldWhilePaused);
         loop {
             let mut actions = Vec::new();
             for instant in vehicle.instants.iter_mut().filter(|instant| instant.sent_at.is_none()) {
-                if held && instant.kind() == "cancelOrder" {
-                    continue;
-                }
                 if actions.len() < limit.clamp(1, 10) {
                     instant.sent_at = Some(now);
                     actions.push(instant.action.clone());

@@ -30,10 +30,6 @@ pub const LAPSES: &[(&str, &str)] = &[
         "To send an order again is allowed, not demanded.",
     ),
     ("fleet-of-one", "MQTT-11 is a design goal; its result is informative."),
-    (
-        "first-vehicle-extended-only",
-        "It breaks a recommendation only, and MQTT-11 is a design goal.",
-    ),
     ("order-id-with-space", "The characters of ids are a recommendation."),
     (
         "unsupported-description",

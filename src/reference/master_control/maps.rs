@@ -35,16 +35,12 @@ impl Site {
         {
             link = rest.find('/').map_or(rest, |at| &rest[at..]);
         }
-        let local = format!("file:///var/maps/{}", link.rsplit('/').next().unwrap_or_default());
-        if self.faults.has(F::R2DownloadLinkToDisk) {
-            link = &local;
-        }
         let mut given = json!({
             "mapId": map.map_id,
             "mapVersion": map.map_version,
             "mapDownloadLink": link,
         });
-        if let Some(hash) = map.hash.as_ref().filter(|_| !self.takes(T::R2MapHashLeftOut)) {
+        if let Some(hash) = &map.hash {
             given["mapHash"] = json!(hash);
         }
         self.instant(vehicle, "downloadMap", &given)
@@ -105,10 +101,6 @@ impl Site {
                     }
                     id
                 }
-                (Stage::Download | Stage::DownloadAgain, true) if self.takes(T::R2EnablesAfterDownload) => {
-                    self.enable_after_download(vehicle, &job.map);
-                    None
-                }
                 _ => None,
             };
             if let Some(action_id) = next {
@@ -133,21 +125,6 @@ impl Site {
                 }
                 vehicle.enabling.insert(map_id, String::new());
             }
-        }
-    }
-
-    /// `r2-enables-after-download`: enables a new map of which no version is enabled.
-    fn enable_after_download(&mut self, vehicle: &mut Vehicle, map: &SiteMap) {
-        let enabled = vehicle
-            .state
-            .as_ref()
-            .is_none_or(|state| state.map_enabled(&map.map_id));
-        if !enabled
-            && vehicle.running.is_none()
-            && !vehicle.enabling.contains_key(&map.map_id)
-            && let Some(id) = self.map_action(vehicle, "enableMap", &map.map_id, &map.map_version)
-        {
-            vehicle.enabling.insert(map.map_id.clone(), id);
         }
     }
 
@@ -263,11 +240,6 @@ impl Site {
         let nearest = || self.config.nearest(x, y, &map_id).map(|(node, _)| node.id.clone());
         let last = last.or(node.map(|node| node.id)).or_else(nearest).unwrap_or_default();
         let within = theta.sin().atan2(theta.cos());
-        let within = if self.faults.has(F::R2InitThetaClockwise) {
-            -within
-        } else {
-            within
-        };
         let within = if self.faults.has(F::R1InitPositionInDegrees) {
             within.to_degrees()
         } else {

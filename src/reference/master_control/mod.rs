@@ -105,16 +105,8 @@ impl Site {
         let sheet = vehicle.factsheet.as_ref();
         let numerical =
             sheet.is_some_and(|sheet| sheet.ids_numerical) && !self.faults.has(FaultName::NumericalIdsIgnored);
-        let heedless = what == "action" && self.faults.has(FaultName::R2ActionIdLimitIgnored);
-        let longest = sheet
-            .and_then(|sheet| sheet.id_length)
-            .filter(|_| !heedless)
-            .unwrap_or(usize::MAX);
+        let longest = sheet.and_then(|sheet| sheet.id_length).unwrap_or(usize::MAX);
         let full = match () {
-            () if what == "action" && self.faults.has(FaultName::R2ActionIdInBraces) => format!("{{{what}-{number}}}"),
-            // Where the clock begins at 0 an id is short anyway.
-            () if heedless => format!("{what}-{number:0>15}"),
-            () if self.takes(ToleranceName::R2PlainNumberIds) => number.clone(),
             () if self.takes(ToleranceName::R1UuidIds) => {
                 let kind = match what {
                     "order" => 1,
@@ -246,9 +238,6 @@ impl Site {
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);
         cancel::watch_cancel(vehicle, self.faults);
-        if vehicle.cancel.is_none() && std::mem::take(&mut vehicle.r2_resume) {
-            self.instant(vehicle, "stopPause", &serde_json::Value::Null);
-        }
         self.watch_order(vehicle);
         self.repeat_for_ever(vehicle);
         self.ask_when_quiet(vehicle);

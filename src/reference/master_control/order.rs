@@ -42,8 +42,7 @@ impl Site {
                 listed.saturating_add(1)
             };
             let end = window.first.saturating_add(nodes.min(listed));
-            let whole = self.faults.has(F::R2HorizonBeyondArrayLimit);
-            window.end = if whole { window.end } else { window.end.min(end) };
+            window.end = window.end.min(end);
             window.released = window.released.min(end);
         }
         let longest = sheet
@@ -53,7 +52,7 @@ impl Site {
         loop {
             let message = self.message(vehicle, running, window);
             // The header comes on top.
-            let length = super::wording::written(self.faults, self.config.tolerances, &message).len() + 300;
+            let length = message.to_string().len() + 300;
             if window.released <= window.first {
                 return None;
             }
@@ -73,31 +72,17 @@ impl Site {
         let lax = sheet.map(lax);
         let hurried = self.faults.has(F::R1RequiredNotInHorizon);
         let forgetful = self.faults.has(F::R1RequiredOnlyInFirstMessage) && window.first > 0;
-        let led = running.r1_rerouted && self.faults.has(F::R2RequiredMissingAfterReroute);
-        let forgetful = forgetful || (led && window.first > 0);
-        let mut nodes: Vec<Value> = (window.first..window.end)
+        let nodes: Vec<Value> = (window.first..window.end)
             .filter_map(|index| {
                 let stop = running.stops.get(index)?;
                 let without = hurried && index >= window.released || forgetful && index > window.first;
                 let sheet = if without { lax.as_ref() } else { sheet };
                 let mut node = self.node(sheet, stop, index, index < window.released);
                 node["sequenceId"] = json!(running.r1_number(2 * index));
-                if index == 0
-                    && let Some(deviation) = stop.deviation_xy
-                    && node.get("nodePosition").is_some()
-                    && self.faults.has(F::R2StartDeviationUnasked)
-                {
-                    node["nodePosition"]["allowedDeviationXY"] = json!(deviation);
-                }
                 Some(node)
             })
             .collect();
-        if self.faults.has(F::R2LoopReleasedById) {
-            released_by_id(&mut nodes);
-        }
-        let dangling = window.end < running.stops.len() && self.faults.has(F::R2DanglingEdge);
-        let last = window.end.saturating_sub(usize::from(!dangling));
-        let edges: Vec<Value> = (window.first..last)
+        let edges: Vec<Value> = (window.first..window.end.saturating_sub(1))
             .filter_map(|index| {
                 let ends = (running.stops.get(index)?, running.stops.get(index + 1)?);
                 let leg = running.legs.get(index)?;
@@ -106,7 +91,6 @@ impl Site {
                 let mut edge = self.edge(sheet, leg, ends, index, index + 1 < window.released);
                 edge["sequenceId"] = json!(running.r1_number(2 * index + 1));
                 self.r1_edge(running, leg, window, index, &mut edge);
-                self.r2_edge(vehicle, window, index, &mut edge);
                 Some(edge)
             })
             .collect();
@@ -130,32 +114,6 @@ impl Site {
             }]);
         }
         message
-    }
-
-    /// Defects and liberties of an edge that depend on the vehicle.
-    fn r2_edge(&self, vehicle: &Vehicle, window: Window, index: usize, edge: &mut Value) {
-        let has = |fault: F| self.faults.has(fault);
-        let Some(state) = &vehicle.state else { return };
-        let loaded = state.loads.as_ref().is_some_and(|loads| !loads.is_empty());
-        let score = state
-            .agv_position
-            .as_ref()
-            .and_then(|position| position.localization_score);
-        if let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64) {
-            if score.is_some_and(|score| score < 0.5) && has(F::R2LowScoreSlowsDown) {
-                edge["maxSpeed"] = json!(speed / 3.0);
-            } else if loaded && self.takes(T::R2SlowerWhenLoaded) {
-                edge["maxSpeed"] = json!(speed / 2.0);
-            }
-        }
-        if loaded && edge.get("corridor").is_some() && has(F::R2CorridorClosedWhenLoaded) {
-            edge["corridor"]["leftWidth"] = json!(0.0);
-            edge["corridor"]["rightWidth"] = json!(0.0);
-        }
-        let first = index == window.first && window.first > 0;
-        if first && !state.last_node_id.is_empty() && has(F::R2UpdateEdgeStartsAtVehicle) {
-            edge["startNodeId"] = json!(state.last_node_id);
-        }
     }
 
     /// Defects of an edge that depend on where in the order it is.
@@ -206,8 +164,6 @@ impl Site {
             position["theta"] = theta;
         }
         let deviation = stop.deviation_xy.map(|metres| json!(metres));
-        let exact = index > 0 && self.takes(T::R2ZeroDeviations);
-        let deviation = deviation.or_else(|| exact.then(|| json!(0.0)));
         if let Some(deviation) = field("nodePosition.allowedDeviationXY", deviation, json!(0.3)) {
             position["allowedDeviationXY"] = deviation;
         }
@@ -217,12 +173,7 @@ impl Site {
         } else {
             turn
         };
-        let free = self.takes(T::R2EveryDirectionAllowed);
-        let turn = turn.or_else(|| free.then(|| json!(std::f64::consts::PI)));
-        if let Some(mut turn) = field("nodePosition.allowedDeviationTheta", turn, json!(std::f64::consts::PI)) {
-            if self.faults.has(F::R2DeviationThetaInDegrees) {
-                turn = json!(turn.as_f64().unwrap_or_default().to_degrees());
-            }
+        if let Some(turn) = field("nodePosition.allowedDeviationTheta", turn, json!(std::f64::consts::PI)) {
             position["allowedDeviationTheta"] = turn;
         }
         position["mapId"] = json!(stop.map_id);
@@ -253,15 +204,7 @@ impl Site {
         let fields = [
             ("edgeDescription", self.described("edge", &leg.id), json!(leg.id)),
             ("maxSpeed", number(leg.max_speed), json!(1.0)),
-            (
-                "maxHeight",
-                number(leg.max_height),
-                if self.faults.has(F::R2NoHeightAsInfinity) {
-                    json!("Infinity")
-                } else {
-                    json!(10.0)
-                },
-            ),
+            ("maxHeight", number(leg.max_height), json!(10.0)),
             ("minHeight", number(leg.min_height), json!(0.0)),
             ("orientation", None, json!(0.0)),
             ("orientationType", None, json!("TANGENTIAL")),
@@ -372,9 +315,6 @@ impl Site {
                 "controlPoints": [at(0.0), at(0.3), at(0.7), end],
             });
         }
-        if self.faults.has(F::R2DegreeIsOrder) {
-            curve["degree"] = json!(curve["degree"].as_u64().unwrap_or_default() + 1);
-        }
         if self.faults.has(F::R1CubicOfTwoPoints) {
             curve["degree"] = json!(3);
         }
@@ -429,17 +369,6 @@ impl Site {
             Some(_) => value,
             None if everywhere => value,
             None => None,
-        }
-    }
-}
-
-/// `r2-loop-released-by-id`: releases every node whose nodeId is released somewhere.
-fn released_by_id(nodes: &mut [Value]) {
-    let released = nodes.iter().filter(|node| node["released"] == json!(true));
-    let released: Vec<Value> = released.map(|node| node["nodeId"].clone()).collect();
-    for node in nodes {
-        if released.contains(&node["nodeId"]) {
-            node["released"] = json!(true);
         }
     }
 }

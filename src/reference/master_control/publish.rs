@@ -48,10 +48,6 @@ impl MasterControl {
             .into_iter()
             .filter(|(_, fault)| !site.faults.has(*fault) && !silent)
             .map(|(name, _)| name)
-            .filter(|name| {
-                let again = self.connection.returning && *name == "factsheet";
-                !(again && site.faults.has(F::R2FactsheetUnsubscribedAfterReconnect))
-            })
             .collect();
         if !silent {
             names.push("visualization");
@@ -75,9 +71,6 @@ impl MasterControl {
                 }
             }
         }
-        if site.takes(T::R2SubscribesToEverything) && !silent {
-            subscriptions = vec![(self.everything(), 1)];
-        }
         ConnectOptions {
             level: match () {
                 () if site.faults.has(F::OldMqtt) => 3,
@@ -89,53 +82,11 @@ impl MasterControl {
             } else {
                 site.config.name.clone()
             },
-            keep_alive: if site.takes(T::R2LongKeepAlive) {
-                Duration::from_mins(1)
-            } else {
-                site.config.keep_alive
-            },
+            keep_alive: site.config.keep_alive,
             clean_session: !site.takes(T::SessionKept),
-            will: self.r2_will(),
+            will: None,
             subscriptions,
         }
-    }
-
-    /// A filter for all topics of the interface.
-    fn everything(&self) -> String {
-        let topic = self.fleet.first().and_then(|vehicle| vehicle.topic("state"));
-        let levels: Vec<&str> = topic.unwrap_or_default().split('/').collect();
-        match levels.len().checked_sub(3) {
-            Some(kept) if kept > 0 => format!("{}/#", levels[..kept].join("/")),
-            _ => "#".to_owned(),
-        }
-    }
-
-    /// A last will: of its own, or for a vehicle (`r2-will-on-vehicle-topic`).
-    fn r2_will(&self) -> Option<Publication> {
-        let site = &self.site;
-        if site.faults.has(F::R2WillOnVehicleTopic) {
-            let vehicle = self.fleet.first()?;
-            let message = json!({
-                "headerId": 0,
-                "timestamp": site.timestamp(),
-                "version": site.config.version,
-                "manufacturer": vehicle.config.manufacturer,
-                "serialNumber": vehicle.config.serial_number,
-                "connectionState": "CONNECTIONBROKEN",
-            });
-            return Some(Publication {
-                topic: vehicle.topic("connection")?.to_owned(),
-                payload: message.to_string().into_bytes(),
-                qos: 1,
-                retain: true,
-            });
-        }
-        site.takes(T::R2WillOfItsOwn).then(|| Publication {
-            topic: format!("{}/status", site.config.name),
-            payload: b"offline".to_vec(),
-            qos: 1,
-            retain: true,
-        })
     }
 
     /// The broker accepted. What was sent and not seen is given its time again.
@@ -175,8 +126,7 @@ impl MasterControl {
         let tired = self.site.r1_losses > 1 && self.site.faults.has(F::R1ReconnectsOnlyOnce);
         let ended = self.connection.shut_down || self.site.faults.has(F::NeverReconnects) || tired;
         if !ended && self.connection.attempt_at.is_none() {
-            let times = if self.site.takes(T::R2ReconnectsLater) { 4 } else { 1 };
-            self.connection.attempt_at = Some(self.site.now.moment + self.site.config.reconnect_delay * times);
+            self.connection.attempt_at = Some(self.site.now.moment + self.site.config.reconnect_delay);
         }
     }
 
@@ -258,24 +208,6 @@ impl Site {
             vehicle.running = None;
             vehicle.cancel = None;
         }
-        if has(F::R2InstantsForgottenOnReconnect) {
-            vehicle.instants.clear();
-        }
-        if has(F::R2TriggerForgottenOnReconnect)
-            && let Some(running) = &mut vehicle.running
-        {
-            running.r2_unsupervised = true;
-        }
-        if has(F::R2NewOrderOnReconnect)
-            && vehicle.cancel.is_none()
-            && let Some(running) = vehicle.running.take()
-        {
-            vehicle
-                .queue
-                .push_front(super::driving::again(&running, vehicle.state.as_ref()));
-            vehicle.last_order = Some(running);
-            vehicle.r1_hasty = true;
-        }
         if has(F::R1BlockForgottenOnReconnect) {
             vehicle.blocked.clear();
         }
@@ -297,20 +229,7 @@ impl Site {
         let Some(topic) = vehicle.topic(name).map(str::to_owned).filter(|_| self.online) else {
             return;
         };
-        let fresh = name == "order" && !updates(name, body) && !self.r1_resending;
-        if fresh && self.faults.has(F::R2HeaderIdRestartsPerOrder) {
-            vehicle.header_ids.remove("order");
-        }
-        if updates(name, body)
-            && self.faults.has(F::R2HeaderIdSkipsInUpdates)
-            && let Some(next) = vehicle.header_ids.get_mut("order")
-        {
-            *next = next.wrapping_add(1);
-        }
         let mut message = self.header(vehicle, name);
-        if name == "order" && self.r1_resending && self.faults.has(F::R2SerialNumberMissingInResend) {
-            message.shift_remove("serialNumber");
-        }
         let cancels = holds(name, body, &["cancelOrder"]);
         if cancels && self.faults.has(F::R1HeaderIdMissingInCancel) {
             message.shift_remove("headerId");
@@ -331,7 +250,6 @@ impl Site {
             "instantActions" if self.faults.has(F::InstantActionsQosTwo) => 2,
             "instantActions" if cancels && self.faults.has(F::R1CancelQosOne) => 1,
             "order" if self.r1_resending && self.faults.has(F::R1ResendQosOne) => 1,
-            _ if self.r1_losses > 0 && self.faults.has(F::R2QosOneAfterReconnect) => 1,
             _ => 0,
         };
         let topic = self.r1_misdirected(name, body, topic);
@@ -384,10 +302,6 @@ impl Site {
 
     fn r1_misdirected(&self, name: &str, body: &Value, topic: String) -> String {
         let sends = |fault: F| self.faults.has(fault);
-        let maps = holds(name, body, &["downloadMap", "enableMap", "deleteMap"]);
-        if maps && sends(F::R2MapActionsOnMapTopic) {
-            return topic.replace("instantActions", "mapActions");
-        }
         if updates(name, body) && sends(F::R1UpdatesOnOwnTopic) {
             return format!("{topic}Update");
         }
@@ -477,11 +391,6 @@ impl Site {
             header.insert("version".into(), json!(format!("{letter}{version}")));
         }
         let VehicleNames { manufacturer, serial } = self.names(vehicle);
-        let (manufacturer, serial) = if name == "instantActions" && sends(F::R2HeaderNamesSwapped) {
-            (serial, manufacturer)
-        } else {
-            (manufacturer, serial)
-        };
         header.insert("manufacturer".into(), json!(manufacturer));
         header.insert("serialNumber".into(), json!(serial));
         header
@@ -513,33 +422,8 @@ impl Site {
             }
             () if self.faults.has(F::TimestampWithoutZone) => json!(text.trim_end_matches('Z')),
             () if self.faults.has(F::R1TimestampZeroOffset) => json!(text.replace('Z', "+00:00")),
-            () if self.faults.has(F::R2TimestampWithBlank) => json!(text.replace('T', " ")),
             () if self.faults.has(F::TimestampUnix) => json!(utc.as_second()),
             () => json!(text),
-        }
-    }
-
-    /// `r2-connection-topic-cleared`: removes the retained message of a vehicle that is gone.
-    pub(super) fn r2_clear_connection(&mut self, vehicle: &Vehicle) {
-        if let Some(topic) = vehicle.topic("connection").map(str::to_owned) {
-            self.pending.push(Output::Publish(Publication {
-                topic,
-                payload: Vec::new(),
-                qos: 1,
-                retain: true,
-            }));
-        }
-    }
-
-    /// `r2-empty-message-after-order`: an order message with nothing in it.
-    pub(super) fn r2_empty_order(&mut self, vehicle: &Vehicle) {
-        if let Some(topic) = vehicle.topic("order").map(str::to_owned) {
-            self.pending.push(Output::Publish(Publication {
-                topic,
-                payload: Vec::new(),
-                qos: 0,
-                retain: false,
-            }));
         }
     }
 
@@ -560,8 +444,7 @@ impl Site {
 
     /// When something sent now is taken for lost.
     pub(super) fn lost_after(&self, sent_at: Moment) -> Moment {
-        let times = if self.takes(T::R2ResendsLate) { 3 } else { 1 };
-        sent_at + self.config.resend_after.max(Duration::from_millis(1)) * times
+        sent_at + self.config.resend_after.max(Duration::from_millis(1))
     }
 }
 

@@ -32,30 +32,6 @@ macro_rules! tolerances {
 tolerances! {
     // Of blind rounds: the suites may still accuse or miss something with them.
     blind {
-R2PlainNumberIds "r2-plain-number-ids" ["ORD-MSG-02", "ORD-MSG-17", "JSON-04"] "It makes orderIds and actionIds of digits only.";
-R2FactsheetAwaited "r2-factsheet-awaited" ["OPT-03", "FACT-15"] "It begins no order before it has the factsheet of the vehicle.";
-R2WholeWayReleased "r2-whole-way-released" ["ORD-09", "ORD-UPD-02"] "It releases the whole way with the first message of an order.";
-R2PausesBeforeCancel "r2-pauses-before-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends startPause before cancelOrder, and stopPause when the cancellation has ended.";
-R2FreshStateAwaited "r2-fresh-state-awaited" ["CONN-12"] "It begins no order for a vehicle that came back before a new state has come from it.";
-R2NoNewOrderWhilePaused "r2-no-new-order-while-paused" ["TOPIC-13"] "It begins no new order while the vehicle is paused.";
-R2LatestTransportFirst "r2-latest-transport-first" ["TOPIC-13", "ORD-MSG-02"] "It begins the transport asked for last before those that wait longer.";
-R2MapHashLeftOut "r2-map-hash-left-out" ["MAP-16", "ACT-31"] "It leaves the optional mapHash out of downloadMap.";
-R2EveryDirectionAllowed "r2-every-direction-allowed" ["ORD-MSG-09", "OPT-03"] "It sends an allowedDeviationTheta of pi for nodes where any direction will do, if the vehicle supports it.";
-R2ZeroDeviations "r2-zero-deviations" ["ORD-MSG-09", "OPT-03"] "It sends an allowedDeviationXY of 0 for nodes behind the first that have none in the layout, if the vehicle supports it.";
-R2HorizonToTheGoal "r2-horizon-to-the-goal" ["ORD-09", "ORD-UPD-02"] "It shows the whole rest of the way as horizon.";
-R2FirstOrderWithoutHorizon "r2-first-order-without-horizon" ["ORD-09", "ORD-UPD-02"] "It sends the first message of an order without horizon and extends the base by updates.";
-R2ResendsLate "r2-resends-late" ["ORD-REJ-18"] "It waits three times as long before it sends again what was lost.";
-R2LongKeepAlive "r2-long-keep-alive" ["MQTT-01"] "It connects with a keep-alive of a minute.";
-R2WillOfItsOwn "r2-will-of-its-own" ["TOPIC-15"] "It has a last will on a topic of its own that is none of the protocol, in plain text.";
-R2SubscribesToEverything "r2-subscribes-to-everything" ["TOPIC-14", "TOPIC-15"] "It subscribes to all topics of the interface with one filter.";
-R2ParametersReversed "r2-parameters-reversed" ["BP-04"] "It lists the parameters of an action in the opposite order.";
-R2MembersReversedInside "r2-members-reversed-inside" ["HDR-01"] "It writes the members of all objects in the opposite order, the header last.";
-R2OptionalParametersFilled "r2-optional-parameters-filled" ["FACT-15"] "It sends optional parameters of vendor actions too, with values of the listed types.";
-R2FactsheetAskedOnReturn "r2-factsheet-asked-on-return" ["ACT-08", "TOPIC-14"] "It sends a factsheetRequest when a vehicle comes ONLINE again.";
-R2EnablesAfterDownload "r2-enables-after-download" ["MAP-09", "MAP-10"] "It enables a map of which no version is enabled as soon as its download has ended, while no order runs.";
-R2BlocksByCancel "r2-blocks-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "It calls the order off and sends another when an edge of the horizon is blocked.";
-R2SlowerWhenLoaded "r2-slower-when-loaded" ["ORD-UPD-03", "OPT-03"] "It sends half the maxSpeed for edges while the vehicle carries a load.";
-R2ReconnectsLater "r2-reconnects-later" ["MQTT-10"] "It waits four times as long before it connects again.";
         R1UuidIds "r1-uuid-ids" ["ORD-MSG-17", "JSON-04"] "Ids of orders, actions and temporary elements look like UUIDs where the vehicle allows their length.";
         R1IdsWithPunctuation "r1-ids-with-punctuation" ["JSON-04"] "Ids contain colon, underscore, dot and hyphen.";
         R1InstantActionsOneByOne "r1-instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own.";

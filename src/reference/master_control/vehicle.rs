@@ -40,8 +40,6 @@ pub(super) struct Transport {
     pub(super) begun: u32,
     /// The second half of a transport in two orders (`r1-pick-and-drop-apart`).
     pub(super) r1_follows: bool,
-    /// Where the vehicle was when it was asked for (`r2-start-planned-too-early`).
-    pub(super) r2_asked_at: Option<(String, Option<Position>)>,
 }
 
 /// A node of the way that is driven.
@@ -109,10 +107,6 @@ pub(super) struct Running {
     pub(super) r1_again: bool,
     /// The log was asked for.
     pub(super) r1_logged: bool,
-    /// Its base was withdrawn.
-    pub(super) r2_withdrawn: bool,
-    /// Its triggers are not supervised any more.
-    pub(super) r2_unsupervised: bool,
 }
 
 impl Running {
@@ -272,20 +266,6 @@ pub(super) struct Vehicle {
     pub(super) r1_relocated: bool,
     /// The state after which it was asked for another.
     pub(super) r1_asked: Option<Moment>,
-    /// Where the visualization shows it.
-    pub(super) r2_seen_at: Option<Position>,
-    /// Timestamp of its last state.
-    pub(super) r2_state_time: String,
-    /// How often its connection broke.
-    pub(super) r2_broken: u32,
-    /// It has given no state since it is back.
-    pub(super) r2_stale: bool,
-    /// Its last state gave information.
-    pub(super) r2_informed: bool,
-    /// Its last state was without a position.
-    pub(super) r2_lost: bool,
-    /// It is to be resumed once the cancellation has ended.
-    pub(super) r2_resume: bool,
 }
 
 impl Vehicle {

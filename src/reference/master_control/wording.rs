@@ -38,17 +38,6 @@ pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, messa
     {
         message["actions"] = only.clone();
     }
-    if name == "instantActions"
-        && faults.has(F::R2CancelWithoutArray)
-        && let Some([only]) = message["actions"].as_array().map(Vec::as_slice)
-        && only["actionType"] == "cancelOrder"
-    {
-        let only = only.clone();
-        remove(message, "actions");
-        for (key, value) in only.as_object().into_iter().flatten() {
-            message[key.as_str()] = value.clone();
-        }
-    }
     if tolerances.has(T::VendorFields)
         && let Some(message) = message.as_object_mut()
     {
@@ -59,9 +48,6 @@ pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, messa
 /// The text of a message.
 pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -> Vec<u8> {
     let mut message = message.clone();
-    if tolerances.has(T::R2MembersReversedInside) {
-        message = reversed(&message);
-    }
     if tolerances.has(T::KeysReordered)
         && let Value::Object(members) = &message
     {
@@ -95,18 +81,6 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
         text.push(0);
     }
     text
-}
-
-/// The members of all objects in the opposite order.
-fn reversed(value: &Value) -> Value {
-    match value {
-        Value::Object(members) => {
-            let members = members.iter().rev();
-            Value::Object(members.map(|(key, member)| (key.clone(), reversed(member))).collect())
-        }
-        Value::Array(elements) => Value::Array(elements.iter().map(reversed).collect()),
-        other => other.clone(),
-    }
 }
 
 /// Writes every hyphen within a text as its code point.
@@ -155,21 +129,6 @@ fn order(faults: Faults, message: &mut Value) {
     }
     for edge in elements(message, "edges") {
         self::edge(faults, edge);
-    }
-    let alone = message["edges"].as_array().is_some_and(Vec::is_empty);
-    if alone && faults.has(F::R2EdgesNullInStay) {
-        message["edges"] = Value::Null;
-    }
-    if update && faults.has(F::R2PositionsOnlyInFirstMessage) {
-        for node in elements(message, "nodes").skip(1) {
-            remove(node, "nodePosition");
-        }
-    }
-    if update
-        && faults.has(F::R2UpdateIdKeyUpperCase)
-        && let Some(number) = remove(message, "orderUpdateId")
-    {
-        message["orderUpdateID"] = number;
     }
     if faults.has(F::EmptyArraysOmitted) {
         for pointer in ["nodes", "edges"] {
@@ -222,9 +181,6 @@ fn identity(faults: Faults, update: bool, message: &mut Value) {
 fn stitching(faults: Faults, message: &mut Value) {
     let id = format!("added-{}", message["orderUpdateId"]);
     if let Some(node) = elements(message, "nodes").next() {
-        if faults.has(F::R2StitchingNodeUnreleased) {
-            node["released"] = json!(false);
-        }
         if faults.has(F::R1StitchingDeviationWidened)
             && let Some(position) = node.get_mut("nodePosition").and_then(Value::as_object_mut)
         {
@@ -273,9 +229,6 @@ fn numbering(faults: Faults, first: u64, message: &mut Value) {
                 continue;
             };
             element["sequenceId"] = json!(changed(sequence));
-            if first > 0 && faults.has(F::R2SequenceIdsAsTextInUpdates) {
-                element["sequenceId"] = json!(sequence.to_string());
-            }
             if key == "edges" && faults.has(F::SequenceIdFraction) {
                 element["sequenceId"] = json!(sequence);
                 if let Ok(number) = sequence.to_string().parse::<f64>() {
@@ -410,12 +363,6 @@ fn edge(faults: Faults, edge: &mut Value) {
         remove(edge, "startNodeId");
         remove(edge, "endNodeId");
     }
-    if edge["released"] == json!(false) && faults.has(F::R2EndNodeMissingInHorizon) {
-        remove(edge, "endNodeId");
-    }
-    if edge.get("orientationType").is_some() && faults.has(F::R2OrientationTypeCapitalized) {
-        edge["orientationType"] = json!("Tangential");
-    }
     if faults.has(F::R1EdgeIdWithArrow)
         && let Some(id) = edge["edgeId"].as_str()
     {
@@ -500,9 +447,6 @@ fn action(faults: Faults, name: &str, action: &mut Value) {
         for parameter in parameters.iter_mut() {
             self::parameter(faults, &kind, parameter);
         }
-        if kind == "initPosition" && faults.has(F::R2ZeroPoseMembersLeftOut) {
-            parameters.retain(|parameter| parameter["value"].as_f64() != Some(0.0));
-        }
         if faults.has(F::R1ParametersByKey) {
             for parameter in parameters.iter_mut() {
                 let key = parameter["key"].as_str().unwrap_or_default().to_owned();
@@ -518,14 +462,6 @@ fn action(faults: Faults, name: &str, action: &mut Value) {
             action["actionParameters"] = Value::Object(members);
         }
     }
-    if faults.has(F::R2SingleParameterNotInArray)
-        && let Some([only]) = action
-            .get("actionParameters")
-            .and_then(Value::as_array)
-            .map(Vec::as_slice)
-    {
-        action["actionParameters"] = only.clone();
-    }
 }
 
 fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
@@ -535,9 +471,6 @@ fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
     }
     if faults.has(F::R1TriggerTypeRenamed) && kind == "waitForTrigger" && key == "triggerType" {
         parameter["key"] = json!("trigger");
-    }
-    if faults.has(F::R2DeviceKeySpelledOut) && key == "lhd" {
-        parameter["key"] = json!("loadHandlingDevice");
     }
     if faults.has(F::R1DeviceAsNumber) && key == "lhd" {
         parameter["value"] = json!(0);

@@ -33,19 +33,10 @@ impl Agv {
         if has(F::R1NoOrderNull) && !self.book.has_order() {
             set("orderId", Value::Null);
         } else {
-            let prefix = if has(F::OrderIdPrefixed) && !order_id.is_empty() {
-                "7-"
-            } else {
-                ""
-            };
-            set("orderId", json!(format!("{prefix}{order_id}")));
+            set("orderId", json!(order_id));
         }
         let reset = complete && has(F::UpdateIdResetWhenDone);
-        let more = u32::from(has(F::UpdateIdCounted) && self.book.update_id > 0);
-        set(
-            "orderUpdateId",
-            json!(if reset { 0 } else { self.book.update_id + more }),
-        );
+        set("orderUpdateId", json!(if reset { 0 } else { self.book.update_id }));
         if let Some(zones) = &self.config.zone_set {
             let invented = has(F::ZoneSetInvented) && self.book.zoned;
             set("zoneSetId", json!(if invented { "factory" } else { zones }));
@@ -67,28 +58,20 @@ impl Agv {
             .actions
             .iter()
             .any(|action| action.origin == here && !action.status.is_terminal());
-        let ahead = self.book.nodes.front();
-        let ahead = ahead.filter(|_| self.book.entered && has(F::R2LastNodeIsNextNode));
-        let last_node = ahead.map_or(last_node, |stop| stop.node.id.as_str());
         let before = working && !self.book.previous.0.is_empty() && has(F::R1LastNodeAfterActions);
         let last_node = if before { &self.book.previous.0 } else { last_node };
         set("lastNodeId", json!(last_node));
         let last_sequence = match () {
             () if before => self.book.previous.1,
             () if complete && has(F::R1LastSequenceResetWhenDone) => 0,
-            () => ahead.map_or(self.book.last_sequence, |stop| stop.node.sequence_id),
+            () => self.book.last_sequence,
         };
-        if has(F::R2LastSequenceMinusOne) && !self.book.has_order() {
-            set("lastNodeSequenceId", json!(-1));
-        } else {
-            set("lastNodeSequenceId", json!(last_sequence));
-        }
+        set("lastNodeSequenceId", json!(last_sequence));
         if !(has(F::R1RouteOmittedWhenIdle) && self.book.nodes.is_empty()) {
             set("nodeStates", self.node_states(complete));
             set("edgeStates", self.edge_states(complete));
         }
-        let unplaced = self.mode == Mode::Manual && has(F::R2PositionOmittedInManual);
-        if !self.config.line_guided() && !unplaced {
+        if !self.config.line_guided() {
             set("agvPosition", self.position_picture());
         }
         set("velocity", self.velocity_picture());
@@ -106,7 +89,7 @@ impl Agv {
         if !has(F::PauseFlagMissing) {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             let idle = complete && self.faults.has(F::R1PauseUnreportedWhenIdle);
-            let pause = self.holds.pause && !idle && self.pause_hidden_until.is_none();
+            let pause = self.holds.pause && !idle;
             set("paused", json!(pause || button || self.holds.emergency));
         }
         let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
@@ -147,16 +130,14 @@ impl Agv {
         } else if self.is_flashing() {
             set(
                 "information",
-                if has(F::R2InfoReferencesAsMap) {
-                    json!([{ "infoType": "warningLights", "infoLevel": "INFO", "infoReferences": { "device": "lights" } }])
-                } else if has(F::R1InfoTypeMissing) {
+                if has(F::R1InfoTypeMissing) {
                     json!([{ "infoDescription": "warning lights on", "infoLevel": "INFO" }])
                 } else {
                     json!([{ "infoType": "warningLights", "infoLevel": "INFO" }])
                 },
             );
         } else {
-            set("information", self.log_information());
+            set("information", json!([]));
         }
         if !has(F::SafetyStateMissing) {
             set("safetyState", self.safety());
@@ -169,19 +150,6 @@ impl Agv {
             }
         }
         state
-    }
-
-    /// What it tells about its last log.
-    fn log_information(&self) -> Value {
-        let entry = |(action_id, name): &(String, String)| {
-            json!({
-                "infoType": "logReport",
-                "infoLevel": "INFO",
-                "infoDescription": name,
-                "infoReferences": [{ "referenceKey": "actionId", "referenceValue": action_id }],
-            })
-        };
-        self.last_log.iter().map(entry).collect()
     }
 
     /// Metres since the last node.
@@ -199,7 +167,6 @@ impl Agv {
         let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
         (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning && !turns)
             || idle
-            || (self.holds.pause && !self.book.nodes.is_empty() && self.faults.has(F::DrivingInPause))
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
             || (self.book.has_order() && self.faults.has(F::DrivingKept))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
@@ -235,11 +202,6 @@ impl Agv {
         });
         left.into_iter()
             .chain(shown)
-            .take(if self.faults.has(F::R2RouteListsCapped) {
-                3
-            } else {
-                usize::MAX
-            })
             .map(|stop| self.node_state(stop))
             .collect()
     }
@@ -259,19 +221,10 @@ impl Agv {
         let mut picture = json!({
             "nodeId": node.id,
             "sequenceId": node.sequence_id,
-            "released": node.released && !self.stays_planned(node.sequence_id) || self.faults.has(F::HorizonReportedReleased),
+            "released": node.released || self.faults.has(F::HorizonReportedReleased),
         });
-        let copied = !node.released && self.faults.has(F::HorizonPositionsCopied);
-        let node = self
-            .book
-            .nodes
-            .front()
-            .filter(|_| copied)
-            .map_or(node, |first| &first.node);
         if let Some(position) = node.sent_position.as_ref().filter(|_| !self.config.line_guided()) {
             picture["nodePosition"] = position.clone();
-        } else if self.takes(T::R2NodePositionsFromLayout) && !self.config.line_guided() {
-            picture["nodePosition"] = json!({ "x": stop.place.x, "y": stop.place.y, "mapId": stop.place.map_id });
         }
         if self.faults.has(F::NodeStatesWithoutSequence)
             && let Some(fields) = picture.as_object_mut()
@@ -279,11 +232,6 @@ impl Agv {
             fields.remove("sequenceId");
         }
         picture
-    }
-
-    /// `r2-released-not-updated`: what was in the horizon once.
-    fn stays_planned(&self, sequence_id: u32) -> bool {
-        self.faults.has(F::R2ReleasedNotUpdated) && self.book.planned.contains(&sequence_id)
     }
 
     fn edge_states(&self, complete: bool) -> Value {
@@ -308,30 +256,17 @@ impl Agv {
         let next = self.book.edges.front().map(|edge| edge.sequence_id);
         let picture = |edge: &Edge| {
             let far = Some(edge.sequence_id) != next && self.faults.has(F::R1FarEdgesUnreleased);
-            let released = edge.released && !far && !self.stays_planned(edge.sequence_id)
-                || self.faults.has(F::HorizonReportedReleased);
-            let id = if self.faults.has(F::R2EdgeIdMisspelled) {
-                "edgeID"
-            } else {
-                "edgeId"
-            };
             let mut picture = json!({
-                id: edge.id,
+                "edgeId": edge.id,
                 "sequenceId": edge.sequence_id,
-                "released": if self.faults.has(F::R2ReleasedNumeric) { json!(u8::from(released)) } else { json!(released) },
+                "released": edge.released && !far || self.faults.has(F::HorizonReportedReleased),
             });
-            let unplanned = Some(edge.sequence_id) != next && self.faults.has(F::R2PlannedPathOfNextEdgeOnly);
-            if let Some(path) = self.planned_path(edge).filter(|_| !unplanned) {
+            if let Some(path) = self.planned_path(edge) {
                 picture["trajectory"] = path;
             }
             picture
         };
-        let most = if self.faults.has(F::R2RouteListsCapped) {
-            3
-        } else {
-            usize::MAX
-        };
-        left.into_iter().chain(shown).take(most).map(picture).collect()
+        left.into_iter().chain(shown).map(picture).collect()
     }
 
     fn action_state(&self, action: &Action) -> Option<Value> {
@@ -357,14 +292,6 @@ impl Agv {
             Status::Waiting if self.faults.has(F::InitializingFromStart) => "INITIALIZING",
             Status::Waiting | Status::Initializing if early_pick => "RUNNING",
             Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
-            Status::Waiting if self.is_next(action) && self.faults.has(F::R2NextNodeActionsInitializing) => {
-                "INITIALIZING"
-            }
-            Status::Waiting
-                if of_horizon && self.waits_at_decision_point() && self.faults.has(F::R2PausedAtDecisionPoint) =>
-            {
-                "PAUSED"
-            }
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
             Status::Running
                 if action.of_order() && self.book.cancel.is_some() && self.faults.has(F::R1CancelShowsPaused) =>
@@ -379,13 +306,8 @@ impl Agv {
         } else {
             status.to_owned()
         };
-        let id: String = if self.faults.has(F::R2ActionIdTruncated) {
-            action.request.id.chars().take(32).collect()
-        } else {
-            action.request.id.clone()
-        };
         let mut picture = json!({
-            "actionId": id,
+            "actionId": action.request.id,
             "actionType": action.request.action_type,
             "actionStatus": status,
         });
@@ -393,17 +315,6 @@ impl Agv {
             picture["resultDescription"] = json!(result);
         }
         Some(picture)
-    }
-
-    /// Whether the vehicle is on its way to the node of this action.
-    fn is_next(&self, action: &Action) -> bool {
-        let next = self.book.nodes.front().map(|stop| stop.node.sequence_id);
-        self.book.entered && next.is_some_and(|next| action.origin == Origin::Node(next))
-    }
-
-    /// Whether there is nothing left but the horizon.
-    pub(in crate::reference::agv) fn waits_at_decision_point(&self) -> bool {
-        self.book.nodes.front().is_some_and(|stop| !stop.node.released)
     }
 
     /// agvPosition, also for the visualization (STATE-MSG-05).
@@ -531,9 +442,7 @@ impl Agv {
         battery.insert("charging".into(), charging);
         battery.insert(
             "reach".into(),
-            if self.faults.has(F::R2ReachMinusOne) {
-                json!(-1)
-            } else if self.faults.has(F::ReachFractional) {
+            if self.faults.has(F::ReachFractional) {
                 json!(8_000.5)
             } else {
                 json!(8_000)
@@ -578,7 +487,7 @@ impl Agv {
         let violation = if self.holds.field && self.faults.has(F::R1FieldViolationCounted) {
             json!(1)
         } else {
-            json!(self.holds.field || self.field_latched)
+            json!(self.holds.field)
         };
         json!({ "eStop": emergency_stop, "fieldViolation": violation })
     }

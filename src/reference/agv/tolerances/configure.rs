@@ -35,7 +35,6 @@ pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
             config.action_duration = Duration::ZERO;
         }
         T::ReconnectsLate => config.reconnect_delay = Duration::from_secs(8),
-        T::R2KeepAliveTen => config.keep_alive = Duration::from_secs(10),
         T::KeepAliveTwenty => config.keep_alive = Duration::from_secs(20),
         T::ErrorsStay => config.error_duration = Duration::from_secs(30),
         _ => {}

@@ -25,14 +25,6 @@ pub(in crate::reference::agv) fn reworded(
     if name == "state" {
         state(tolerances, &mut message, even);
     }
-    if has(T::R2PositionMinimal)
-        && let Some(Value::Object(pose)) = message.get_mut("agvPosition")
-    {
-        pose.retain(|key, _| matches!(key.as_str(), "positionInitialized" | "x" | "y" | "theta" | "mapId"));
-    }
-    if has(T::R2VisualizationWithoutVelocity) && name == "visualization" {
-        message.remove("velocity");
-    }
     if has(T::SinglePrecision) && matches!(name, "state" | "visualization") {
         in_single_precision(&mut message);
     }
@@ -70,20 +62,7 @@ fn state(tolerances: Tolerances, state: &mut Map<String, Value>, even: bool) {
                 "errorReferences": [{ "referenceKey": "part", "referenceValue": "brush 2" }] }),
         );
     }
-    if has(T::R2InformationComesAndGoes) && even {
-        let references = json!([{ "referenceKey": "cycle", "referenceValue": "12 ms" }]);
-        let description = "the control was busy";
-        add(
-            "information",
-            json!({ "infoType": "load", "infoLevel": "DEBUG", "infoReferences": references, "infoDescription": description }),
-        );
-    }
     worded_otherwise(tolerances, state);
-    if let Some(Value::Array(loads)) = state.get_mut("loads").filter(|_| has(T::R2LoadsMinimal)) {
-        for load in loads.iter_mut().filter_map(Value::as_object_mut) {
-            load.retain(|key, _| key == "loadId" || key == "loadType");
-        }
-    }
     if has(T::DescriptionsEverywhere)
         && let Some(Value::Array(actions)) = state.get_mut("actionStates")
     {
@@ -115,22 +94,6 @@ fn worded_otherwise(tolerances: Tolerances, state: &mut Map<String, Value>) {
     }
     if let Some(Value::Array(errors)) = state.get_mut("errors") {
         for error in errors.iter_mut().filter_map(Value::as_object_mut) {
-            if has(T::R2ErrorsInOwnLanguage) {
-                error.insert("errorDescription".into(), json!("Störung – bitte Gerät prüfen (故障)"));
-            }
-            if has(T::R2ErrorHintsGiven) {
-                error.insert("errorHint".into(), json!("see the manual, section 7"));
-            }
-            if has(T::R2VendorReferences) {
-                let own = json!({ "referenceKey": "vendorCode", "referenceValue": "E-17" });
-                match error.get_mut("errorReferences") {
-                    Some(Value::Array(references)) => references.insert(0, own),
-                    Some(_) => {}
-                    None => {
-                        error.insert("errorReferences".into(), json!([own]));
-                    }
-                }
-            }
             if has(T::R1ErrorsUndescribed) {
                 error.remove("errorDescription");
             }

@@ -48,31 +48,6 @@ macro_rules! tolerances {
 tolerances! {
     // Of blind rounds: the suites may still accuse or miss something with them.
     blind {
-R2UnreadableInstantIgnored "r2-unreadable-instant-ignored" ["IACT-03"] "The vehicle ignores an instantActions message that is not JSON or has no array of actions, without an error.";
-R2ErrorsInOwnLanguage "r2-errors-in-own-language" ["JSON-03", "ERR-02"] "The errorDescription of every error is in another language, with letters and signs beyond ASCII.";
-R2ErrorHintsGiven "r2-error-hints-given" ["ERR-02"] "Every error has an errorHint.";
-R2VendorReferences "r2-vendor-references" ["BP-02", "ERR-05"] "Every error begins its errorReferences with a key of the vendor.";
-R2InformationComesAndGoes "r2-information-comes-and-goes" ["INFO-01"] "An information entry of level DEBUG is in every other state.";
-R2LoadsMinimal "r2-loads-minimal" ["STATE-MSG-07"] "The loads name only loadId and loadType; the only load position, the dimensions and the weight are left out.";
-R2PositionMinimal "r2-position-minimal" ["STATE-MSG-05"] "agvPosition holds only what it must hold, no localizationScore.";
-R2VisualizationWithoutVelocity "r2-visualization-without-velocity" ["VIS-01"] "The visualization tells the position but no velocity.";
-R2KeepAliveTen "r2-keep-alive-ten" ["CONN-04"] "The keep-alive is 10 s.";
-R2OnlineAgain "r2-online-again" ["CONN-05", "CONN-10"] "The vehicle publishes ONLINE again with every tenth state.";
-R2FirstStateLate "r2-first-state-late" ["CONN-05", "STATE-02"] "The first state of a connection comes more than a second after ONLINE.";
-R2FactsheetBeforeOnline "r2-factsheet-before-online" ["CONN-05", "TOPIC-11"] "On connecting the vehicle publishes its factsheet before it says ONLINE.";
-R2FactsheetAfterState "r2-factsheet-after-state" ["TOPIC-11", "FACT-01"] "On connecting the vehicle publishes its factsheet after the first state.";
-R2SubscribesWithWildcard "r2-subscribes-with-wildcard" ["TOPIC-10"] "The vehicle subscribes with one topic filter that ends in a wildcard.";
-R2ClientIdChanges "r2-client-id-changes" ["MQTT-01", "CONN-11"] "The vehicle takes another MQTT client identifier at every connection.";
-R2TurnsTheLongWay "r2-turns-the-long-way" ["ORD-MSG-10", "ORD-MSG-24"] "The vehicle turns to an orientation the long way round.";
-R2OwnOrientationAtEnd "r2-own-orientation-at-end" ["ORD-MSG-10"] "On the last node of its base, where the order asks for no theta, the vehicle turns to an orientation of its own before it reports the node.";
-R2BacksUp "r2-backs-up" ["MAP-03", "ORD-MSG-22"] "Where an edge asks for no orientation the vehicle drives backwards to a node that lies behind it instead of turning.";
-R2AdoptsBeforeDriving "r2-adopts-before-driving" ["STATE-11", "STATE-03"] "The vehicle reports the adoption of an order or update in a state of its own, and its start in the next one at the same time.";
-R2PauseTakesTime "r2-pause-takes-time" ["ACT-12", "ACT-15", "ACT-41"] "startPause and stopPause are RUNNING for a moment, in which the vehicle goes on as before, and then FINISHED.";
-R2InitPositionTakesTime "r2-init-position-takes-time" ["ACT-23", "ACT-41"] "initPosition is RUNNING for a moment before the pose is taken over.";
-R2MapActionsTakeTime "r2-map-actions-take-time" ["MAP-24", "MAP-29", "ACT-41"] "enableMap and deleteMap are RUNNING for a moment before the maps change.";
-R2FailuresDescribed "r2-failures-described" ["STATE-MSG-12"] "Failed actions have a resultDescription that says why, beside the error.";
-R2LogNameInInformation "r2-log-name-in-information" ["ACT-27", "INFO-01"] "The name of the last log is in the information of the states instead of a resultDescription, which the factsheet does not announce either.";
-R2NodePositionsFromLayout "r2-node-positions-from-layout" ["STATE-MSG-13"] "The nodeStates give a nodePosition also where the order had none, from the layout of the vehicle.";
         R1IdleCancelErrorBrief "r1-idle-cancel-error-brief" ["ORD-CANCEL-19", "STATE-05"] "It reports noOrderToCancel in one state and takes it back at once.";
         R1OutdatedErrorBrief "r1-outdated-error-brief" ["ORD-REJ-12", "STATE-05"] "It reports an outdated update in one state and takes the warning back at once.";
         R1OwnErrorNames "r1-own-error-names" ["ORD-FLOW-01", "MAP-08", "ORD-REJ-15"] "It has names of its own for errors that the standard does not name.";
