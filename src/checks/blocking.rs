@@ -1,4 +1,4 @@
-//! `action/blocking`: the actions of a node, held against their blocking types and the sequence of their list.
+//! `action/blocking`: the actions of a node or an edge, held against their blocking types and the sequence of their list.
 //!
 //! That actions run at all, and where, is left to the tests and to `state_triggers`.
 
@@ -22,8 +22,8 @@ pub(super) const BLOCKING: Check = Check {
     decides: &["BLOCK-01", "BLOCK-03", "BLOCK-04", "BLOCK-05", "BLOCK-06"],
     doc: "Of the actions of one node, a HARD one runs beside no other, no action runs before one that stands in front \
           of it with a HARD one between or among them, and what may run in parallel is over before the next HARD one \
-          begins. While a SOFT or HARD action runs, driving is false. Running one after the other what may run in \
-          parallel is a liberty. Actions of edges, instant actions, and pick, drop and finePositioning, which move the \
+          begins. While a SOFT or HARD action of a node or an edge runs, driving is false. Running one after the other what may run in \
+          parallel is a liberty. The sequence of the actions of edges, instant actions, and pick, drop and finePositioning, which move the \
           vehicle themselves, are not held to this; another action than the one named `still` may move it, too, which \
           makes it a warning. Not judged after a cancelOrder, a change of mode, a fatal error or a failed action.",
     arguments: &["still"],
@@ -49,6 +49,8 @@ struct Listed<'s> {
     rank: usize,
     /// How many HARD actions stand in front of it there.
     hard_before: usize,
+    /// Whether it belongs to an edge.
+    on_edge: bool,
 }
 
 impl Listed<'_> {
@@ -77,8 +79,9 @@ impl Running for BlockingTypes {
         }
         let seq = entry.seq();
         let mut found = Vec::new();
-        for (at, one) in listed.iter().enumerate() {
-            for other in &listed[at + 1..] {
+        let of_nodes: Vec<&Listed<'_>> = listed.iter().filter(|action| !action.on_edge).collect();
+        for (at, one) in of_nodes.iter().enumerate() {
+            for other in &of_nodes[at + 1..] {
                 let (first, second) = if (one.sequence, one.rank) <= (other.sequence, other.rank) {
                     (one, other)
                 } else {
@@ -123,9 +126,12 @@ impl BlockingTypes {
                 .shown
                 .orders
                 .of(order)
-                .filter(|other| other.nodes.iter().any(|node| node.sequence == placed.sequence))
+                .filter(|other| {
+                    let mut all = other.nodes.iter().chain(&other.edges);
+                    all.any(|element| element.sequence == placed.sequence)
+                })
                 .all(|other| list(other) == own);
-            let blocking = placed.blocking.filter(|_| clear && !placed.on_edge)?;
+            let blocking = placed.blocking.filter(|_| clear)?;
             let rank = own.iter().position(|other| other.action == id)?;
             let hard_before = own[..rank]
                 .iter()
@@ -138,6 +144,7 @@ impl BlockingTypes {
                 sequence: placed.sequence,
                 rank,
                 hard_before: hard_before.count(),
+                on_edge: placed.on_edge,
             })
         })
         .collect()

@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::traffic::{Traffic, broken, device_publish, outside_influence, remark, says_broken, text};
+use super::traffic::{Traffic, broken, device_publish, lag, outside_influence, remark, says_broken, text};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -203,6 +203,14 @@ impl OnlineAfterConnect {
 impl Running for OnlineAfterConnect {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
+        if let Some(late) = lag(entry) {
+            // What the harness had no time for is not held against the device.
+            let sessions = self.open.iter_mut().filter_map(|session| session.first_state.as_mut());
+            let stale = self.stale.iter_mut().filter_map(|stale| stale.since.as_mut());
+            for since in sessions.map(|(since, _)| since).chain(stale) {
+                *since = *since + late;
+            }
+        }
         if outside_influence(entry) || matches!(entry.event(), Event::Fault { .. }) {
             for session in &mut self.open {
                 session.first_state = None;
@@ -291,6 +299,16 @@ mod tests {
         trace.connected(1).publish(1, "state", 0, false, &json!({})).wait(10.0);
         assert!(trace.judge(CHECK).findings.is_empty());
         trace.wait(30.0);
+        assert_eq!(trace.judge(CHECK).summary(), ["CONN-05"]);
+    }
+
+    #[test]
+    fn what_the_harness_was_late_by_does_not_count() {
+        let mut trace = Trace::tap();
+        trace.connected(1).publish(1, "state", 0, false, &json!({})).wait(20.0);
+        trace.late(10.0).wait(20.0);
+        assert!(trace.judge(CHECK).findings.is_empty());
+        trace.wait(5.0);
         assert_eq!(trace.judge(CHECK).summary(), ["CONN-05"]);
     }
 

@@ -6,10 +6,9 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
+use super::continuity::Continuity;
 use super::orders::number;
-use super::traffic::{
-    Traffic, actions, broken, elements, is_to_vehicle, maybe_restarted, outside_influence, state, text, to_vehicle,
-};
+use super::traffic::{Traffic, actions, broken, elements, is_to_vehicle, outside_influence, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -22,7 +21,8 @@ pub(super) const PERSIST: Check = Check {
     decides: &["ORD-REJ-03", "ORD-REJ-08"],
     doc: "A validationError or orderError warning that answers an order is listed in every state until the vehicle \
           shows another orderId or orderUpdateId. Errors that answer an instant action are not held to this, and a \
-          restart or a change of operating mode ends the watch.",
+          restart or a change of operating mode ends the watch; a cut of the link by the harness does not, as long as the \
+          vehicle counts its headerId on.",
     arguments: &[],
     start: |_| Box::new(Persist::default()),
 };
@@ -30,6 +30,7 @@ pub(super) const PERSIST: Check = Check {
 #[derive(Default)]
 struct Persist {
     traffic: Traffic,
+    life: Continuity,
     /// Whether the last thing sent to the vehicle was an order.
     after_order: bool,
     /// Whether no state has come since the last instant action.
@@ -57,7 +58,7 @@ impl Running for Persist {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.sent(entry, context);
-        if outside_influence(entry) || maybe_restarted(self.traffic, entry, context) {
+        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
             self.watched.clear();
             self.shown = None;
         }

@@ -7,9 +7,19 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, quote, remark, text};
+use super::traffic::{Traffic, broken, elements, quote, remark, show, text};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
+
+/// `factsheet/limits`.
+pub(super) const LIMITS: Check = Check {
+    name: "factsheet/limits",
+    decides: &["FACT-05"],
+    doc: "Each member of maxStringLens and maxArrayLens is a number under its literal name, which for arrays has a dot: what \
+          comes before the dot is no object that holds the numbers. Members of other names are not judged.",
+    arguments: &[],
+    start: |_| Box::new(Limits::default()),
+};
 
 /// How many elements of a list are looked at.
 const ELEMENTS: usize = 256;
@@ -88,6 +98,52 @@ impl Running for Consistency {
     }
 }
 
+/// What the literal names with a dot begin with.
+const FIRST_PARTS: [&str; 13] = [
+    "order",
+    "node",
+    "edge",
+    "actions",
+    "instantActions",
+    "trajectory",
+    "state",
+    "error",
+    "errors",
+    "information",
+    "topic",
+    "msg",
+    "id",
+];
+
+#[derive(Default)]
+struct Limits {
+    traffic: Traffic,
+}
+
+impl Running for Limits {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let message = self.traffic.delivered(entry, context);
+        if message.is_none_or(|message| message.name != "factsheet") {
+            return false;
+        }
+        let limits = entry.json().and_then(|sheet| sheet.get("protocolLimits"));
+        let mut judged = false;
+        for name in ["maxStringLens", "maxArrayLens"] {
+            let members = limits.and_then(|limits| limits.get(name)?.as_object());
+            for (key, value) in members.into_iter().flatten().take(ELEMENTS) {
+                judged = true;
+                // A manufacturer may add members of any kind.
+                if (value.is_object() || value.is_array()) && FIRST_PARTS.contains(&key.as_str()) {
+                    let text = format!("{name}.{} holds {}, which is no number", quote(key), show(value));
+                    findings.push(broken("FACT-05", entry.seq(), text));
+                }
+            }
+        }
+        judged
+    }
+}
+
 type Point = (f64, f64);
 
 /// Whether two sides that are no neighbours cross. The last point is joined to the first, repeated or not.
@@ -153,5 +209,16 @@ mod tests {
             judged(&json!({ "physicalParameters": { "speedMin": 2.0, "speedMax": 1.0 } })),
             ["FACT-04 warning"]
         );
+    }
+
+    #[test]
+    fn limits_are_numbers_under_names_with_a_dot() {
+        let judge = |arrays: serde_json::Value| {
+            let mut trace = Trace::subscriber();
+            trace.message("factsheet", &json!({ "protocolLimits": { "maxArrayLens": arrays } }));
+            trace.judge("factsheet/limits").summary()
+        };
+        assert!(judge(json!({ "order.nodes": 100 })).is_empty());
+        assert_eq!(judge(json!({ "order": { "nodes": 100 } })), ["FACT-05"]);
     }
 }

@@ -18,7 +18,7 @@ pub(super) const ID_RISES: Check = Check {
     decides: &["HDR-02"],
     doc: "headerId is a whole number from 0 to 4294967295 that rises by one with each message of a topic. Any start \
           value and a restart of the count after a new connection are accepted, but one after a link that only the \
-          harness has broken is a warning; the last will is exempt. At the tap \
+          harness has broken is a warning, and so is one count for the topics of all vehicles; the last will is exempt. At the tap \
           the PUBLISH packets count; a subscriber cannot tell a gap from a lost message, which is inconclusive.",
     arguments: &[],
     start: |_| Box::new(IdRises::default()),
@@ -56,6 +56,8 @@ impl Running for IdRises {
             }
             _ => {}
         }
+        // The id before this one on the topics of that name, whatever vehicle they are for.
+        let shared = context.shared.fleet.borrow().before(entry.seq());
         let Some(message) = self.traffic.published(entry, context) else {
             return false;
         };
@@ -92,7 +94,10 @@ impl Running for IdRises {
             return true;
         }
         let text = format!("headerId {id} follows {before} on {}", message.name);
-        if self.traffic.tap || (again && id > 1) {
+        if shared.is_some_and(|last| last != before && id == last.wrapping_add(1)) {
+            let text = format!("{text}: the topics of all vehicles are counted together");
+            findings.push(remark("HDR-02", entry.seq(), text));
+        } else if self.traffic.tap || (again && id > 1) {
             findings.push(broken("HDR-02", entry.seq(), text));
         } else if again || id < before {
             findings.push(unclear(
@@ -141,7 +146,8 @@ mod tests {
     use serde_json::json;
 
     use super::super::trace::Trace;
-    use crate::journal::event::LinkFault;
+    use crate::journal::Payload;
+    use crate::journal::event::{Direction, LinkFault, Packet};
 
     const CHECK: &str = "header/id-rises";
 
@@ -224,5 +230,32 @@ mod tests {
         trace.fault(LinkFault::Restore);
         trace.publish(1, "state", 0, false, &json!({ "headerId": 11 }));
         assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
+    fn each_topic_has_a_count_of_its_own() {
+        let judged = |ids: [u32; 4]| {
+            let mut trace = Trace::master_control_at_tap();
+            trace.connect(1, None, 15, 4);
+            for (at, id) in ids.into_iter().enumerate() {
+                let own = trace.topic("order");
+                let mut levels: Vec<&str> = own.split('/').collect();
+                if at % 2 == 1 {
+                    levels[3] = "another";
+                }
+                let packet = Packet::Publish {
+                    topic: levels.join("/"),
+                    qos: 0,
+                    retain: false,
+                    dup: false,
+                    packet_id: None,
+                    payload: Payload::keep(bytes::Bytes::from(json!({ "headerId": id }).to_string())),
+                };
+                trace.packet(1, Direction::FromDevice, packet);
+            }
+            trace.judge(CHECK).summary()
+        };
+        assert!(judged([0, 0, 1, 1]).is_empty());
+        assert_eq!(judged([0, 1, 3, 4]), ["HDR-02"]);
     }
 }

@@ -78,7 +78,7 @@ struct Schema {
     traffic: Traffic,
     /// The member names of each topic's messages.
     members: BTreeMap<String, Vec<String>>,
-    /// The same of what is inside of commands: topic and path.
+    /// The same of what is inside of messages: topic and path.
     inner: Vec<(&'static str, &'static [&'static str], Vec<String>)>,
     malformed: Malformed,
     /// An angle beyond pi by what single precision does to it was remarked on.
@@ -100,11 +100,17 @@ const OF_ORDER: [&str; 8] = [
 /// Pi and what single precision, or seven digits, make of it.
 const PI_IN_SINGLE_PRECISION: f64 = std::f64::consts::PI + 5.0e-7;
 
-/// Whether a number is out of range by no more than single precision explains.
+/// Whether a number is out of range by no more than single precision explains, or is pi as far as it is written: 3.142,
+/// 3.1416.
 fn is_rounded_pi(finding: &Finding, value: &Value) -> bool {
     let number = value.pointer(&finding.path).and_then(Value::as_f64);
     finding.kind == FindingKind::Range
-        && number.is_some_and(|number| (3.0..=PI_IN_SINGLE_PRECISION).contains(&number.abs()))
+        && number.is_some_and(|number| {
+            let shown = number.abs().to_string();
+            let digits = shown.split_once('.').map_or(0, |(_, digits)| digits.len());
+            let is_written_so = digits >= 3 && format!("{:.digits$}", std::f64::consts::PI) == shown;
+            is_written_so || (3.0..=PI_IN_SINGLE_PRECISION).contains(&number.abs())
+        })
 }
 
 impl Schema {
@@ -147,8 +153,15 @@ impl Schema {
     }
 }
 
-/// What is inside of commands and has members of its own.
-const INNER: [(&str, &[&str]); 9] = [
+/// What is inside of messages and has members of its own.
+const INNER: [(&str, &[&str]); 16] = [
+    ("state", &["safetyState"]),
+    ("state", &["batteryState"]),
+    ("state", &["agvPosition"]),
+    ("state", &["velocity"]),
+    ("state", &["errors"]),
+    ("visualization", &["agvPosition"]),
+    ("visualization", &["velocity"]),
     ("order", &["nodes"]),
     ("order", &["nodes", "nodePosition"]),
     ("order", &["nodes", "actions"]),
@@ -210,7 +223,7 @@ impl Running for Schema {
             }
             if is_rounded_pi(&finding, value) {
                 if !std::mem::replace(&mut self.rounded, true) {
-                    let text = format!("{topic}{}: {}, by single precision", finding.path, finding.message);
+                    let text = format!("{topic}{}: {}, by rounding", finding.path, finding.message);
                     findings.push(remark("JSON-10", seq, text));
                 }
                 continue;
@@ -219,6 +232,7 @@ impl Running for Schema {
             for id in requirements(topic, &finding, value) {
                 findings.push(broken(id, seq, text.clone()));
             }
+            deep_misspelling(topic, &finding, value, seq, findings);
         }
         self.misspelled(topic, value, seq, findings);
         let physical = value.get("physicalParameters").filter(|_| topic == "factsheet");
@@ -227,6 +241,28 @@ impl Running for Schema {
             findings.push(remark("FACT-04", seq, text));
         }
         true
+    }
+}
+
+/// A member that is missing further inside, and stands there in another spelling.
+fn deep_misspelling(topic: &str, finding: &Finding, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
+    let Some((inside, name)) = finding.path.rsplit_once('/').filter(|(inside, _)| !inside.is_empty()) else {
+        return;
+    };
+    let path: Vec<&str> = inside
+        .split('/')
+        .skip(1)
+        .filter(|part| part.parse::<u32>().is_err())
+        .collect();
+    // Those are looked through anyway.
+    if finding.kind != FindingKind::Missing || INNER.contains(&(topic, &path[..])) {
+        return;
+    }
+    let members = value.pointer(inside).and_then(Value::as_object);
+    let mut members = members.into_iter().flatten().map(|(member, _)| member);
+    if let Some(other) = members.find(|other| other.len() < 64 && plain(other) == plain(name)) {
+        let text = format!("member {} on {topic} is spelled {name:?}", quote(other));
+        findings.push(broken("JSON-01", seq, text));
     }
 }
 

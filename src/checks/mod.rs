@@ -8,27 +8,46 @@
 //! stale, and tests send broken messages on purpose. Memory is bounded whatever a device sends.
 
 mod blocking;
+mod cancel_course;
 mod commands;
 mod connection;
 mod connection_crash;
+mod connection_offline;
+mod continuity;
 mod errors;
+mod errors_blame;
 mod errors_event;
 mod errors_ready;
 mod factsheet;
 mod factsheet_actions;
+mod factsheet_network;
 mod fleet;
+mod fleet_heard;
+mod fleet_orders;
+mod fleet_seen;
 mod header;
 mod header_id;
+mod instant_answers;
+mod instant_queued;
+mod instant_requests;
+mod linked_state;
 mod message;
 mod motion;
+mod motion_signs;
 mod mqtt;
 mod orders;
+mod state_action_ids;
 mod state_actions;
 mod state_battery;
 mod state_bursts;
 mod state_driving;
+mod state_known;
+mod state_loads;
+mod state_map_changes;
 mod state_maps;
+mod state_node_positions;
 mod state_order;
+mod state_pause_stands;
 mod state_paused;
 mod state_period;
 mod state_place;
@@ -46,9 +65,12 @@ mod visualization;
 mod visualization_pose;
 
 use std::cell::RefCell;
+use std::rc::Rc;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
+
+pub(crate) use fleet_seen::FleetSeen;
 
 use crate::journal::Entry;
 use crate::pack::{Pack, RequirementId, Role};
@@ -78,6 +100,18 @@ pub struct CheckContext<'a> {
 #[derive(Default)]
 pub struct Shared {
     walked: RefCell<motion::Walked>,
+    /// What came to the other vehicles as well; nothing for a check in a test.
+    fleet: Rc<RefCell<FleetSeen>>,
+}
+
+impl Shared {
+    /// For the monitors of one vehicle of a fleet.
+    pub(crate) fn of_fleet(fleet: &Rc<RefCell<FleetSeen>>) -> Self {
+        Self {
+            fleet: Rc::clone(fleet),
+            ..Self::default()
+        }
+    }
 }
 
 impl std::fmt::Debug for Shared {
@@ -158,6 +192,8 @@ static REGISTRY: &[Check] = &[
     message::SCHEMA,
     message::ENCODING,
     fleet::COMMANDED,
+    fleet_orders::OWN_ORDERS,
+    fleet_heard::EACH_HEARD,
     header_id::ID_RISES,
     header::TIMESTAMP,
     header::IDENTITY,
@@ -171,22 +207,39 @@ static REGISTRY: &[Check] = &[
     connection::ONLINE_AFTER_CONNECT,
     connection::VALUES,
     connection_crash::STAYS,
+    connection_offline::SAYS_OFFLINE,
     state_period::PERIOD,
     state_period::OWN_LIMITS,
     state_bursts::BURSTS,
+    state_action_ids::ACTION_IDS,
     state_actions::TRANSITIONS,
     state_actions::KEPT,
     state_order::ORDER_KEPT,
+    state_known::ORDER_KNOWN,
+    state_known::UPDATE_ID_RISES,
+    state_known::NOT_REPLACED,
     state_predefined::STATUSES,
     state_predefined::RESULTS,
+    linked_state::LINKED_STATE,
+    cancel_course::COURSE,
+    instant_answers::ANSWERED,
+    instant_answers::TOGETHER,
+    instant_answers::BEGINS,
+    instant_answers::SCOPE,
+    instant_queued::NOT_QUEUED,
+    instant_requests::REQUESTS_MET,
     state_route::REMAINING_ROUTE,
     state_route::LAST_NODE,
+    state_node_positions::NODE_POSITIONS,
+    state_node_positions::JOINT_POSITION,
     state_triggers::TRIGGERS,
     blocking::BLOCKING,
     state_paused::PAUSED,
+    state_pause_stands::PAUSE_STANDS,
     state_place::LAST_NODE_PLACE,
     state_values::IDLE_EMPTY,
     state_maps::MAPS,
+    state_map_changes::MAP_CHANGES,
     state_values::POSITION_RANGE,
     state_values::IDENTIFIERS,
     state_driving::DRIVING,
@@ -195,14 +248,18 @@ static REGISTRY: &[Check] = &[
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
     state_battery::LEVELS,
+    state_loads::LOADS,
     visualization::RATE,
     visualization::PUBLISHED,
     visualization_pose::POSITION,
     errors::PERSIST,
     errors_ready::READY,
     errors_event::ON_EVENT,
+    errors_blame::BLAME,
     factsheet::CONSISTENCY,
+    factsheet::LIMITS,
     factsheet_actions::PREDEFINED,
+    factsheet_network::NETWORK,
     motion::EDGE_SPEED,
     motion::EDGE_ROTATION_SPEED,
     motion::EDGE_ORIENTATION,
@@ -216,6 +273,8 @@ static REGISTRY: &[Check] = &[
     motion::NODE_THETA,
     motion::AXES,
     motion::VELOCITY_SIGN,
+    motion_signs::VELOCITY_AXES,
+    motion_signs::TURN_SIGN,
     motion::MODE_SPEED,
     commands::NODES_AND_EDGES,
     commands::RELEASED,
@@ -253,12 +312,16 @@ static REGISTRY: &[Check] = &[
     commands::ENABLED,
     commands::DOWNLOADS,
     commands::DUPLICATES,
+    commands::ON_BOARD,
     commands::MODES,
     commands::NOT_ASKED,
+    commands::ON_INFORMATION,
     commands::FIRST_PLACE,
     commands::HEALTH,
     commands::ALIVE,
     commands::LISTENS,
+    commands::AWAY,
+    commands::CONTRADICTS,
 ];
 
 #[cfg(test)]

@@ -280,11 +280,30 @@ pub(super) fn last_node(state: &Value) -> Option<(String, u64)> {
 /// Whether a state reports something that may end an order without a word: another operating mode than the
 /// automatic ones, an emergency stop (a word that is none of the standard is neither, and a finding of its own), a fatal error, or a failed action.
 pub(super) fn may_abandon(state: &Value) -> bool {
+    may_abandon_beside(state, &[])
+}
+
+/// The same where these errors are known not to hold the vehicle.
+pub(super) fn may_abandon_beside(state: &Value, borne: &[Value]) -> bool {
+    let failed = elements(state, "actionStates").any(|action| text(action, "actionStatus") == "FAILED");
+    failed || is_taken_out_beside(state, borne)
+}
+
+/// The errors of a state that ask for a person.
+pub(super) fn fatal_errors(state: &Value) -> impl Iterator<Item = &Value> {
+    elements(state, "errors").filter(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"))
+}
+
+/// The same without failed actions: whatever is left of the order is still to be seen then.
+pub(super) fn is_taken_out(state: &Value) -> bool {
+    is_taken_out_beside(state, &[])
+}
+
+fn is_taken_out_beside(state: &Value, borne: &[Value]) -> bool {
     let manual = matches!(text(state, "operatingMode"), "MANUAL" | "SERVICE" | "TEACHIN");
     let stopped = state
         .pointer("/safetyState/eStop")
         .is_some_and(|stop| matches!(stop.as_str(), Some("AUTOACK" | "MANUAL" | "REMOTE")));
-    let fatal = elements(state, "errors").any(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"));
-    let failed = elements(state, "actionStates").any(|action| text(action, "actionStatus") == "FAILED");
-    manual || stopped || fatal || failed
+    let fatal = fatal_errors(state).any(|error| !borne.contains(error));
+    manual || stopped || fatal
 }

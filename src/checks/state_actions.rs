@@ -2,14 +2,13 @@
 //!
 //! When an action has to start or end is left to the tests.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 
 use serde_json::Value;
 
+use super::continuity::Continuity;
 use super::orders::number;
-use super::traffic::{
-    Traffic, actions, broken, elements, maybe_restarted, outside_influence, quote, remark, state, text, to_vehicle,
-};
+use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::pack::Pack;
@@ -140,10 +139,13 @@ impl Running for Transitions {
 struct Kept {
     graph: Graph,
     traffic: Traffic,
+    life: Continuity,
     order: Option<(String, u64)>,
     listed: HashMap<String, String>,
     /// actionIds of cancelOrder actions seen on their way to the vehicle.
     cancels: Vec<String>,
+    /// actionIds of all instant actions: they are none of a cancelled order's.
+    instant: VecDeque<String>,
     /// The limit of the factsheet; zero is none.
     limit: usize,
 }
@@ -152,10 +154,14 @@ impl Running for Kept {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         // A restarted vehicle may have forgotten everything; what it keeps over a restart is not ruled.
-        if outside_influence(entry) || maybe_restarted(self.traffic, entry, context) {
+        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
             self.listed.clear();
         }
         if let Some(message) = to_vehicle("instantActions", entry, context) {
+            let all = actions(message).map(|action| text(action, "actionId").to_owned());
+            self.instant.extend(all.take(ACTIONS));
+            let excess = self.instant.len().saturating_sub(ACTIONS);
+            self.instant.drain(..excess);
             let cancels = actions(message).filter(|action| text(action, "actionType") == "cancelOrder");
             self.cancels
                 .extend(cancels.map(|action| text(action, "actionId").to_owned()));
@@ -221,7 +227,7 @@ impl Kept {
             findings.push(remark("STATE-MSG-10", seq, text));
             return;
         }
-        if cancelled && !self.cancels.iter().any(|cancel| cancel == id) {
+        if cancelled && !self.instant.iter().any(|instant| instant == id) {
             findings.push(broken("ORD-CANCEL-12", seq, text.clone()));
         }
         if !self.graph.terminal(status) {
@@ -351,6 +357,18 @@ mod tests {
             trace.judge("state/action-states-kept").summary(),
             ["ORD-CANCEL-12", "STATE-MSG-10"]
         );
+    }
+
+    #[test]
+    fn an_instant_action_that_vanishes_is_none_of_the_cancelled_order() {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&actions(&[("a", "RUNNING")]))
+            .instant("stopPause", "p", &json!([]))
+            .instant("cancelOrder", "x", &json!([]))
+            .state(&actions(&[("a", "FAILED"), ("p", "FINISHED"), ("x", "FINISHED")]))
+            .state(&actions(&[("a", "FAILED"), ("x", "FINISHED")]));
+        assert_eq!(trace.judge("state/action-states-kept").summary(), ["STATE-MSG-10"]);
     }
 
     #[test]

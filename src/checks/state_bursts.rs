@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::traffic::{HEADER, Traffic, broken, is_to_vehicle, outside_influence, state, text};
+use super::traffic::{HEADER, Traffic, broken, is_to_vehicle, lag, outside_influence, state, text};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -51,7 +51,7 @@ impl Running for Bursts {
         let asked = ["order", "instantActions"]
             .iter()
             .any(|name| is_to_vehicle(name, entry, context));
-        if asked || outside_influence(entry) || self.traffic.disturbed {
+        if asked || outside_influence(entry) || lag(entry).is_some() || self.traffic.disturbed {
             self.equal.clear();
         }
         let Some(state) = state(self.traffic, entry, context).filter(|_| !self.traffic.disturbed) else {
@@ -109,6 +109,18 @@ mod tests {
     fn states_that_say_something_or_take_their_time_are_right() {
         assert!(states(0.01, true).judge("state/bursts").summary().is_empty());
         assert!(states(0.1, false).judge("state/bursts").summary().is_empty());
+    }
+
+    #[test]
+    fn what_waited_for_the_harness_is_no_burst() {
+        let mut trace = Trace::subscriber();
+        for _ in 0..3 {
+            trace.late(0.3);
+            for _ in 0..4 {
+                trace.state(&json!({}));
+            }
+        }
+        assert!(trace.judge("state/bursts").summary().is_empty());
     }
 
     #[test]

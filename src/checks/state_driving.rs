@@ -22,6 +22,10 @@ const MOVED: f64 = 0.1;
 const STILL: f64 = 0.01;
 /// States further apart may leave out a stop, or a drive, between them.
 const CLOSE: Duration = Duration::from_secs(2);
+/// States closer together than this may be of one cycle of the vehicle, and prove as little as one alone.
+const ONE_CYCLE: Duration = Duration::from_millis(200);
+/// Faster than this no vehicle drives, in metres per second: it has found out that it is elsewhere.
+const JUMP: f64 = 20.0;
 /// So long a vehicle may say that it drives while it stands and has nowhere to go.
 const COMING_TO_REST: Duration = Duration::from_secs(10);
 /// Nodes that lie less far apart say nothing of a position, in metres.
@@ -134,7 +138,10 @@ fn has_nowhere_to_go(state: &Value) -> bool {
 #[derive(Default)]
 struct Driving {
     traffic: Traffic,
-    suspicious: bool,
+    /// Since when each state shows a velocity without `driving`.
+    suspicious: Option<Moment>,
+    /// When something else than driving last set the position.
+    displaced: Option<Moment>,
     /// The last states that said they stand: time and pose, and how often it moved from one to the next.
     standing: Option<(Moment, Pose)>,
     moves: u32,
@@ -158,7 +165,11 @@ impl Driving {
         }
         self.resting = None;
         let before = self.standing.replace((now, pose.clone()));
-        let moved = before.is_some_and(|(at, before)| now.since(at) <= CLOSE && before.moved(&pose));
+        let moved = before.is_some_and(|(at, before)| {
+            let apart = now.since(at);
+            let jumped = before.apart(&pose).0 > JUMP * apart.as_secs_f64().max(ONE_CYCLE.as_secs_f64());
+            apart <= CLOSE && !jumped && before.moved(&pose)
+        });
         self.moves = if moved { self.moves + 1 } else { 0 };
         if self.moves >= 2 {
             self.moves = 0;
@@ -193,12 +204,20 @@ impl Driving {
 impl Running for Driving {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
+        let now = entry.at().moment;
         if is_displaced(entry, context) {
             self.forget();
+            self.displaced = Some(now);
         }
         let Some(state) = state(self.traffic, entry, context) else {
             return false;
         };
+        // A vehicle may be slow to take a new place over.
+        let patience = context.time("react").unwrap_or(COMING_TO_REST);
+        if self.displaced.is_some_and(|since| now.since(since) < patience) {
+            self.forget();
+            return false;
+        }
         self.by_position(state, entry, findings);
         let Some(velocity) = state.get("velocity") else {
             return Pose::of(state).is_some();
@@ -206,11 +225,14 @@ impl Running for Driving {
         let speed = |name| velocity.get(name).and_then(Value::as_f64).unwrap_or_default().abs();
         let moving = ["vx", "vy", "omega"].into_iter().any(|name| speed(name) > MOVING);
         let suspicious = moving && state.get("driving") == Some(&Value::Bool(false));
-        if suspicious && self.suspicious {
-            let text = format!("driving is false at velocity {}", show(velocity));
-            findings.push(broken("STATE-MSG-08", entry.seq(), text));
+        match self.suspicious {
+            Some(since) if suspicious && now.since(since) >= ONE_CYCLE => {
+                let text = format!("driving is false at velocity {}", show(velocity));
+                findings.push(broken("STATE-MSG-08", entry.seq(), text));
+            }
+            Some(_) if suspicious => {}
+            _ => self.suspicious = suspicious.then_some(now),
         }
-        self.suspicious = suspicious;
         true
     }
 }

@@ -6,8 +6,9 @@ use std::collections::VecDeque;
 
 use serde_json::Value;
 
+use super::continuity::Continuity;
 use super::orders::number;
-use super::traffic::{Traffic, broken, maybe_restarted, outside_influence, quote, state, text, to_vehicle};
+use super::traffic::{Traffic, actions, broken, outside_influence, quote, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -17,10 +18,11 @@ const ORDERS: usize = 64;
 /// See the module.
 pub(super) const ORDER_KEPT: Check = Check {
     name: "state/order-kept",
-    decides: &["STATE-MSG-02"],
-    doc: "orderId is not emptied, and orderUpdateId does not go back, as long as no new order was sent. Judged in \
-          modes in which master control is in command; a restart and what a person or a hook did in between are \
-          forgiven.",
+    decides: &["STATE-MSG-02", "ORD-CANCEL-08"],
+    doc: "orderId is not emptied, and orderUpdateId does not go back, as long as no new order was sent, neither after a \
+          cancellation. Judged in modes in which master control is in command; a restart and what a person or a hook did \
+          in between are forgiven; a cut of the link by the harness is no restart, as long as the vehicle counts its \
+          headerId on.",
     arguments: &[],
     start: |_| Box::new(OrderKept::default()),
 };
@@ -28,7 +30,10 @@ pub(super) const ORDER_KEPT: Check = Check {
 #[derive(Default)]
 struct OrderKept {
     traffic: Traffic,
+    life: Continuity,
     shown: Option<(String, u64)>,
+    /// orderId that a cancelOrder was sent for.
+    cancelled: Option<String>,
     /// orderId and orderUpdateId of the latest orders seen on their way to the vehicle.
     sent: VecDeque<(String, u64)>,
 }
@@ -37,8 +42,13 @@ impl Running for OrderKept {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         // What is kept over a restart is not ruled, nor what a person does to the order.
-        if outside_influence(entry) || maybe_restarted(self.traffic, entry, context) {
+        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
             self.shown = None;
+        }
+        let cancels = to_vehicle("instantActions", entry, context)
+            .is_some_and(|message| actions(message).any(|action| text(action, "actionType") == "cancelOrder"));
+        if cancels {
+            self.cancelled = self.shown.as_ref().map(|shown| shown.0.clone());
         }
         if let Some(order) = to_vehicle("order", entry, context) {
             self.sent.push_back(named(order));
@@ -68,7 +78,9 @@ impl Running for OrderKept {
                 "orderId was {} and is empty, although no new order came",
                 quote(&before.0)
             );
-            findings.push(broken("STATE-MSG-02", entry.seq(), text));
+            let cancelled = self.cancelled.as_ref() == Some(&before.0);
+            let requirement = if cancelled { "ORD-CANCEL-08" } else { "STATE-MSG-02" };
+            findings.push(broken(requirement, entry.seq(), text));
         } else if now.0 == before.0 && now.1 < before.1 && !self.sent.contains(&now) {
             let text = format!(
                 "orderUpdateId of order {} was {} and is {}, although no such order came",
@@ -92,6 +104,7 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::super::trace::Trace;
+    use crate::journal::event::LinkFault;
 
     fn shows(id: &str, update: u64, mode: &str) -> Value {
         json!({ "orderId": id, "orderUpdateId": update, "operatingMode": mode })
@@ -140,6 +153,27 @@ mod tests {
     fn what_a_person_does_with_it_is_not_judged() {
         assert!(judge(&[("a", 1, "AUTOMATIC"), ("", 0, "MANUAL"), ("", 0, "AUTOMATIC")]).is_empty());
         assert!(judge(&[("a", 1, "AUTOMATIC"), ("a", 1, "MANUAL"), ("", 0, "AUTOMATIC")]).is_empty());
+    }
+
+    #[test]
+    fn an_order_that_is_forgotten_over_a_cut_of_ours_is_found() {
+        let over_a_cut = |cancelled: bool| {
+            let mut trace = Trace::tap();
+            trace.connected(1).state(&shows("a", 1, "AUTOMATIC"));
+            if cancelled {
+                trace.instant("cancelOrder", "x", &json!([]));
+            }
+            trace
+                .state(&shows("a", 1, "AUTOMATIC"))
+                .fault(LinkFault::Cut { reset: false })
+                .closed(1);
+            trace.fault(LinkFault::Restore);
+            trace.connect(2, None, 15, 4);
+            trace.state(&shows("", 0, "AUTOMATIC"));
+            trace.judge("state/order-kept").summary()
+        };
+        assert_eq!(over_a_cut(false), ["STATE-MSG-02"]);
+        assert_eq!(over_a_cut(true), ["ORD-CANCEL-08"]);
     }
 
     #[test]

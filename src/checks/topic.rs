@@ -12,11 +12,13 @@ use super::traffic::{Traffic, broken, device_publish, quote, remark};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::Event;
+use crate::journal::event::{Event, Packet};
 use crate::pack::Role;
 
 /// How many different topics are remembered; a device that invents more is judged on the first ones.
 const TOPICS: usize = 64;
+/// How many order messages are remembered.
+const ORDERS: usize = 1024;
 
 /// `topic/names`.
 pub(super) const NAMES: Check = Check {
@@ -24,7 +26,8 @@ pub(super) const NAMES: Check = Check {
     decides: &["TOPIC-01", "TOPIC-02", "TOPIC-03"],
     doc: "The last level of a protocol topic is spelled exactly as defined. Topics whose last level is no variant of \
           a defined name are the vendor's own and not judged, unless what belongs on a defined one is published there \
-          and, for thirty seconds, never where it belongs. Where only the levels before the name differ, that is a warning.",
+          and, for thirty seconds, never where it belongs. An order of a master control belongs on its topic by its \
+          orderId and orderUpdateId, an instant action by its actionId. Where only the levels before the name differ, that is a warning.",
     arguments: &[],
     start: |_| Box::new(Names::default()),
 };
@@ -43,7 +46,8 @@ pub(super) const STRUCTURE: Check = Check {
 pub(super) const OWN_SIDE: Check = Check {
     name: "topic/own-side",
     decides: &["TOPIC-15"],
-    doc: "The device publishes only on the topics of its own side. Only the tap knows who published.",
+    doc: "The device publishes only on the topics of its own side, and has no last will on one of the other side. Only the \
+          tap knows who published.",
     arguments: &[],
     start: |_| Box::new(OwnSide::default()),
 };
@@ -67,6 +71,40 @@ struct Names {
     proper: BTreeSet<String>,
     /// What looks like a message of ours on a topic of another name: by name, where, entry, time, and how often.
     astray: BTreeMap<&'static str, (String, u64, Moment, u32)>,
+    /// What a master control has published where it belongs.
+    orders: BTreeSet<Sent>,
+    /// What it has published elsewhere below the levels of the vehicle only: where, entry, time.
+    strays: BTreeMap<Sent, (String, u64, Moment)>,
+}
+
+/// What tells a message of a master control wherever it is published.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Sent {
+    /// orderId and orderUpdateId.
+    Order(String, u64),
+    /// The actionId of its first instant action.
+    Instant(String),
+}
+
+impl Sent {
+    fn read(message: &Value) -> Option<Self> {
+        let short = |value: &Value| -> Option<String> { Some(value.as_str()?.chars().take(256).collect()) };
+        if message.get("nodes").is_some_and(Value::is_array) {
+            let update = message.get("orderUpdateId").and_then(Value::as_u64)?;
+            return Some(Self::Order(short(message.get("orderId")?)?, update));
+        }
+        let action = message.get("actions")?.as_array()?.first()?;
+        let kind = action.get("actionType").is_some_and(Value::is_string);
+        Some(Self::Instant(short(action.get("actionId")?)?)).filter(|_| kind && message.get("headerId").is_some())
+    }
+
+    /// The topic where it belongs.
+    fn topic(&self) -> &'static str {
+        match self {
+            Self::Order(..) => "order",
+            Self::Instant(_) => "instantActions",
+        }
+    }
 }
 
 /// Members that tell a message of a vehicle wherever it is published.
@@ -86,21 +124,81 @@ pub(super) fn looks_like(message: &Value) -> Option<&'static str> {
         .map(|(name, _)| name)
 }
 
+/// A topic whose last level is spelled almost as that of the visualization, which has no members of its own to be told by.
+fn almost(topic: &str) -> Option<&'static str> {
+    const NAME: &str = "visualization";
+    let last = plain(topic.rsplit('/').next().unwrap_or_default());
+    let same = |pairs: &mut dyn Iterator<Item = (char, char)>| pairs.take_while(|(one, other)| one == other).count();
+    let front = same(&mut last.chars().zip(NAME.chars()));
+    let back = same(&mut last.chars().rev().zip(NAME.chars().rev()));
+    (last != NAME && last.len().abs_diff(NAME.len()) <= 2 && front + back + 2 >= NAME.len()).then_some(NAME)
+}
+
 impl Names {
     /// Notes where the device publishes what.
     fn note(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
-        if context.role != Role::Agv || topic.len() > 1024 {
+        if topic.len() > 1024 {
+            return;
+        }
+        if context.role == Role::MasterControl {
+            self.note_order(topic, entry, context);
             return;
         }
         if let Some(name) = context.topic_name(topic) {
             self.proper.insert(name.to_owned());
             return;
         }
-        let Some(name) = entry.json().and_then(looks_like) else {
+        let Some(name) = entry.json().and_then(looks_like).or_else(|| almost(topic)) else {
             return;
         };
         let first = || (topic.to_owned(), entry.seq(), entry.at().moment, 0);
         self.astray.entry(name).or_insert_with(first).3 += 1;
+    }
+
+    /// Notes where a master control publishes its orders and instant actions.
+    fn note_order(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
+        let Some(key) = entry.json().and_then(Sent::read) else {
+            return;
+        };
+        let belongs = key.topic();
+        if context.topic_name(topic) == Some(belongs) {
+            self.strays.remove(&key);
+            if self.orders.len() == ORDERS {
+                self.orders.pop_first();
+            }
+            self.orders.insert(key);
+            return;
+        }
+        let above = |topic: &str| topic.rsplit_once('/').map(|(above, _)| above.to_owned());
+        let beside = context
+            .topics
+            .get(belongs)
+            .is_some_and(|usual| above(usual) == above(topic));
+        if beside && context.topic_name(topic).is_none() && !self.orders.contains(&key) && self.strays.len() < ORDERS {
+            let place = (topic.to_owned(), entry.seq(), entry.at().moment);
+            self.strays.entry(key).or_insert(place);
+        }
+    }
+
+    /// What came on a topic beside its own, and on its own never.
+    fn strayed(&mut self, now: Moment, patience: Duration, findings: &mut Vec<CheckFinding>) {
+        let due = |since: &Moment| now.since(*since) >= patience;
+        let late: Vec<_> = self.strays.iter().filter(|(_, (.., since))| due(since)).collect();
+        let late: Vec<_> = late.into_iter().map(|(key, _)| key.clone()).collect();
+        for key in late {
+            let Some((topic, seq, _)) = self.strays.remove(&key) else {
+                continue;
+            };
+            if self.seen.first(&topic) {
+                let what = match &key {
+                    Sent::Order(id, update) => format!("order {}, orderUpdateId {update},", quote(id)),
+                    Sent::Instant(id) => format!("the instant action {}", quote(id)),
+                };
+                let (topic, belongs) = (quote(&topic), key.topic());
+                let text = format!("{what} is published on {topic}, which is no topic name, and not as {belongs}");
+                findings.push(broken("TOPIC-01", seq, text));
+            }
+        }
     }
 
     /// Messages that come on another topic, and never on their own.
@@ -138,11 +236,14 @@ impl Names {
 impl Running for Names {
     fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         self.astray(end, context, findings);
+        // What came at the very last may still be on its way to the other topic.
+        self.strayed(end, Duration::from_secs(2), findings);
     }
 
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         self.astray(entry.at().moment, context, findings);
+        self.strayed(entry.at().moment, ELSEWHERE, findings);
         let topic = match entry.event() {
             Event::Message {
                 topic, retain: false, ..
@@ -315,6 +416,23 @@ struct OwnSide {
 impl Running for OwnSide {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
+        let owner = match context.role {
+            Role::Agv => "master control",
+            Role::MasterControl => "the vehicle",
+        };
+        if let Event::Packet {
+            packet: Packet::Connect { will: Some(will), .. },
+            ..
+        } = entry.event()
+        {
+            let name = context.topic_name(&will.topic);
+            let rule = name.and_then(|name| context.pack.topic(name));
+            if let Some(name) = name.filter(|_| rule.is_some_and(|rule| rule.publisher != context.role)) {
+                let text = format!("the device has a last will on {name}, which belongs to {owner}");
+                findings.push(broken("TOPIC-15", entry.seq(), text));
+            }
+            return name.is_some();
+        }
         let Some((_, topic, ..)) = device_publish(entry) else {
             return false;
         };
@@ -322,10 +440,6 @@ impl Running for OwnSide {
             return false;
         };
         if self.traffic.published(entry, context).is_none() {
-            let owner = match context.role {
-                Role::Agv => "master control",
-                Role::MasterControl => "the vehicle",
-            };
             let text = format!("the device publishes on {name}, which belongs to {owner}");
             findings.push(broken("TOPIC-15", entry.seq(), text));
         }
@@ -334,175 +448,4 @@ impl Running for OwnSide {
 }
 
 #[cfg(test)]
-mod tests {
-    use serde_json::json;
-
-    use super::super::trace::Trace;
-    use crate::journal::event::{Direction, Event, Packet, Source};
-
-    fn at_tap(topic: &str) -> Trace {
-        said_at_tap(topic, "{}")
-    }
-
-    fn said_at_tap(topic: &str, text: &str) -> Trace {
-        let mut trace = Trace::tap();
-        let packet = Packet::Publish {
-            topic: topic.to_owned(),
-            qos: 0,
-            retain: false,
-            dup: false,
-            packet_id: None,
-            payload: crate::journal::Payload::keep(bytes::Bytes::from(text.to_owned())),
-        };
-        trace.packet(1, Direction::FromDevice, packet);
-        trace
-    }
-
-    #[test]
-    fn defined_names_and_the_vendors_own_topics_are_right() {
-        let mut trace = Trace::tap();
-        trace.publish(1, "state", 0, false, &json!({}));
-        assert!(trace.judge("topic/names").findings.is_empty());
-        let own = at_tap("acme/diagnostics").judge("topic/names");
-        assert!(own.findings.is_empty() && own.judged == 0);
-    }
-
-    #[test]
-    fn messages_on_another_topic_are_found_when_they_never_come_on_their_own() {
-        let state = json!({ "actionStates": [], "operatingMode": "AUTOMATIC" });
-        let mut trace = Trace::tap();
-        trace
-            .publish(1, "states", 0, false, &state)
-            .wait(40.0)
-            .publish(1, "states", 0, false, &state);
-        assert_eq!(trace.judge("topic/names").summary(), ["TOPIC-01"]);
-        assert!(trace.judge("state/period").findings.is_empty(), "states do come");
-        trace.publish(1, "state", 0, false, &state);
-        let mut copied = Trace::tap();
-        copied
-            .publish(1, "state", 0, false, &state)
-            .publish(1, "states", 0, false, &state)
-            .wait(40.0);
-        assert!(copied.judge("topic/names").findings.is_empty(), "a copy for others");
-        let mut other = Trace::tap();
-        let (own, minor) = (other.prefix.clone(), other.prefix.replacen("/v", "/v1.", 1));
-        other.prefix = minor;
-        let topic = other.topic("state");
-        other.prefix = own;
-        let payload = crate::journal::Payload::keep(bytes::Bytes::from(state.to_string().into_bytes()));
-        let packet = Packet::Publish {
-            topic,
-            qos: 0,
-            retain: false,
-            dup: false,
-            packet_id: None,
-            payload,
-        };
-        other
-            .add(
-                Source::Tap,
-                Some(Direction::FromDevice),
-                Event::Packet { connection: 1, packet },
-            )
-            .wait(40.0);
-        assert_eq!(other.judge("topic/names").summary(), ["TOPIC-03 warning"]);
-    }
-
-    #[test]
-    fn variants_of_a_name_are_found_once() {
-        for name in ["State", "instant_actions", "FactSheet"] {
-            assert_eq!(
-                at_tap(&format!("x/{name}")).judge("topic/names").summary(),
-                ["TOPIC-01"],
-                "{name}"
-            );
-        }
-        let mut trace = Trace::subscriber();
-        trace
-            .message("Connection", &json!({}))
-            .message("Connection", &json!({}));
-        assert_eq!(trace.judge("topic/names").summary(), ["TOPIC-01"]);
-    }
-
-    fn structure(prefix: &str) -> Vec<String> {
-        let mut trace = Trace::subscriber();
-        prefix.clone_into(&mut trace.prefix);
-        trace.state(&json!({})).state(&json!({}));
-        trace.judge("topic/structure").summary()
-    }
-
-    #[test]
-    fn five_levels_with_the_major_version_are_right() {
-        let trace = Trace::subscriber();
-        assert!(structure(&trace.prefix).is_empty());
-    }
-
-    #[test]
-    fn other_structures_are_remarked_on_once_per_topic() {
-        assert_eq!(structure("site/hall/agv7"), ["TOPIC-02 warning"]);
-        assert_eq!(structure("uagv/2/acme/7"), ["TOPIC-03 warning"]);
-        assert_eq!(structure("uagv/v2/ac$me/7"), ["TOPIC-07 warning"]);
-    }
-
-    #[test]
-    fn a_serial_number_of_other_characters_is_found() {
-        let mut trace = Trace::subscriber();
-        trace.prefix.push_str(" b");
-        trace.serial.push_str(" b");
-        trace.state(&json!({}));
-        assert_eq!(trace.judge("topic/structure").summary(), ["TOPIC-05"]);
-    }
-
-    #[test]
-    fn a_level_that_contradicts_the_version_of_its_message_is_remarked_on() {
-        let said = |topic: &str, version: &str| {
-            let text = json!({ "version": version }).to_string();
-            said_at_tap(topic, &text).judge("topic/structure").summary()
-        };
-        assert_eq!(said("uagv/v7/acme/7/visualization", "8.1.0"), ["TOPIC-03 warning"]);
-        assert!(
-            said("uagv/v7/acme/7/visualization", "7.1.0").is_empty(),
-            "two versions side by side"
-        );
-        assert!(
-            said("uagv/v7/acme/7/diagnostics", "8.1.0").is_empty(),
-            "a topic of its own"
-        );
-        assert!(
-            said("uagv/v7/acme/9/visualization", "8.1.0").is_empty(),
-            "another vehicle"
-        );
-    }
-
-    #[test]
-    fn publishing_on_the_other_sides_topics_is_found() {
-        let mut trace = Trace::tap();
-        trace
-            .publish(1, "state", 0, false, &json!({}))
-            .sent("order", &json!({}));
-        assert!(trace.judge("topic/own-side").findings.is_empty());
-        trace.publish(1, "order", 0, false, &json!({}));
-        assert_eq!(trace.judge("topic/own-side").summary(), ["TOPIC-15"]);
-    }
-
-    #[test]
-    fn what_the_broker_delivers_to_the_device_is_not_published_by_it() {
-        let mut trace = Trace::tap();
-        let topic = trace.topic("order");
-        let packet = Packet::Publish {
-            topic,
-            qos: 0,
-            retain: false,
-            dup: false,
-            packet_id: None,
-            payload: crate::journal::Payload::keep(bytes::Bytes::from_static(b"{}")),
-        };
-        trace.add(
-            Source::Tap,
-            Some(Direction::ToDevice),
-            Event::Packet { connection: 1, packet },
-        );
-        let outcome = trace.judge("topic/own-side");
-        assert!(outcome.findings.is_empty() && outcome.judged == 0);
-    }
-}
+mod tests;

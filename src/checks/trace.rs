@@ -294,6 +294,13 @@ impl Trace {
         self.add(Source::Harness, None, Event::Fault { fault })
     }
 
+    /// The harness notices that it was late.
+    pub fn late(&mut self, seconds: f64) -> &mut Self {
+        let micros = u64::try_from(std::time::Duration::from_secs_f64(seconds).as_micros()).expect("a short time");
+        let of = "timer".to_owned();
+        self.add(Source::Harness, None, Event::Lag { micros, of })
+    }
+
     pub fn hook(&mut self) -> &mut Self {
         let event = Event::Hook {
             hook: "power-cycle".into(),
@@ -323,6 +330,7 @@ impl Trace {
         else {
             unreachable!()
         };
+        let shared = super::Shared::default();
         let context = CheckContext {
             pack: &pack,
             topics: &topics,
@@ -330,13 +338,14 @@ impl Trace {
             identity: ("acme", &self.serial),
             with: &self.with,
             bindings: &bindings,
-            shared: &super::Shared::default(),
+            shared: &shared,
         };
         let mut running = (find(name).expect("known check").start)(&context);
         let mut findings = Vec::new();
         let mut judged = 0;
         for entry in self.journal.entries() {
             let entry: &Arc<Entry> = entry;
+            shared.fleet.borrow_mut().link(entry);
             judged += usize::from(running.observe(entry, &context, &mut findings));
         }
         running.finish(self.at.moment, &context, &mut findings);

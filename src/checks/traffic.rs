@@ -2,6 +2,8 @@
 //!
 //! Which requirement is broken is left to the checks.
 
+use std::time::Duration;
+
 use serde_json::Value;
 
 use super::{CheckContext, CheckFinding};
@@ -164,6 +166,14 @@ pub(super) fn device_publish(entry: &Entry) -> Option<(u64, &str, u8, bool, bool
 /// Whether something outside the protocol may have changed the vehicle: a hook was run or a person acted.
 pub(super) fn outside_influence(entry: &Entry) -> bool {
     matches!(entry.event(), Event::Hook { .. } | Event::Answer { .. })
+}
+
+/// By how much the harness was late: what came meanwhile was read later than it was sent.
+pub(super) fn lag(entry: &Entry) -> Option<Duration> {
+    match entry.event() {
+        Event::Lag { micros, .. } => Some(Duration::from_micros(*micros)),
+        _ => None,
+    }
 }
 
 /// Whether the device may have been restarted: it opens a connection, or says something about it.

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::traffic::{Traffic, broken, outside_influence, remark};
+use super::traffic::{Traffic, broken, lag, outside_influence, remark};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -110,6 +110,11 @@ impl Running for Rate {
             self.since = None;
             self.gaps.clear();
         }
+        if let Some(late) = lag(entry) {
+            // The interval in which the harness was late is not counted.
+            self.last = None;
+            self.since = self.since.map(|since| since + late);
+        }
         let Some(message) = self
             .traffic
             .delivered(entry, context)
@@ -185,6 +190,16 @@ mod tests {
         for number in 0..20 {
             trace.wait(if number == 7 { 60.0 } else { 1.0 });
             trace.message("visualization", &json!({}));
+        }
+        assert!(trace.judge("visualization/rate").findings.is_empty());
+    }
+
+    #[test]
+    fn an_interval_in_which_the_harness_was_late_does_not_count() {
+        let mut trace = trace(1.0);
+        for _ in 0..20 {
+            trace.wait(1.0).message("visualization", &json!({}));
+            trace.wait(1.0).late(0.9).wait(0.0).message("visualization", &json!({}));
         }
         assert!(trace.judge("visualization/rate").findings.is_empty());
     }

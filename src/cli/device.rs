@@ -92,7 +92,11 @@ pub(super) fn claims(device: &profile::Device) -> BTreeMap<String, bool> {
             name,
             scope: Some(scope),
         } => (format!("action {name} {scope}"), true),
-        Claim::NoAction(name) => (format!("action {name}"), false),
+        Claim::NoAction { name, scope: None } => (format!("action {name}"), false),
+        Claim::NoAction {
+            name,
+            scope: Some(scope),
+        } => (format!("action {name} {scope}"), false),
         Claim::Optional(path) => (format!("optional {path}"), true),
         Claim::NoOptional(path) => (format!("optional {path}"), false),
         Claim::Limit { name, value } => (format!("limit {name}"), *value > 0),

@@ -113,7 +113,7 @@ fn tests(library: &Library, pack: &Pack, role: Role) -> String {
     let mut group = "";
     let mut table = "";
     for test in &all {
-        // The cases that come from a schema are listed as one.
+        // The cases that a run draws from are listed as one.
         if test.drawn.is_some() && test.table() == table {
             continue;
         }
@@ -144,8 +144,8 @@ fn tests(library: &Library, pack: &Pack, role: Role) -> String {
             let cases = all.iter().filter(|other| other.table() == table).count();
             let _ = writeln!(
                 text,
-                "      {cases} cases [member-way] from the schema of {}; a run takes {}, all with --thorough",
-                drawn.topic,
+                "      {cases} cases {}; a run takes {}, all with --thorough",
+                drawn.origin(),
                 drawn.draw.min(cases)
             );
         }
@@ -155,7 +155,7 @@ fn tests(library: &Library, pack: &Pack, role: Role) -> String {
     if !all.is_empty() {
         let more = match cases.len() {
             0 => String::new(),
-            cases => format!(", and {cases} cases from schemas"),
+            cases => format!(", and {cases} cases from schemas and matrices"),
         };
         let _ = writeln!(
             text,
@@ -367,8 +367,8 @@ fn about_test(test: &Test, cases: usize) -> String {
         Some(drawn) => {
             let _ = writeln!(
                 text,
-                "cases          {cases}, from the schema of {}; a run takes {}, all with --thorough",
-                drawn.topic,
+                "cases          {cases} {}; a run takes {}, all with --thorough",
+                drawn.origin(),
                 drawn.draw.min(cases)
             );
         }

@@ -277,6 +277,7 @@ impl Job {
         let capabilities = Capabilities {
             factsheet: None,
             statements: device.statements(),
+            samples: device.device_bindings(),
             claims: BTreeMap::new(),
             vantage: Vantage::Tap,
             hooks: operator.hooks(),
@@ -357,6 +358,7 @@ impl Job {
         let capabilities = Capabilities {
             factsheet: None,
             statements: statements(&profile.device),
+            samples: profile.device.bindings(),
             claims: claims(&profile.device),
             vantage: if tap { Vantage::Tap } else { Vantage::Subscriber },
             hooks: operator.hooks(),

@@ -23,6 +23,9 @@ pub use ways::Station;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::profile::{LayoutSource, Profile, SampleKind};
 
+/// How much larger than an edge the range around its start is that is called `beyond`: between one and two.
+const BEYOND: f64 = 1.4;
+
 /// What a test asks of the course.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CourseNeed {
@@ -205,7 +208,8 @@ impl Course {
         self.nodes.iter().map(|(name, node)| (name.as_str(), node))
     }
 
-    /// What is known of an edge, with `length` of the straight line from node to node in metres, `heading`, its
+    /// What is known of an edge, with `length` of the straight line from node to node in metres, `beyond`, a range around
+    /// its start that holds its end and, read as a diameter, does not, `heading`, its
     /// direction, and `back`, the direction back, both in radians against the map; `line` and `curve` are trajectories.
     fn edge_value(&self, from: &str, to: &str, edge: &Edge) -> Value {
         let mut value = edge.value();
@@ -215,7 +219,9 @@ impl Course {
         {
             let heading = (end.y - start.y).atan2(end.x - start.x);
             let back = (start.y - end.y).atan2(start.x - end.x);
-            members.insert("length".into(), start.distance(end.x, end.y).into());
+            let length = start.distance(end.x, end.y);
+            members.insert("length".into(), length.into());
+            members.insert("beyond".into(), (length * BEYOND).into());
             members.insert("heading".into(), heading.into());
             members.insert("back".into(), back.into());
             let (from, to) = ((start.x, start.y), (end.x, end.y));

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
+use super::ids::IdForm;
 use super::route::{RouteBuilder, SentOrders};
 use crate::clock::Stamp;
 use crate::judge::Ground;
@@ -51,6 +52,7 @@ pub struct Composer {
     run: String,
     header_ids: BTreeMap<String, u32>,
     action_count: u64,
+    ids: IdForm,
     orders: SentOrders,
 }
 
@@ -61,6 +63,7 @@ impl Composer {
             run: run.into(),
             header_ids: BTreeMap::new(),
             action_count: 0,
+            ids: IdForm::default(),
             orders: SentOrders::default(),
         }
     }
@@ -70,10 +73,10 @@ impl Composer {
         self.orders = SentOrders::default();
     }
 
-    /// A fresh actionId.
+    /// A fresh actionId, as the factsheet of the vehicle wants ids as far as it is known.
     pub fn action_id(&mut self) -> String {
         self.action_count += 1;
-        format!("{}-action-{}", self.run, self.action_count)
+        self.ids.of_action(&self.run, self.action_count)
     }
 
     /// Makes the message of a `send` step.
@@ -89,6 +92,7 @@ impl Composer {
             .get(&send.topic)
             .cloned()
             .ok_or_else(|| ComposeError::Topic(send.topic.clone()))?;
+        self.ids = IdForm::of(bindings.get("device.factsheet.protocolLimits.maxStringLens"));
         let rule = ground.pack.topic(&send.topic);
         let qos = send.qos.unwrap_or_else(|| rule.map_or(0, |rule| rule.qos));
         let mut actions = Vec::new();
@@ -151,7 +155,7 @@ impl Composer {
         let mut message = self.header(&send.topic, ground, now);
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
         if !send.actions.is_empty() {
-            let list = self.actions(&send.actions, bindings, actions)?;
+            let list = self.actions(&send.actions, true, bindings, actions)?;
             message.insert("actions".to_owned(), Value::Array(list));
         }
         if let Some(route) = &send.route {
@@ -165,7 +169,7 @@ impl Composer {
             message.insert("orderUpdateId".to_owned(), json!(0));
             let mut placed = BTreeMap::new();
             for (at, (place, list)) in route.actions.iter().enumerate() {
-                placed.insert(at, (place.clone(), self.actions(list, bindings, actions)?));
+                placed.insert(at, (place.clone(), self.actions(list, false, bindings, actions)?));
             }
             let builder = RouteBuilder {
                 course: bindings.get("course"),
@@ -198,6 +202,7 @@ impl Composer {
     fn actions(
         &mut self,
         list: &[SendAction],
+        instant: bool,
         bindings: &Bindings,
         named: &mut Vec<(String, String)>,
     ) -> Result<Vec<Value>, ComposeError> {
@@ -224,7 +229,11 @@ impl Composer {
             }
             let action_type = action.action.bind(bindings)?;
             let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
-            let blocking = blocking.unwrap_or_else(|| usual_blocking(&action_type, bindings));
+            let blocking = match blocking {
+                Some(said) if !instant => said,
+                // How an instant action blocks is nothing a test is about.
+                said => usual_blocking(&action_type, said.unwrap_or_else(|| json!("HARD")), bindings),
+            };
             all.push(json!({
                 "actionType": action_type,
                 "actionId": id,
@@ -279,10 +288,9 @@ fn timestamp(now: Stamp) -> String {
     format!("{:.2}", now.utc)
 }
 
-/// How an action blocks where a test does not care: HARD, or the first type its factsheet lists when HARD is not among
-/// them (FACT-15).
-fn usual_blocking(action_type: &Value, bindings: &Bindings) -> Value {
-    let usual = json!("HARD");
+/// How an action blocks where a test does not care: the usual way, or the first type its factsheet lists when the usual
+/// one is not among them (FACT-15).
+fn usual_blocking(action_type: &Value, usual: Value, bindings: &Bindings) -> Value {
     let listed = bindings
         .get("device.factsheet.protocolFeatures.agvActions")
         .and_then(Value::as_array);

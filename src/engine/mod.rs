@@ -7,6 +7,7 @@
 mod compose;
 mod flood;
 mod hands;
+mod ids;
 mod map_file;
 mod operator;
 mod recorder;
@@ -19,6 +20,7 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 
 pub use compose::{ComposeError, Composer};
+pub use ids::IdForm;
 pub use operator::{HookOutcome, Operator};
 pub use recorder::{RecordError, Recorder};
 

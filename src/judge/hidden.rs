@@ -1,7 +1,7 @@
 //! What a broken report hides.
 //!
 //! A state that forgets the name of its order, or leaves out actions that are done, cannot show what most tests wait
-//! for. The vehicle is guilty of that, once; whether it did what it was told could not be observed. A monitor names
+//! for, nor can an instantActions message without its list. The vehicle is guilty of that, once; whether it did what it was told could not be observed. A monitor names
 //! the members it speaks for under `hides:`, and what was missed there is inconclusive in the tests it found something
 //! in. Which monitors do so is data.
 
@@ -21,11 +21,13 @@ pub(super) struct Open {
     pub ended: u64,
     /// What was waited for.
     pub waited: Option<Waited>,
+    /// The vehicle has reported a new error since the message the step is about: it says itself that it did not obey.
+    pub refused: bool,
     /// What it says about time, if it is a finding about time.
     pub of_time: Option<Timing>,
 }
 
-/// A member of the state that shows nothing in a test.
+/// A member of a message that shows nothing in a test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Hidden {
     /// The member.
@@ -50,12 +52,18 @@ impl Hidden {
             return false;
         };
         let member = nearest.path.split(['.', '[']).next();
-        let shows_nothing = self.lasting && matches!(nearest.found.as_str(), "\"\"" | "0" | "nothing");
+        let shows_nothing = matches!(nearest.found.as_str(), "\"\"" | "0" | "nothing");
+        let is_unseen = match self.lasting {
+            // What is known to be forgotten at times is seen whenever it is shown.
+            true => shows_nothing,
+            false => open.clause.witness.is_none() || open.walks,
+        };
         matches!(open.clause.holds, Holds::No | Holds::Softly | Holds::Late)
-            && (open.clause.witness.is_none() || open.walks || shows_nothing)
+            && is_unseen
             && member == Some(self.member.as_str())
             && !self.decides.iter().any(|id| about.contains(id))
             && self.seq <= open.ended
+            && !(open.refused && open.clause.holds == Holds::No && open.clause.witness.is_none())
     }
 }
 
@@ -81,7 +89,7 @@ pub(super) fn hide(all: &mut [Open], hidden: &[Hidden]) -> Option<String> {
             continue;
         };
         let why = format!(
-            "the states do not show `{}` as they must (#{}: {} is broken, found by {})",
+            "the messages do not show `{}` as they must (#{}: {} is broken, found by {})",
             hidden.member, hidden.seq, hidden.requirement, hidden.monitor
         );
         open.clause.holds = Holds::Unseen(why.clone());
@@ -122,6 +130,7 @@ mod tests {
             ended: 30,
             waited: None,
             of_time: None,
+            refused: false,
         }
     }
 
@@ -156,6 +165,13 @@ mod tests {
         let mut came = clause("ORD-06", "orderId");
         came.clause.witness = Some(20);
         assert!(!is_hidden(came, 15));
+    }
+
+    #[test]
+    fn what_the_vehicle_says_it_refused_is_seen() {
+        let mut refused = clause("ORD-06", "orderId");
+        refused.refused = true;
+        assert!(!is_hidden(refused, 15));
     }
 
     #[test]

@@ -192,8 +192,20 @@ fn mend(meant: &mut Value, state: &Value, seq: u64, timeline: &Timeline, waiver:
             if !is_nothing(state.get(member)) {
                 return None;
             }
-            let kept =
-                before(timeline, seq).find_map(|state| state.get(member).filter(|one| !is_nothing(Some(*one))))?;
+            // What holds on is what the order that was named last had, and never what an older one had. An order that is
+            // named has forgotten nothing but what its own states have shown.
+            let named = state.get("orderId").filter(|name| !is_nothing(Some(*name)));
+            let of_order = |earlier: &&Value| match named {
+                Some(name) => earlier.get("orderId") == Some(name),
+                None => !is_nothing(earlier.get("orderId")),
+            };
+            let order = before(timeline, seq).find(of_order)?.get("orderId")?;
+            let own = before(timeline, seq)
+                .skip_while(|earlier| earlier.get("orderId") != Some(order))
+                .take_while(|earlier| earlier.get("orderId") == Some(order));
+            let kept = own
+                .filter_map(|earlier| earlier.get(member))
+                .find(|one| !is_nothing(Some(*one)))?;
             meant.as_object_mut()?.insert(member.to_owned(), kept.clone());
             Some(())
         }

@@ -10,6 +10,7 @@ mod hidden;
 mod limit;
 mod mend;
 mod monitor;
+mod own_errors;
 mod reactions;
 mod run;
 mod step;

@@ -12,6 +12,7 @@ use serde_json::{Map, Value};
 use super::decide::decide;
 use super::departure::Departure;
 use super::hidden::{Hidden, Open, hide};
+use super::own_errors::{is_refused, reported};
 use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use super::window::Scene;
@@ -40,39 +41,6 @@ pub struct Ground {
     pub bindings: Arc<Map<String, Value>>,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
-}
-
-/// What the vehicle itself says is wrong, in its last state.
-fn reported(timeline: &Timeline) -> Option<String> {
-    let state = timeline.of("state").last()?.json()?;
-    let errors = state.get("errors")?.as_array()?;
-    let text = |value: &Value, name: &str| -> String {
-        let found = value.get(name).and_then(Value::as_str).unwrap_or_default();
-        found.chars().take(60).collect()
-    };
-    let one = |error: &Value| {
-        let references = error.get("errorReferences").and_then(Value::as_array);
-        let named: Vec<String> = references
-            .into_iter()
-            .flatten()
-            .take(3)
-            .map(|reference| {
-                format!(
-                    "{} {}",
-                    text(reference, "referenceKey"),
-                    text(reference, "referenceValue")
-                )
-            })
-            .collect();
-        let named = if named.is_empty() {
-            String::new()
-        } else {
-            format!(" ({})", named.join(", "))
-        };
-        format!("{} {}{named}", text(error, "errorLevel"), text(error, "errorType"))
-    };
-    let all: Vec<String> = errors.iter().take(2).map(one).collect();
-    (!all.is_empty()).then(|| format!("the vehicle itself reports {}", all.join(" and ")))
 }
 
 /// How a precondition comes out that is itself an obligation: it is broken when what is seen contradicts it. Coming late is
@@ -321,7 +289,9 @@ impl TestJudge {
                 step.title.clone().unwrap_or_else(|| step.path.clone()),
                 step.span.place()
             );
-            let own = reported(timeline).map(|own| format!("; {own}")).unwrap_or_default();
+            let own = reported(timeline, self.mark)
+                .map(|own| format!("; {own}"))
+                .unwrap_or_default();
             match section {
                 Section::Given => {
                     self.preamble = Err(format!("the precondition was not reached: {place}: {why}{own}"));
@@ -360,6 +330,7 @@ impl TestJudge {
                     ended: entry.seq(),
                     waited,
                     of_time,
+                    refused: ground.role == Role::Agv && is_refused(timeline, self.mark),
                 });
             }
         }

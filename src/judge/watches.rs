@@ -4,13 +4,15 @@
 //! mock AGV gets monitors of its own, and what they find is put together. What belongs to no vehicle, such as the
 //! CONNECT packet, is shown to the monitors of the first one only.
 
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use super::hidden::Hidden;
 use super::monitor::MonitorJudge;
 use super::test::Ground;
 use super::timeline::Timeline;
-use crate::checks::Shared;
+use crate::checks::{FleetSeen, Shared};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
@@ -24,6 +26,8 @@ pub(super) struct Watches {
     first: Watch,
     /// Those of further vehicles, with what is known of them.
     others: Vec<(Ground, Watch)>,
+    /// What came to all of them.
+    fleet: Rc<RefCell<FleetSeen>>,
 }
 
 /// The monitors of one vehicle.
@@ -33,14 +37,14 @@ struct Watch {
 }
 
 impl Watch {
-    fn begin(monitors: &[&Arc<Monitor>], ground: &Ground, tap: bool) -> Self {
+    fn begin(monitors: &[&Arc<Monitor>], ground: &Ground, tap: bool, fleet: &Rc<RefCell<FleetSeen>>) -> Self {
         let bindings = Bindings::above(vec![ground.pack.words(), Arc::clone(&ground.bindings)]);
         let all = monitors.iter();
         Self {
             monitors: all
                 .filter_map(|monitor| MonitorJudge::start(monitor, ground, &bindings, tap))
                 .collect(),
-            shared: Shared::default(),
+            shared: Shared::of_fleet(fleet),
         }
     }
 
@@ -106,19 +110,28 @@ impl Watched {
 impl Watches {
     /// Puts the monitors on duty. `ground` is that of the first vehicle.
     pub fn begin(monitors: &[&Arc<Monitor>], ground: &Ground, others: Vec<Ground>, tap: bool) -> Self {
+        let fleet = Rc::default();
         let others = others.into_iter().map(|ground| {
-            let own = Watch::begin(monitors, &ground, tap);
+            let own = Watch::begin(monitors, &ground, tap, &fleet);
             (ground, own)
         });
         Self {
-            first: Watch::begin(monitors, ground, tap),
+            first: Watch::begin(monitors, ground, tap, &fleet),
             others: others.collect(),
+            fleet,
         }
     }
 
     /// Shows the next entry to those it concerns.
     pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, timeline: &Timeline, ground: &Ground) {
         let place = timeline.place(entry);
+        match place {
+            Some(place) if !self.others.is_empty() => {
+                self.fleet.borrow_mut().note(entry, place.vehicle, &place.name);
+            }
+            Some(_) => {}
+            None => self.fleet.borrow_mut().link(entry),
+        }
         if place.is_none_or(|place| place.vehicle == 0) {
             // What the harness's own vehicles say is context, and not the subject of any monitor.
             let subject = subject.filter(|_| !matches!(entry.event(), Event::Sent { .. }));

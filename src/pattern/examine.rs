@@ -157,8 +157,12 @@ impl Bound {
         };
         match which {
             Element::Has if !matching.is_empty() => decided_by(matching.first()),
-            Element::HasNew => match matching.iter().find(|at| baseline.is_new(self, &found[**at])) {
+            Element::HasNew => match matching.iter().find(|at| baseline.is_new(self, found, **at)) {
                 Some(at) => decided_by(Some(at)),
+                // What is new and is not as expected says more than what is as expected and old.
+                None if (0..found.len()).any(|at| baseline.is_new(self, found, at)) => {
+                    self.nearest_new(inner, found, baseline, trail)
+                }
                 None => match matching.first() {
                     Some(at) => {
                         let mut miss = self.miss(
@@ -238,6 +242,22 @@ impl Bound {
                     ..closest
                 }
             }
+        }
+    }
+
+    /// The same among those that were not there before.
+    fn nearest_new(&self, inner: &Self, found: &[Value], baseline: &Baseline, trail: &Trail<'_>) -> Examination {
+        let best = (0..found.len())
+            .filter(|at| baseline.is_new(self, found, *at))
+            .map(|at| (at, inner.agreeing(&found[at], baseline)))
+            .max_by(|left, right| left.1.cmp(&right.1).then(right.0.cmp(&left.0)));
+        let Some((at, _)) = best else {
+            return self.nearest(inner, found, baseline, trail);
+        };
+        let closest = inner.compare(found.get(at), baseline, &Trail::Element(trail, at));
+        Examination {
+            score: (closest.score.0, self.leaves()),
+            ..closest
         }
     }
 

@@ -1,6 +1,6 @@
 //! Whether a message matches. Work is bounded by the size of the pattern times the size of the message.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use serde_json::Value;
 
@@ -9,8 +9,9 @@ use super::bound::{Bound, BoundKind};
 use super::number::{canonical, compare_numbers, same_value};
 
 /// What every `$hasNew` of a pattern found in the baseline: canonical texts of the elements that were there
-/// before, by the address of the pattern. An element is old when an equal one was anywhere at this path.
-pub(super) struct Baseline(HashMap<*const Bound, HashSet<String>>);
+/// before, and how many of each, by the address of the pattern. An element is old when an equal one was anywhere at
+/// this path; one more of its like than before is new.
+pub(super) struct Baseline(HashMap<*const Bound, HashMap<String, usize>>);
 
 impl Baseline {
     pub(super) fn new(pattern: &Bound, message: Option<&Value>) -> Self {
@@ -23,15 +24,19 @@ impl Baseline {
         Self(old)
     }
 
-    /// Whether this element of a `$hasNew` was not there before.
-    pub(super) fn is_new(&self, pattern: &Bound, element: &Value) -> bool {
-        self.0
-            .get(&std::ptr::from_ref(pattern))
-            .is_none_or(|old| !old.contains(&canonical(element)))
+    /// Whether this element of the list a `$hasNew` looks at was not there before.
+    pub(super) fn is_new(&self, pattern: &Bound, list: &[Value], at: usize) -> bool {
+        let (Some(old), Some(element)) = (self.0.get(&std::ptr::from_ref(pattern)), list.get(at)) else {
+            return true;
+        };
+        let text = canonical(element);
+        let Some(before) = old.get(&text) else { return true };
+        let like = list[..=at].iter().filter(|other| canonical(other) == text);
+        like.count() > *before
     }
 }
 
-fn collect(pattern: &Bound, before: &[&Value], old: &mut HashMap<*const Bound, HashSet<String>>) {
+fn collect(pattern: &Bound, before: &[&Value], old: &mut HashMap<*const Bound, HashMap<String, usize>>) {
     if before.is_empty() {
         return;
     }
@@ -54,7 +59,10 @@ fn collect(pattern: &Bound, before: &[&Value], old: &mut HashMap<*const Bound, H
         BoundKind::Elements(which, inner) => {
             let elements = elements();
             if *which == Element::HasNew {
-                let texts = elements.iter().map(|element| canonical(element)).collect();
+                let mut texts = HashMap::new();
+                for element in &elements {
+                    *texts.entry(canonical(element)).or_insert(0) += 1;
+                }
                 old.insert(std::ptr::from_ref(pattern), texts);
             }
             collect(inner, &elements, old);
@@ -105,7 +113,6 @@ impl Bound {
     }
 
     fn gather_new<'a>(&self, values: &[&'a Value], baseline: &Baseline, found: &mut Vec<&'a Value>) {
-        let elements = || values.iter().filter_map(|value| value.as_array()).flatten();
         match &self.kind {
             BoundKind::Object(members) => {
                 for (name, member) in members {
@@ -116,7 +123,10 @@ impl Bound {
             BoundKind::All(parts) => parts.iter().for_each(|part| part.gather_new(values, baseline, found)),
             BoundKind::Not(inner) => inner.gather_new(values, baseline, found),
             BoundKind::Elements(Element::HasNew, _) => {
-                found.extend(elements().filter(|element| baseline.is_new(self, element)));
+                for list in values.iter().filter_map(|value| value.as_array()) {
+                    let new = (0..list.len()).filter(|at| baseline.is_new(self, list, *at));
+                    found.extend(new.filter_map(|at| list.get(at)));
+                }
             }
             _ => {}
         }
@@ -189,10 +199,14 @@ impl Bound {
     }
 
     fn elements_accept(&self, which: Element, inner: &Self, found: &[Value], baseline: &Baseline) -> bool {
+        if which == Element::HasNew {
+            return (0..found.len())
+                .any(|at| inner.accepts(found.get(at), baseline) && baseline.is_new(self, found, at));
+        }
         let mut matching = found.iter().filter(|element| inner.accepts(Some(element), baseline));
         match which {
             Element::Has => matching.next().is_some(),
-            Element::HasNew => matching.any(|element| baseline.is_new(self, element)),
+            Element::HasNew => false,
             Element::None => matching.next().is_none(),
             Element::One => matching.next().is_some() && matching.next().is_none(),
             Element::AtMostOne => matching.nth(1).is_none(),

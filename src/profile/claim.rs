@@ -15,8 +15,13 @@ pub enum Claim {
         /// `INSTANT`, `NODE` or `EDGE`; all of them when absent.
         scope: Option<String>,
     },
-    /// `no action NAME`: it does not offer the action.
-    NoAction(String),
+    /// `no action NAME` or `no action NAME SCOPE`: it does not offer the action, or not there.
+    NoAction {
+        /// actionType.
+        name: String,
+        /// `INSTANT`, `NODE` or `EDGE`; all of them when absent.
+        scope: Option<String>,
+    },
     /// `optional PATH`: it reads this optional parameter.
     Optional(String),
     /// `no optional PATH`: it does not read it.
@@ -67,11 +72,18 @@ impl FromStr for Claim {
                 name: (*name).to_owned(),
                 scope: Some((*scope).to_owned()),
             }),
-            ["action", _, scope] => Err((
+            ["no", "action", name] => Ok(Self::NoAction {
+                name: (*name).to_owned(),
+                scope: None,
+            }),
+            ["no", "action", name, scope] if SCOPES.contains(scope) => Ok(Self::NoAction {
+                name: (*name).to_owned(),
+                scope: Some((*scope).to_owned()),
+            }),
+            ["action", _, scope] | ["no", "action", _, scope] => Err((
                 format!("`{scope}` is not a scope of actions"),
                 diagnostic::did_you_mean(scope, SCOPES),
             )),
-            ["no", "action", name] => Ok(Self::NoAction((*name).to_owned())),
             ["no", "hook", name] if EQUIPMENT.contains(name) => Ok(Self::NoHook((*name).to_owned())),
             ["no", "hook", name] => Err((
                 format!("a device cannot do without `{name}`"),
@@ -96,7 +108,7 @@ impl FromStr for Claim {
             [name] => statement(name, statements()).map(Self::Statement),
             _ => Err((
                 format!("`{text}` is not a claim"),
-                "a claim is `action NAME`, `action NAME NODE`, `no action NAME`, `optional PATH`, `no optional PATH`, \
+                "a claim is `action NAME`, `action NAME NODE`, `no action NAME`, `no action NAME EDGE`, `optional PATH`, `no optional PATH`, \
                  `limit NAME = 10`, `no hook NAME`, or the name of a statement"
                     .to_owned(),
             )),
@@ -126,9 +138,24 @@ impl Claim {
     pub fn contradicts(&self, other: &Self) -> bool {
         use Claim::{Action, Limit, NoAction, NoOptional, NoStatement, Optional, Statement};
         match (self, other) {
-            (Action { name: yes, .. }, NoAction(no))
-            | (NoAction(no), Action { name: yes, .. })
-            | (Optional(yes), NoOptional(no))
+            (
+                Action { name, scope },
+                NoAction {
+                    name: no,
+                    scope: where_no,
+                },
+            )
+            | (
+                NoAction {
+                    name: no,
+                    scope: where_no,
+                },
+                Action { name, scope },
+            ) => {
+                // What is said about one scope comes before what is said about all.
+                name == no && (where_no.is_none() || scope == where_no)
+            }
+            (Optional(yes), NoOptional(no))
             | (NoOptional(no), Optional(yes))
             | (Statement(yes), NoStatement(no))
             | (NoStatement(no), Statement(yes)) => yes == no,
@@ -152,7 +179,11 @@ impl std::fmt::Display for Claim {
                 name,
                 scope: Some(scope),
             } => write!(f, "action {name} {scope}"),
-            Self::NoAction(name) => write!(f, "no action {name}"),
+            Self::NoAction { name, scope: None } => write!(f, "no action {name}"),
+            Self::NoAction {
+                name,
+                scope: Some(scope),
+            } => write!(f, "no action {name} {scope}"),
             Self::Optional(path) => write!(f, "optional {path}"),
             Self::NoOptional(path) => write!(f, "no optional {path}"),
             Self::Limit { name, value } => write!(f, "limit {name} = {value}"),
@@ -173,6 +204,7 @@ mod tests {
             "action pick",
             "action pick NODE",
             "no action drop",
+            "no action pick EDGE",
             "optional order.edges.trajectory",
             "no optional order.edges.corridor",
             "limit maxArrayLens.order.nodes = 10",

@@ -139,7 +139,7 @@ pub const HOOKS: &[HookInfo] = &[
     ),
     master_control(
         "dispatch",
-        &["vehicle", "from", "to", "loadType", "action"],
+        &["vehicle", "from", "to", "loadType", "action", "parameters"],
         "A transport was ordered.",
     ),
     master_control(

@@ -51,8 +51,8 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
     word("push-out", &[], "It is moved off the way it was given."),
     word(
         "shift-position",
-        &[],
-        "It takes itself to stand beside the way it was given.",
+        &["by"],
+        "It takes itself to stand beside the way it was given, by that many metres.",
     ),
     word("drive-manually", &[], "It is driven by hand for a short way."),
     word("lose-position", &[], "It no longer knows where it is."),

@@ -18,3 +18,4 @@ pub mod sequence;
 pub mod sources;
 pub mod statement;
 pub mod text;
+pub mod undecided;

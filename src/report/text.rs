@@ -13,6 +13,7 @@ use super::headline::reference;
 use super::result::{Decision, MonitorResult, RunResult, TestResult, Waited};
 use super::sources::Sources;
 use super::statement::{self, Counts, many, seconds};
+use super::undecided;
 use crate::journal::Journal;
 use crate::verdict::Verdict;
 
@@ -282,6 +283,7 @@ pub fn summary(result: &RunResult, bundle: Bundle<'_>, color: Color) -> String {
     if let Some(fleet) = &result.fleet {
         let _ = writeln!(text, "{:<13} {}", "fleet", super::fleet::line(fleet));
     }
+    causes(result, color, &mut text);
     let style = color.verdict(result.verdict);
     let word = result
         .verdict
@@ -302,6 +304,20 @@ pub fn summary(result: &RunResult, bundle: Bundle<'_>, color: Color) -> String {
         let _ = writeln!(text, "root    sha256:{}", line(root));
     }
     text
+}
+
+/// Why tests decided nothing, where several have one cause.
+fn causes(result: &RunResult, color: Color, text: &mut String) {
+    let groups = undecided::groups(result);
+    if groups.iter().all(|group| group.tests.len() < 2) {
+        return;
+    }
+    let _ = writeln!(text, "\nWhy nothing was decided:");
+    for group in groups {
+        let count = color.verdict(Some(Verdict::Inconclusive)).apply_to(group.count());
+        let _ = writeln!(text, "  {count}: {}", group.cause());
+        let _ = writeln!(text, "      {}", color.dim().apply_to(group.named()));
+    }
 }
 
 /// `12 pass, 1 warning, 1 fail, 2 not applicable`, worst last; noughts left out.

@@ -63,13 +63,11 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let until = self.engine.link.now().moment + self.time("settle");
         let mut found = self.engine.watch(until, has_sheet).await?;
         let ground = self.engine.recorder.judge().ground();
-        if let Some(request) = ground
-            .pack
-            .word("action.factsheetRequest")
-            .map(str::to_owned)
-            .filter(|_| !found)
-        {
-            self.instant_action(&request, json!([])).await?;
+        let is_known = ground.pack.vocabulary().pointer("/action/factsheetRequest").is_some();
+        // Who says that the device has no such action knows that it would only find a mistake in it.
+        let is_denied = self.setup.capabilities.claims.get("action factsheetRequest") == Some(&false);
+        if !found && is_known && !is_denied {
+            self.instant_action("factsheetRequest", json!([])).await?;
             let until = self.engine.link.now().moment + self.time("react");
             found = self.engine.watch(until, has_sheet).await?;
         }

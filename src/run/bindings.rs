@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use super::pace::{Pace, between_looks};
 use super::rest::Home;
 use crate::course::{Layout, Standing};
+use crate::engine::IdForm;
 use crate::journal::event::{Event, Packet};
 use crate::judge::RunJudge;
 use crate::pack::Role;
@@ -91,8 +92,10 @@ pub(super) fn own_bindings(
             .map(|millis| ("look".to_owned(), millis.into())),
     );
     own.extend(course.map(|course| ("course".to_owned(), course)));
-    let ids = fresh_names(test).into_iter().map(|name| {
-        let id = format!("{run}-{number}-{name}");
+    let device = judge.ground().bindings.get("device");
+    let form = IdForm::of(device.and_then(|device| device.pointer("/factsheet/protocolLimits/maxStringLens")));
+    let ids = fresh_names(test).into_iter().enumerate().map(|(place, name)| {
+        let id = form.of_name(run, number, &name, place);
         (name, Value::from(id))
     });
     own.insert("run".to_owned(), Value::Object(ids.collect()));

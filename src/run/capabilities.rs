@@ -6,12 +6,14 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
+use super::fits::outgrown;
 use crate::journal::event::{Capability, Gate};
 use crate::link::Vantage;
+use crate::pattern::{Term, TermKind};
 use crate::profile::{SAMPLE_ACTIONS, SampleKind};
-use crate::suite::model::{Need, Test, Verb};
+use crate::suite::model::{Need, SendAction, Test, Verb};
 
 /// Found out from the first state, and said by no profile.
 const ACTIVE_MAP: &str = "active-map";
@@ -23,6 +25,8 @@ pub struct Capabilities {
     pub factsheet: Option<Value>,
     /// What the profile states: `stops-between-nodes` and so on.
     pub statements: BTreeMap<String, bool>,
+    /// What the suites know of the device below `device`: its sample actions among it.
+    pub samples: Map<String, Value>,
     /// Capabilities the profile claims beside the factsheet, by their names.
     pub claims: BTreeMap<String, bool>,
     /// From where the harness can see.
@@ -64,6 +68,18 @@ impl Capabilities {
                 }
             }
         }
+        let sends = test.sections().into_iter().flat_map(|(_, steps)| steps);
+        let routes = sends.filter_map(|step| match &step.verb {
+            Verb::Send(send) => send.route.as_ref(),
+            _ => None,
+        });
+        let mut ordered = routes.flat_map(|route| &route.actions).flat_map(|(_, actions)| actions);
+        if let Some(why) = ordered.find_map(|action| self.blocks_otherwise(action)) {
+            return Gate::NotApplicable(why);
+        }
+        if let Some(why) = self.factsheet.as_ref().and_then(|sheet| outgrown(sheet, test)) {
+            return Gate::NotApplicable(why);
+        }
         if test.moves
             && let Err(why) = &self.motion
         {
@@ -101,8 +117,28 @@ impl Capabilities {
             Need::NoAction(name) => reverse(self.action(name, None), name),
             Need::Optional(path) => self.optional(path),
             Need::NoOptional(path) => reverse(self.optional(path), path),
+            Need::NotRequired(path) => self.not_required(path),
             Need::Limit(path) => self.declared(&[format!("limit {path}")], |sheet| has_limit(sheet, path)),
         }
+    }
+
+    /// Why an action of an order cannot be sent as the test wants: the factsheet lists it with other blocking types
+    /// (FACT-15).
+    fn blocks_otherwise(&self, action: &SendAction) -> Option<String> {
+        let wanted = literal(action.blocking.as_ref()?)?;
+        let action_type = match &action.action.kind {
+            TermKind::Variable(name) => {
+                let (sample, member) = name.strip_prefix("device.")?.split_once('.')?;
+                self.samples.get(sample)?.get(member)?.as_str()?
+            }
+            _ => literal(&action.action)?,
+        };
+        let sheet = self.factsheet.as_ref()?;
+        let mut listed = sheet.pointer("/protocolFeatures/agvActions")?.as_array()?.iter();
+        let own = listed.find(|listed| listed.get("actionType").and_then(Value::as_str) == Some(action_type))?;
+        let types = own.get("blockingTypes")?.as_array()?;
+        let allowed = types.is_empty() || types.iter().any(|known| known.as_str() == Some(wanted));
+        (!allowed).then(|| format!("the factsheet does not list: action {action_type} with the blocking type {wanted}"))
     }
 
     fn action(&self, name: &str, scope: Option<&str>) -> Gate {
@@ -112,6 +148,16 @@ impl Capabilities {
             None => vec![whole],
         };
         self.declared(&names, |sheet| has_action(sheet, name, scope))
+    }
+
+    fn not_required(&self, path: &str) -> Gate {
+        let Some(sheet) = &self.factsheet else {
+            return Gate::Unobservable(format!("there is no factsheet that could say whether it needs: {path}"));
+        };
+        if requires(sheet, path) {
+            return Gate::NotApplicable(format!("the factsheet lists as required: {path}"));
+        }
+        Gate::Runs
     }
 
     fn optional(&self, path: &str) -> Gate {
@@ -219,6 +265,13 @@ impl Capabilities {
     }
 }
 
+fn literal(term: &Term) -> Option<&str> {
+    match &term.kind {
+        TermKind::Literal(Value::String(text)) => Some(text),
+        _ => None,
+    }
+}
+
 fn action_name(name: &str, scope: Option<&str>) -> String {
     scope.map_or_else(|| format!("action {name}"), |scope| format!("action {name} {scope}"))
 }
@@ -248,6 +301,19 @@ fn has_optional(sheet: &Value, path: &str) -> Option<bool> {
     Some(all.iter().any(named))
 }
 
+/// Whether the vehicle cannot do without the optional parameter, or without a part of it.
+fn requires(sheet: &Value, path: &str) -> bool {
+    let all = sheet.pointer("/protocolFeatures/optionalParameters");
+    let mut all = all.and_then(Value::as_array).into_iter().flatten();
+    all.any(|one| {
+        let name = one.get("parameter").and_then(Value::as_str).unwrap_or_default();
+        let part = name
+            .strip_prefix(path)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        part && one.get("support").and_then(Value::as_str) == Some("REQUIRED")
+    })
+}
+
 /// `maxArrayLens.order.nodes`: a group of `protocolLimits` and a member whose name has dots in it; `None` when there are
 /// no limits at all.
 fn has_limit(sheet: &Value, path: &str) -> Option<bool> {
@@ -260,12 +326,14 @@ fn has_limit(sheet: &Value, path: &str) -> Option<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnostic::{Source, Span};
     use serde_json::json;
 
     fn capabilities(factsheet: Option<Value>) -> Capabilities {
         Capabilities {
             factsheet,
             statements: BTreeMap::from([("node-bound".to_owned(), false)]),
+            samples: Map::new(),
             claims: BTreeMap::new(),
             vantage: Vantage::Subscriber,
             hooks: Vec::new(),
@@ -331,6 +399,31 @@ mod tests {
         assert!(matches!(known.has(&drop), Gate::Unobservable(_)));
         let lift = Need::Hook("use-lift".to_owned());
         assert!(matches!(known.has(&lift), Gate::NotApplicable(_)));
+    }
+
+    #[test]
+    fn an_action_is_sent_with_the_blocking_types_its_factsheet_lists() {
+        let listed = json!([{ "actionType": "beep", "blockingTypes": ["SOFT", "HARD"] }]);
+        let mut known = capabilities(Some(json!({ "protocolFeatures": { "agvActions": listed } })));
+        known.samples = Map::from_iter([("briefAction".to_owned(), json!({ "type": "beep" }))]);
+        let span = Span::new(&Source::new("x.yaml", "x"), 0, 1);
+        let term = |kind| Term {
+            kind,
+            span: span.clone(),
+        };
+        let action = |of: TermKind, blocking: &str| SendAction {
+            action: term(of),
+            name: None,
+            with: Vec::new(),
+            with_all: None,
+            blocking: Some(term(TermKind::Literal(json!(blocking)))),
+            span: span.clone(),
+        };
+        let sample = || TermKind::Variable("device.briefAction.type".to_owned());
+        assert_eq!(known.blocks_otherwise(&action(sample(), "HARD")), None);
+        assert!(known.blocks_otherwise(&action(sample(), "NONE")).is_some());
+        let unknown = TermKind::Literal(json!("other"));
+        assert_eq!(known.blocks_otherwise(&action(unknown, "NONE")), None);
     }
 
     #[test]

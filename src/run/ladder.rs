@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::between::power_cycle;
-use super::lasting::{self, Idle, has_ended, lasting};
+use super::lasting::{self, Idle, has_ended, is_stalled, lasting};
 use super::rest::{Obstacle, place_of};
 use super::session::Session;
 use crate::clock::Moment;
@@ -46,7 +46,10 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     fn rung(&mut self, what: &str) -> Result<(), EngineError> {
         let all: Vec<String> = self.obstacles().iter().map(Obstacle::describe).collect();
-        let text = format!("the vehicle is not at rest ({}): {what}", all.join("; "));
+        let text = match all.is_empty() {
+            true => format!("whether the vehicle still takes orders is seen by {what}"),
+            false => format!("the vehicle is not at rest ({}): {what}", all.join("; ")),
+        };
         self.engine.note(Event::Note { text })?;
         Ok(())
     }
@@ -124,8 +127,11 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             let cancelled = self.engine.watch(until, free).await?;
             self.cancelled = Some(id);
             self.read_over(since).await?;
-            // With another way at hand, a device that does not obey is not asked again after every test.
-            self.engine.cancels = cancelled || !is_busy(&self.obstacles()) || !self.has_hook("power-cycle");
+            // With another way at hand, a device that does not obey is not asked again after every test. One that says
+            // nothing at all any more has not disobeyed.
+            let states = self.engine.recorder.judge().timeline().of("state");
+            let silent = states.last().is_none_or(|entry| entry.at().moment < since);
+            self.engine.cancels = cancelled || silent || !is_busy(&self.obstacles()) || !self.has_hook("power-cycle");
         }
         for (obstacle, action) in [(Obstacle::Paused, "stopPause"), (Obstacle::Charging, "stopCharging")] {
             if self.obstacles().contains(&obstacle) {
@@ -229,6 +235,14 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     /// of a test never showed, and from the first time it was found so after every test.
     pub(super) async fn still_takes_orders(&mut self) -> Result<(), EngineError> {
         let may = self.setup.capabilities.motion.is_ok() && self.has_hook("power-cycle") && self.unhelped < 2;
+        let judge = self.engine.recorder.judge();
+        if may && !self.engine.interrupted() && is_stalled(judge, self.home.since, self.time("drive") / 2) {
+            self.unhelped += 1;
+            let text = "the vehicle says that it drives, and does not move".to_owned();
+            self.engine.note(Event::Note { text })?;
+            self.restart().await?;
+            return Ok(());
+        }
         let judge = self.engine.recorder.judge();
         let asked = self.refuses || last_order_never_showed(judge, self.home.since);
         if !may || !asked || self.engine.interrupted() {

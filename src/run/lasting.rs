@@ -329,6 +329,35 @@ fn stood_driving(judge: &RunJudge, since: Moment) -> bool {
     false
 }
 
+/// Whether the vehicle has said for so long that it drives a released way, and has not moved, although nothing in its
+/// states holds it: something in it has died, and it will not move in the next test either.
+pub(super) fn is_stalled(judge: &RunJudge, since: Moment, patience: Duration) -> bool {
+    let states = judge.timeline().of("state").iter().rev();
+    let mut later: Option<&crate::journal::Entry> = None;
+    for entry in states.take_while(|entry| entry.at().moment >= since) {
+        let Some(state) = entry.json() else { continue };
+        let list = |name: &str| state.get(name).and_then(Value::as_array).into_iter().flatten();
+        let is = |path: &str| state.pointer(path) == Some(&Value::Bool(true));
+        let stopped = state.pointer("/safetyState/eStop").is_some_and(|stop| stop != "NONE");
+        let held = is("/paused") || is("/safetyState/fieldViolation") || stopped;
+        let ahead = list("nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
+        if !is("/driving") || held || !ahead || !list("actionStates").all(is_over_or_waits) {
+            later = None;
+            continue;
+        }
+        let place = super::rest::place_of(state);
+        match later {
+            Some(later) if place.is_some() && later.json().and_then(super::rest::place_of) == place => {
+                if later.at().moment.since(entry.at().moment) >= patience {
+                    return true;
+                }
+            }
+            _ => later = Some(entry),
+        }
+    }
+    false
+}
+
 fn is_over_or_waits(action: &Value) -> bool {
     is_over(action) || action.get("actionStatus").and_then(Value::as_str) == Some("WAITING")
 }

@@ -14,6 +14,7 @@ pub mod device_peer;
 mod dispatching;
 mod draw;
 mod estimate;
+mod fits;
 mod fleet;
 mod header;
 mod hook_server;

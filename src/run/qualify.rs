@@ -69,6 +69,8 @@ impl Kill {
 /// The outcome of a qualification.
 #[derive(Clone, Debug)]
 pub struct Qualification {
+    /// The side whose reference device it is.
+    pub role: Role,
     /// What is not a pass on the faultless device: decider and verdict.
     pub blemishes: Vec<(Decider, Verdict)>,
     /// Everything that passes on the faultless device.
@@ -112,10 +114,19 @@ impl Qualification {
             .collect()
     }
 
-    /// Faults that no requirement they name was reported for.
+    /// Whether a fault comes from a blind round and has not moved to the proven ones yet. What it fails is proven all the
+    /// same, but it need not be found.
+    #[must_use]
+    pub fn is_of_blind_round(&self, fault: &Fault) -> bool {
+        let mut all = BuiltIn::blind_faults(self.role).iter();
+        all.any(|one| one.name == fault.name)
+    }
+
+    /// Faults that no requirement they name was reported for, but for those of blind rounds.
     #[must_use]
     pub fn missed(&self) -> Vec<&Kill> {
-        self.kills.iter().filter(|kill| !kill.named()).collect()
+        let own = self.kills.iter().filter(|kill| !self.is_of_blind_round(&kill.fault));
+        own.filter(|kill| !kill.named()).collect()
     }
 
     /// The matrix as text: per fault what it kills, then what is unproven.
@@ -197,7 +208,7 @@ pub fn decided(result: &RunResult) -> Vec<(Decider, Verdict)> {
     all
 }
 
-/// What was decided, the cases that come from a schema counting as one: which of them are drawn is chance.
+/// What was decided, the cases of a table that is drawn from counting as one: which of them are drawn is chance.
 fn decided_in(library: &Library, result: &RunResult) -> Vec<(Decider, Verdict)> {
     let tests = &library.rules.suites.tests;
     let fold = |mut decider: Decider| {
@@ -297,6 +308,7 @@ pub fn qualify_tests(
     }
     let excused = library.rules.suites.unproven.iter();
     Ok(Qualification {
+        role,
         blemishes,
         deciders,
         kills,

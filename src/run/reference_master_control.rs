@@ -69,7 +69,7 @@ impl ReferenceMasterControl {
             nodes: layout.nodes().map(site_node).collect(),
             edges: layout.edges().map(site_edge).collect(),
             reconnect_delay: Duration::from_millis(300),
-            resend_after: Duration::from_secs(4),
+            resend_after: Duration::from_secs(2),
             trigger_timeout: Duration::from_secs(10),
             ..MasterControlConfig::default()
         };
@@ -117,13 +117,13 @@ impl ReferenceMasterControl {
             vehicle.hurry();
         }
         self.time.drive = Duration::from_secs(3);
-        self.time.quiet = Duration::from_millis(300);
+        self.time.quiet = Duration::from_millis(200);
         // What the tests let pass so that nobody is accused of what was under way; here nothing is for long.
-        self.time.slow = Duration::from_millis(650);
+        self.time.slow = Duration::from_millis(400);
         self.time.settle = Duration::from_millis(70);
         self.time.notice = Duration::from_millis(50);
         self.config.reconnect_delay = Duration::from_millis(100);
-        self.config.resend_after = Duration::from_secs(2);
+        self.config.resend_after = Duration::from_millis(1_200);
         self.config.trigger_timeout = Duration::from_secs(3);
     }
 

@@ -214,15 +214,15 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         Ok(self.stopped().unwrap_or(End::Completed))
     }
 
-    /// Leaves out cases that come from a schema, where the run need not be thorough.
+    /// Leaves out cases that come from a schema or a matrix, where the run need not be thorough.
     fn draw(&mut self) {
         let Some(seed) = self.setup.draw else { return };
         let runs = |test: &Test| self.setup.capabilities.gate(test) == Gate::Runs;
         let drawing = draw(&self.setup.tests, seed, runs);
         if drawing.taken < drawing.of {
             self.setup.limits.push(format!(
-                "Of {} messages broken after the schemas, {} were to be sent, drawn by the seed {seed}; `--thorough` \
-                 sends all of them.",
+                "Of {} cases from schemas and matrices, {} were to be tried, drawn by the seed {seed}; `--thorough` tries \
+                 all of them.",
                 drawing.of, drawing.taken
             ));
         }

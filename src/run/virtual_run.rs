@@ -183,6 +183,7 @@ pub async fn run_virtually(
         capabilities: Capabilities {
             factsheet: None,
             statements: device.statements(),
+            samples: device.device_bindings(),
             claims: std::collections::BTreeMap::new(),
             vantage: request.vantage,
             hooks,

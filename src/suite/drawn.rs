@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::fields::{Fields, Problems, text_of, word_of};
 use super::lint::Vocabulary;
-use super::model::Drawn;
+use super::model::{Drawn, Kind as Origin};
 use super::steps::version_range;
 use crate::diagnostic::Span;
 use crate::pack::{Breakage, Ground, Version, VersionRange, Way};
@@ -143,8 +143,7 @@ pub(super) fn rows(
                 spec: (packs != claimed).then(|| range_of(&packs, &versions)).flatten(),
                 values: values(&one, wanted.topic, at),
                 drawn: Drawn {
-                    topic: wanted.topic.to_owned(),
-                    way: one.way,
+                    kind: Origin::Schema(wanted.topic.to_owned(), one.way),
                     draw: wanted.draw,
                 },
             }

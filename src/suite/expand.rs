@@ -47,13 +47,25 @@ impl<'a> Fill<'a> {
                 Filled::Whole(value) => return value,
                 Filled::Text(value) => Kind::Text { value, quoted: *quoted },
             },
-            Kind::List(items) => Kind::List(items.iter().map(|item| self.apply(item, problems)).collect()),
+            Kind::List(items) => Kind::List(items.iter().flat_map(|item| self.item(item, problems)).collect()),
             Kind::Map(entries) => self.map(entries, problems),
             other => other.clone(),
         };
         Node {
             kind,
             span: node.span.clone(),
+        }
+    }
+
+    /// An element of a list. A variable that stands for a list is its elements.
+    fn item(&mut self, item: &Node, problems: &mut Problems) -> Vec<Node> {
+        let filled = self.apply(item, problems);
+        match (&item.kind, filled.kind) {
+            (Kind::Text { .. }, Kind::List(items)) => items,
+            (_, kind) => vec![Node {
+                kind,
+                span: filled.span,
+            }],
         }
     }
 

@@ -11,6 +11,7 @@ mod fields;
 mod grammar;
 mod lint;
 mod load;
+mod matrix;
 pub mod model;
 mod read;
 mod steps;

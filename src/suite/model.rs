@@ -44,12 +44,12 @@ pub struct Test {
     pub source: Arc<Source>,
     /// The names of course nodes it uses, in order of appearance, and the pairs it drives.
     pub course: CourseNeed,
-    /// What it breaks, when it is one of many cases that come from a schema.
+    /// Where it comes from, when it is one of many cases of which a run takes some.
     pub drawn: Option<Drawn>,
 }
 
 impl Test {
-    /// What it is known by where the cases of a schema count as one: its table, else its id.
+    /// What it is known by where the cases that a run draws from count as one: its table, else its id.
     #[must_use]
     pub fn table(&self) -> &str {
         match self.drawn {
@@ -142,6 +142,8 @@ pub enum Need {
     Optional(String),
     /// `no optional PATH`: the factsheet does not list it.
     NoOptional(String),
+    /// `not required PATH`: the factsheet does not list it as required, or not at all.
+    NotRequired(String),
     /// `vantage tap`: packets can be seen.
     Tap,
     /// `maps`: the bench can serve map files to the device.
@@ -156,7 +158,7 @@ pub enum Need {
 }
 
 pub use crate::course::CourseNeed;
-pub use drawn::Drawn;
+pub use drawn::{Drawn, Kind};
 pub use monitor::{About, Monitor, Rule};
 pub use serving::ServeBehaviour;
 pub use vehicle::{VehicleStep, Which};

@@ -11,6 +11,7 @@ use super::fields::{Fields, Problems, text_of};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::load::{States, parse};
+use super::matrix;
 use super::model::{About, Binding, CourseNeed, Drawn, Maturity, Monitor, Need, Rule, Test};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
@@ -135,23 +136,33 @@ pub(super) fn read_test(
         return reader.draw(&fields, &root, cases, problems);
     }
     let before_rows = problems.len();
-    let rows = rows(cases, problems);
+    let cells = match cases.get(matrix::MATRIX) {
+        Some(_) => matrix::cells(cases, rows, problems),
+        None => Vec::new(),
+    };
+    let rows = match cases.get(matrix::MATRIX) {
+        Some(_) => Vec::new(),
+        None => rows(cases, problems),
+    };
     if problems.len() > before_rows {
         return Vec::new();
     }
+    let written = rows.iter().map(|(name, values)| (Case::Row(name), *values));
+    let crossed = cells.iter().map(|cell| (Case::cell(cell), &cell.values[..]));
     let without_cases = without_cases(&fields, &root);
     let mut used: BTreeMap<&str, (bool, &Span)> = BTreeMap::new();
     let mut tests = Vec::new();
-    for (name, values) in &rows {
+    for (case, values) in written.chain(crossed) {
         let mut fill = Fill::new("case", values);
         let filled = fill.apply(&without_cases, problems);
         let filled = Fill::new("with", nothing).apply_to(&filled, problems);
-        for ((key, _), is_used) in values.iter().zip(&fill.used) {
+        for ((key, value), is_used) in values.iter().zip(&fill.used) {
+            // The name of a row need not be used; it has the place of its axis.
             used.entry(key.text().unwrap_or_default())
                 .or_insert((false, &key.span))
-                .0 |= is_used;
+                .0 |= *is_used || key.span == value.span;
         }
-        tests.extend(reader.read(&filled, Case::Row(name), problems));
+        tests.extend(reader.read(&filled, case, problems));
     }
     for (name, (is_used, span)) in used {
         if !is_used {
@@ -246,8 +257,26 @@ enum Case<'a> {
     Whole,
     /// A row of its table.
     Row(&'a str),
-    /// A row that came from a schema, and whether it is linted.
-    Drawn(&'a drawn::Row, bool),
+    /// One of many of which a run takes some.
+    Drawn {
+        name: &'a str,
+        /// The versions that have it; those of the test unless said.
+        spec: Option<&'a VersionRange>,
+        drawn: &'a Drawn,
+        /// Whether it is linted.
+        lint: bool,
+    },
+}
+
+impl<'a> Case<'a> {
+    fn cell(cell: &'a matrix::Cell) -> Self {
+        Self::Drawn {
+            name: &cell.name,
+            spec: None,
+            drawn: &cell.drawn,
+            lint: true,
+        }
+    }
 }
 
 impl TestReader<'_> {
@@ -280,8 +309,14 @@ impl TestReader<'_> {
                 .first()
                 .and_then(|(_, patch)| patch.list())
                 .map_or(0, <[Node]>::len);
-            let lint = linted.insert((row.drawn.way, length, row.spec.is_some()));
-            tests.extend(self.read(&filled, Case::Drawn(row, lint), problems));
+            let lint = linted.insert((row.drawn.kind.clone(), length, row.spec.is_some()));
+            let case = Case::Drawn {
+                name: &row.name,
+                spec: row.spec.as_ref(),
+                drawn: &row.drawn,
+                lint,
+            };
+            tests.extend(self.read(&filled, case, problems));
         }
         tests
     }
@@ -324,7 +359,7 @@ impl TestReader<'_> {
         let (name, drawn, lint): (_, Option<Drawn>, _) = match case {
             Case::Whole => (None, None, true),
             Case::Row(name) => (Some(name), None, true),
-            Case::Drawn(row, lint) => (Some(row.name.as_str()), Some(row.drawn.clone()), lint),
+            Case::Drawn { name, drawn, lint, .. } => (Some(name), Some(drawn.clone()), lint),
         };
         let mut test = Test {
             id: name.map_or_else(|| id.clone(), |name| format!("{id}[{name}]")),
@@ -332,7 +367,7 @@ impl TestReader<'_> {
             title: header.title,
             device: header.device.or(self.role)?,
             spec: match case {
-                Case::Drawn(row, _) => row.spec.clone().or(header.spec)?,
+                Case::Drawn { spec: Some(spec), .. } => spec.clone(),
                 _ => header.spec?,
             },
             needs,

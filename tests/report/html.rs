@@ -159,6 +159,7 @@ fn sections_stand_in_the_order_a_reader_needs_them() {
     let expected = [
         "In numbers",
         "Limits of this statement",
+        "Why nothing was decided",
         "Requirements by chapter",
         "Tests",
         "Monitors",

@@ -10,7 +10,9 @@ use crate::journal::Entry;
 /// See the module.
 pub(in crate::checks) const NOT_ASKED: Check = Check {
     name: "commands/not-asked",
-    decides: &["ACT-08", "FACT-15", "IACT-02", "INFO-02", "MODE-04"],
+    decides: &[
+        "ACT-08", "CONN-12", "CONN-14", "FACT-15", "IACT-02", "INFO-02", "INFO-03", "MODE-04", "VIS-03",
+    ],
     doc: "No instant action of the `types` is sent, or none but those of `except`. Without an \
           array `actions` they are looked for in `instantActions`, as older versions called it: there they are as wrong.",
     arguments: &["types", "except"],

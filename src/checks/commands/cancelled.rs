@@ -20,7 +20,8 @@ pub(in crate::checks) const BASE_KEPT: Check = Check {
     doc: "While the states of the vehicle show released elements or a running action of an order, no other order is sent \
           to it and no update replaces them, unless cancelOrder has come before and the vehicle has reported it done or \
           shows nothing left of the order. After cancelOrder no update of that order comes, unless cancelOrder has \
-          FAILED. A vehicle that may have given its order up by itself is not judged.",
+          FAILED. A vehicle that may have given its order up by itself is not judged; where an \
+          action has failed, what is left tells.",
     arguments: &[],
     start: |_| Box::new(BaseKept::default()),
 };
@@ -117,7 +118,7 @@ impl Running for BaseKept {
         }
         if let Some(seen) = self.vehicle.last() {
             self.taken |= seen.order == self.order;
-            self.free |= self.taken && seen.abandons && self.cancel.is_none();
+            self.free |= self.taken && seen.taken_out && self.cancel.is_none();
         }
         let command = Command::read(self.traffic, entry, context);
         let Some(command) = command.filter(|_| !self.traffic.disturbed) else {

@@ -16,7 +16,7 @@ pub(in crate::checks) const CORRIDORS: Check = Check {
     doc: "A corridor has a left and a right width of at least 0, not both 0, and a reference point the protocol knows. It \
           comes with a trajectory, unless the vehicle is bound to lines or reports trajectories of its own. Where two \
           corridors meet, the end of the first way lies inside the second corridor; a node that allows a wider \
-          deviation than the second corridor is a warning.",
+          deviation than the second corridor, or than both sides of it together, is a warning.",
     arguments: &[],
     start: |_| Box::new(Corridors::default()),
 };
@@ -144,7 +144,8 @@ fn meeting(pair: &[&Value], around: &[&Value], found: &mut Found<'_>) {
     }
     let allowed = node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64);
     let reach = before_left.max(before_right);
-    if let Some(allowed) = allowed.filter(|allowed| allowed.min(reach) > left.max(right) + ROUNDING) {
+    let wide = |allowed: f64| allowed.min(reach) > left.max(right) + ROUNDING || allowed > left + right + ROUNDING;
+    if let Some(allowed) = allowed.filter(|allowed| wide(*allowed)) {
         let text = format!("node {id} allows {allowed} m, the next corridor is narrower to both sides");
         found.remark("CORR-04", text);
     }

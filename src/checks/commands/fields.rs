@@ -35,9 +35,10 @@ pub(in crate::checks) const POSITION_RANGE: Check = Check {
 pub(in crate::checks) const ZONE_SET: Check = Check {
     name: "commands/zone-set",
     decides: &["ORD-MSG-03"],
-    doc: "zoneSetId is left out or names a zone set; it is neither null nor empty.",
+    doc: "zoneSetId is left out or names a zone set; it is neither null nor empty. A word for nothing, such as none, is \
+          a warning, and fails where the factsheet of the vehicle does not support the field.",
     arguments: &[],
-    start: |_| Each::start(zone_set),
+    start: |_| Box::new(ZoneSet::default()),
 };
 
 /// `commands/identifiers`.
@@ -136,14 +137,42 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
     judged
 }
 
-fn zone_set(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
-    let Some(order) = command.order() else { return false };
-    match order.get("zoneSetId") {
-        Some(Value::Null) => found.broken("ORD-MSG-03", "zoneSetId is null"),
-        Some(Value::String(text)) if text.is_empty() => found.broken("ORD-MSG-03", "zoneSetId is empty"),
-        _ => {}
+/// Words that say that there is nothing, where nothing should be said.
+const NOTHING: [&str; 7] = ["none", "null", "nil", "undefined", "n/a", "na", "-"];
+
+#[derive(Default)]
+struct ZoneSet {
+    traffic: Traffic,
+    sheets: Sheets,
+}
+
+impl Running for ZoneSet {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.sheets.note(entry, context);
+        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+        let Some(order) = order else { return false };
+        let mut found = Found::new(entry, findings);
+        match order.get("zoneSetId") {
+            Some(Value::Null) => found.broken("ORD-MSG-03", "zoneSetId is null"),
+            Some(Value::String(text)) if text.is_empty() => found.broken("ORD-MSG-03", "zoneSetId is empty"),
+            Some(Value::String(text)) if NOTHING.contains(&text.to_ascii_lowercase().trim()) => {
+                let sheets = self.sheets.valid(entry, context);
+                let unlisted = |sheet: &Sheet| {
+                    let listed = sheet.supported.as_ref();
+                    listed.is_some_and(|listed| !listed.iter().any(|one| one.ends_with("zoneSetId")))
+                };
+                let message = format!("zoneSetId is {}, a word for no zone set", quote(text));
+                if !sheets.is_empty() && sheets.iter().all(|sheet| unlisted(sheet)) {
+                    found.broken("ORD-MSG-03", message);
+                } else {
+                    found.remark("ORD-MSG-03", message);
+                }
+            }
+            _ => {}
+        }
+        true
     }
-    true
 }
 
 /// Every identifier in a message: what it is, and the text.

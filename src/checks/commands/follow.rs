@@ -1,6 +1,6 @@
 //! Orders and their updates, one after the other: what may change and what must stay.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use serde_json::Value;
 
@@ -12,6 +12,7 @@ use crate::checks::traffic::{Traffic, elements, quote, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
+use crate::journal::event::Event;
 
 /// `commands/updates`.
 pub(in crate::checks) const UPDATES: Check = Check {
@@ -79,10 +80,12 @@ struct Order {
     id: String,
     sent: VecDeque<Sent>,
     /// Ids of all released elements by sequenceId; bounded.
-    base: std::collections::BTreeMap<u64, String>,
+    base: BTreeMap<u64, String>,
     last_used: Moment,
     /// Whether a state has shown that nothing is left of it.
     done: bool,
+    /// The same, and nobody has done anything to the vehicle meanwhile.
+    ended: bool,
 }
 
 struct Follow {
@@ -91,6 +94,8 @@ struct Follow {
     vehicle: Vehicle,
     /// Oldest first; the one sent last is at the end.
     orders: VecDeque<Order>,
+    /// Numbers and contents of what was sent before the link was disturbed, by orderId.
+    numbers: BTreeMap<String, Vec<(u64, u64)>>,
 }
 
 /// The released elements of a message: sequenceId and id.
@@ -119,9 +124,10 @@ impl Order {
         let mut order = Self {
             id,
             sent: VecDeque::new(),
-            base: std::collections::BTreeMap::new(),
+            base: BTreeMap::new(),
             last_used: now,
             done: false,
+            ended: false,
         };
         order.take(message, update, now);
         order
@@ -143,6 +149,7 @@ impl Order {
         }
         self.last_used = now;
         self.done = false;
+        self.ended = false;
     }
 
     fn newest(&self) -> Option<u64> {
@@ -157,7 +164,41 @@ impl Follow {
             traffic: Traffic::default(),
             vehicle: Vehicle::default(),
             orders: VecDeque::new(),
+            numbers: BTreeMap::new(),
         }
+    }
+
+    /// The link is disturbed: where orders go on is not known any more, but numbers that were given are.
+    fn interrupted(&mut self) {
+        for order in self.orders.drain(..) {
+            if self.numbers.len() == ORDERS {
+                self.numbers.pop_first();
+            }
+            let known = self.numbers.entry(order.id).or_default();
+            known.extend(order.sent.iter().map(|sent| (sent.update, sent.print)));
+            known.truncate(MESSAGES);
+        }
+    }
+
+    /// An order that goes on behind a disturbance with a number that was given before.
+    fn falls_back(&self, message: &Value, id: &str, update: u64, found: &mut Found<'_>) -> bool {
+        let Some(known) = self.numbers.get(id).filter(|_| self.focus == Focus::Updates) else {
+            return false;
+        };
+        let print = content(message);
+        let again = known.contains(&(update, print));
+        let first = in_sequence(message, "nodes")
+            .first()
+            .and_then(|node| number(node, "sequenceId"));
+        let newest = known.iter().map(|(update, _)| *update).max().unwrap_or_default();
+        if again || first.is_none_or(|first| first == 0) {
+            return false;
+        }
+        if update <= newest {
+            let text = format!("orderUpdateId {update} comes behind the lost link, and was at {newest} before");
+            found.broken("ORD-UPD-04", text);
+        }
+        true
     }
 
     fn message(&mut self, message: &Value, entry: &Entry, context: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
@@ -166,7 +207,7 @@ impl Follow {
         };
         let now = entry.at().moment;
         let Some(at) = self.orders.iter().position(|order| order.id == id) else {
-            let judged = self.unknown(message, &id, found);
+            let judged = self.falls_back(message, &id, update, found) || self.unknown(message, &id, found);
             if self.orders.len() == ORDERS {
                 self.orders.pop_front();
             }
@@ -189,7 +230,13 @@ impl Follow {
         let first = in_sequence(message, "nodes")
             .first()
             .and_then(|node| number(node, "sequenceId"));
-        let starts_anew = first == Some(0) && (update == 0 || Some(update) <= order.newest());
+        let behind_its_end = order.ended
+            && order
+                .sent
+                .back()
+                .and_then(|sent| sent.end.as_ref())
+                .is_some_and(|end| end.sequence > 0);
+        let starts_anew = first == Some(0) && (update == 0 || Some(update) <= order.newest() || behind_its_end);
         let judged = if (order.done || !is_newest) && starts_anew {
             self.reused(&order, now, found);
             order = Order::begin(id, message, update, now);
@@ -283,6 +330,7 @@ impl Follow {
         let Some(first) = in_sequence(message, "nodes").into_iter().next() else {
             return true;
         };
+        counted_back(message, first, found);
         // An update that the vehicle has not taken over may be replaced by one that begins where it began.
         let confirmed = self
             .vehicle
@@ -339,6 +387,22 @@ fn elsewhere(order: &Order, end: &End, message: &Value, first: &Value, found: &m
     let replaces = sequence == end.sequence;
     if repeats || replaces {
         found.broken("ORD-UPD-03", text_of("though the base ended with"));
+    }
+}
+
+/// Edges of an update that have numbers from before its first node, which other elements had already.
+fn counted_back(message: &Value, first: &Value, found: &mut Found<'_>) {
+    let (nodes, edges) = (in_sequence(message, "nodes"), in_sequence(message, "edges"));
+    let Some(begins) = number(first, "sequenceId").filter(|_| nodes.len() == edges.len() + 1) else {
+        return;
+    };
+    let back = edges
+        .into_iter()
+        .find_map(|edge| Some((edge, number(edge, "sequenceId").filter(|sequence| *sequence < begins)?)));
+    if let Some((edge, sequence)) = back {
+        let id = quote(text(edge, "edgeId"));
+        let text = format!("edge {id} of an update that begins with sequenceId {begins} has sequenceId {sequence}");
+        found.broken("ORD-UPD-12", text);
     }
 }
 
@@ -413,11 +477,18 @@ impl Running for Follow {
         self.traffic.note(entry);
         match self.vehicle.note(entry, context) {
             // What was sent may have been lost, or the vehicle has given its order up without a word.
-            Outside::Moved | Outside::Lost => {
+            outside @ (Outside::Moved | Outside::Lost) => {
                 for order in &mut self.orders {
                     order.done = true;
                 }
+                let link = matches!(entry.event(), Event::Fault { .. });
+                if outside == Outside::Moved || !link {
+                    self.numbers.clear();
+                }
                 if self.vehicle.states.is_empty() && self.focus != Focus::Ids {
+                    if link {
+                        self.interrupted();
+                    }
                     self.orders.clear();
                 }
             }
@@ -433,6 +504,7 @@ impl Running for Follow {
             && order.newest() <= Some(seen.update)
         {
             order.done = true;
+            order.ended = true;
         }
         if self.traffic.disturbed {
             return false;

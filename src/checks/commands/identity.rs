@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
+use super::vehicle::Vehicle;
 use super::{Command, ELEMENTS, Found, fingerprint, in_sequence, place_of, short};
 use crate::checks::orders::number;
 use crate::checks::traffic::{Traffic, elements, quote, text, unclear};
@@ -16,7 +17,7 @@ pub(in crate::checks) const NODE_IDS: Check = Check {
     name: "commands/node-ids",
     decides: &["ORD-MSG-07"],
     doc: "A nodeId always comes with the same map and position. A position that has moved by less than half a metre may \
-          have been corrected by somebody, which is inconclusive.",
+          have been corrected by somebody, which is inconclusive, unless it has moved to where the vehicle stands.",
     arguments: &[],
     start: |_| Box::new(NodeIds::default()),
 };
@@ -42,6 +43,7 @@ const CORRECTED: f64 = 0.5;
 #[derive(Default)]
 struct NodeIds {
     traffic: Traffic,
+    vehicle: Vehicle,
     /// Place of each node.
     known: BTreeMap<String, (f64, f64, String)>,
 }
@@ -49,8 +51,14 @@ struct NodeIds {
 impl Running for NodeIds {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
+        self.vehicle.note(entry, context);
         let order = Command::read(self.traffic, entry, context).and_then(Command::order);
         let Some(order) = order else { return false };
+        let stands: Vec<(f64, f64)> = self
+            .vehicle
+            .recent(entry, context)
+            .filter_map(|seen| seen.pose.as_ref().map(|(x, y, _)| (*x, *y)))
+            .collect();
         let mut found = Found::new(entry, findings);
         let mut judged = false;
         for node in in_sequence(order, "nodes") {
@@ -72,6 +80,9 @@ impl Running for NodeIds {
                 found.broken("ORD-MSG-07", text);
             } else if apart > CORRECTED {
                 found.broken("ORD-MSG-07", format!("node {shown} is {apart:.2} m from where it was"));
+            } else if apart > SAME && stands.iter().any(|(at_x, at_y)| (x - at_x).hypot(y - at_y) < SAME) {
+                let text = format!("node {shown} is {apart:.3} m from where it was, right where the vehicle stands");
+                found.broken("ORD-MSG-07", text);
             } else if apart > SAME {
                 let text = format!("node {shown} is {apart:.3} m from where it was, as after a correction");
                 found.push(unclear("ORD-MSG-07", entry.seq(), text));

@@ -9,6 +9,7 @@ use crate::checks::traffic::{Traffic, elements, quote, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
+use crate::journal::event::{Event, LinkFault};
 
 /// `commands/limits`.
 pub(in crate::checks) const SIZES: Check = Check {
@@ -25,7 +26,8 @@ pub(in crate::checks) const ORDER_INTERVAL: Check = Check {
     name: "commands/order-interval",
     decides: &["FACT-13"],
     doc: "Between two order messages lies at least minOrderInterval of the factsheet, with a margin of a tenth and \
-          50 ms. Judged only while the link is not disturbed.",
+          50 ms. Judged only while the link is not disturbed; the first order behind a link that was cut counts from the \
+          last one before.",
     arguments: &[],
     start: |_| Box::new(Interval::default()),
 };
@@ -128,22 +130,37 @@ struct Interval {
     traffic: Traffic,
     sheets: Sheets,
     last: Option<Moment>,
+    /// The link was cut since the last order.
+    cut: bool,
 }
 
 impl Running for Interval {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let disturbed = self.traffic.disturbed;
         self.traffic.note(entry);
         self.sheets.note(entry, context);
-        if disturbed != self.traffic.disturbed || self.traffic.disturbed {
-            self.last = None;
+        match entry.event() {
+            Event::Fault {
+                fault: LinkFault::Cut { .. },
+            } => self.cut = true,
+            Event::Fault {
+                fault: LinkFault::Restore,
+            } if self.cut => {}
+            // What is held back or lost comes at other times than it was sent.
+            Event::Fault { .. } => self.last = None,
+            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown") => self.last = None,
+            _ => {}
         }
         let order = Command::read(self.traffic, entry, context).and_then(Command::order);
         if order.is_none() || self.traffic.disturbed {
             return false;
         }
         let now = entry.at().moment;
-        let Some(before) = self.last.replace(now) else {
+        let before = self.last.replace(now);
+        if std::mem::take(&mut self.cut) {
+            // What was sent while the link was down may come all at once. It is never earlier than it was sent.
+            self.last = None;
+        }
+        let Some(before) = before else {
             return false;
         };
         let sheets = self.sheets.valid(entry, context);

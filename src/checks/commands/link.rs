@@ -190,7 +190,7 @@ impl Running for Listens {
 }
 
 /// Whether a topic filter takes a topic.
-fn takes(filter: &str, topic: &str) -> bool {
+pub(in crate::checks) fn takes(filter: &str, topic: &str) -> bool {
     // The name of a group comes before the filter of a shared subscription.
     let filter = match filter.strip_prefix("$share/") {
         Some(rest) => rest.split_once('/').map_or(rest, |(_, filter)| filter),

@@ -22,6 +22,16 @@ pub(in crate::checks) const ENABLED: Check = Check {
     start: |_| Box::new(Enabled::default()),
 };
 
+/// `commands/map-on-board`.
+pub(in crate::checks) const ON_BOARD: Check = Check {
+    name: "commands/map-on-board",
+    decides: &["MAP-10"],
+    doc: "The instant action enableMap names a map version that a state of the vehicle lists: it was brought on board \
+          before. Judged only for a vehicle that lists maps; otherwise it is a warning.",
+    arguments: &[],
+    start: |_| Box::new(OnBoard::default()),
+};
+
 /// `commands/map-download`.
 pub(in crate::checks) const DOWNLOADS: Check = Check {
     name: "commands/map-download",
@@ -148,6 +158,63 @@ impl Running for Enabled {
                     "MAP-09",
                     format!("the order is on map {}, which is not enabled", quote(map)),
                 );
+            }
+        }
+        judged
+    }
+}
+
+#[derive(Default)]
+struct OnBoard {
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// Map versions of the last states.
+    listed: VecDeque<(Moment, BTreeSet<(String, String)>)>,
+}
+
+impl Running for OnBoard {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+            self.listed.clear();
+        }
+        let now = entry.at().moment;
+        if let Some(state) = said("state", entry, context) {
+            let name = |map: &Value, member| short(map, member).unwrap_or_default();
+            let maps = elements(state, "maps").take(KEPT);
+            let maps = maps.map(|map| (name(map, "mapId"), name(map, "mapVersion"))).collect();
+            if self.listed.len() == 64 {
+                self.listed.pop_front();
+            }
+            self.listed.push_back((now, maps));
+        }
+        let Some(command @ Command::Instant(_)) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        let newest = self.listed.iter().rev();
+        let fresh = newest
+            .clone()
+            .take_while(|(said, _)| now.since(*said) < grace(context))
+            .count();
+        let recent: Vec<_> = newest.take(fresh + 1).map(|(_, maps)| maps).collect();
+        if recent.is_empty() || recent.iter().any(|maps| maps.is_empty()) || self.vehicle.unsettled(entry, context) {
+            return false;
+        }
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        for (_, action) in command.actions() {
+            let (Some((id, version)), "enableMap") = (pair(action), text(action, "actionType")) else {
+                continue;
+            };
+            judged = true;
+            let is_it = |map: &(String, String)| map.0 == id && (version.is_empty() || map.1 == version);
+            if !recent.iter().any(|maps| maps.iter().any(is_it)) {
+                let text = format!(
+                    "enableMap names version {} of map {}, which is not on board",
+                    quote(&version),
+                    quote(&id)
+                );
+                found.remark("MAP-10", text);
             }
         }
         judged

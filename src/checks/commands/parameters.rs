@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::sheet::{Sheet, Sheets};
-use super::{Command, ELEMENTS, Each, Found, parameter};
+use super::{Command, ELEMENTS, Found, parameter};
 use crate::checks::factsheet_actions::{How, look};
 use crate::checks::traffic::{Traffic, elements, quote, show, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
@@ -13,17 +13,67 @@ use crate::journal::Entry;
 pub(in crate::checks) const VALUES: Check = Check {
     name: "commands/parameter-form",
     decides: &["BP-04", "BP-05"],
-    doc: "Parameters of actions are an array of objects, each with a text as key and a value that is not null. Another \
-          word in the place of key or value breaks both rules.",
+    doc: "Parameters of actions are an array of objects, each with a text as key and a value that is not null, and of the \
+          valueDataType that the factsheet of the vehicle names. Another word in the place of key or value breaks both \
+          rules.",
     arguments: &[],
-    start: |_| Each::start(form),
+    start: |_| Box::new(Values::default()),
 };
+
+#[derive(Default)]
+struct Values {
+    traffic: Traffic,
+    sheets: Sheets,
+}
+
+impl Running for Values {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.sheets.note(entry, context);
+        let Some(command) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        let mut found = Found::new(entry, findings);
+        let judged = form(command, &mut found);
+        let sheets = self.sheets.valid(entry, context);
+        if sheets.is_empty() {
+            return judged;
+        }
+        for (_, action) in command.actions() {
+            let kind = text(action, "actionType");
+            for parameter in elements(action, "actionParameters").take(ELEMENTS) {
+                let key = text(parameter, "key");
+                let Some(value) = parameter.get("value").filter(|value| !value.is_null()) else {
+                    continue;
+                };
+                // Wrong is what no factsheet that counts allows.
+                let wanted = |sheet: &Sheet| {
+                    let offered = sheet.actions.as_ref()?.get(kind)?;
+                    let wanted = offered.types.get(key)?;
+                    (!is_of_type(value, wanted)).then(|| wanted.clone())
+                };
+                let all: Option<Vec<String>> = sheets.iter().map(|sheet| wanted(sheet)).collect();
+                if let Some(wanted) = all.and_then(|all| all.into_iter().next()) {
+                    let shown = show(value);
+                    let text = format!(
+                        "parameter {} of {} is {shown}, not of type {wanted}",
+                        quote(key),
+                        quote(kind)
+                    );
+                    found.broken("BP-05", text);
+                }
+            }
+        }
+        judged
+    }
+}
 
 /// `commands/parameter-keys`.
 pub(in crate::checks) const KEYS: Check = Check {
     name: "commands/parameter-keys",
     decides: &["ACT-06"],
-    doc: "No parameter of a predefined action is a predefined one in another spelling. One that only has all its words, \
+    doc: "No parameter of a predefined action is a predefined one in another spelling, or hides one in an object of \
+          its own. One that only has all its words, \
           and is not listed in the factsheet of the vehicle, is a warning.",
     arguments: &[],
     start: |_| Box::new(Keys::default()),
@@ -39,7 +89,7 @@ pub(in crate::checks) const MANDATORY: Check = Check {
     start: |_| Box::new(Mandatory::default()),
 };
 
-fn form(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
+fn form(command: Command<'_>, found: &mut Found<'_>) -> bool {
     let mut judged = false;
     for (_, action) in command.actions() {
         let Some(parameters) = action.get("actionParameters") else {
@@ -132,6 +182,18 @@ impl Running for Keys {
                 .filter(|key| !predefined.contains_key(*key))
                 .filter(|key| !sheets.iter().any(|sheet| lists(sheet, key)))
                 .collect();
+            for parameter in elements(action, "actionParameters").take(ELEMENTS) {
+                let (key, inside) = (
+                    text(parameter, "key"),
+                    parameter.get("value").and_then(Value::as_object),
+                );
+                let inside = inside.filter(|_| further.contains(&key));
+                let hidden = inside.and_then(|inside| inside.keys().find(|name| predefined.contains_key(*name)));
+                if let Some(hidden) = hidden {
+                    let name = quote(key);
+                    found.broken("ACT-06", format!("{hidden} of {kind} is hidden in a parameter {name}"));
+                }
+            }
             let open: Vec<&str> = predefined
                 .keys()
                 .map(String::as_str)

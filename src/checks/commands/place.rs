@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::sheet::Sheets;
+use super::sheet::{Sheet, Sheets};
 use super::vehicle::{Outside, Seen, Vehicle};
 use super::{Command, Found, in_sequence, place_of, short};
 use crate::checks::orders::number;
@@ -66,6 +66,8 @@ pub(in crate::checks) const FIRST_PLACE: Check = Check {
 
 /// How far a position may be off by measuring and rounding, in metres.
 const MEASURED: f64 = 0.3;
+/// How far a position may be off by rounding alone, in metres.
+const ROUNDED: f64 = 0.06;
 /// Farther off than this is another unit, and not another direction, in metres.
 const FAR_OFF: f64 = 50.0;
 /// A vehicle this far from the place of its last node stands between nodes, in metres.
@@ -127,15 +129,26 @@ impl Start {
     ) -> bool {
         let id = text(node, "nodeId");
         let is_last = recent.iter().any(|seen| seen.last_node == id);
+        // What was set up by the harness stands exactly there.
+        let exact = self.settled && self.rule == Rule::Start;
         let covered = recent
             .iter()
-            .map(|seen| covers(node, seen))
+            .map(|seen| covers(node, seen, exact))
             .max()
             .unwrap_or(Reach::Unknown);
         let newest = recent.first().map(|seen| seen.last_node.as_str()).unwrap_or_default();
         let shown = quote(id);
         match self.rule {
             Rule::Start => {
+                if let Some((map, on)) = other_map(node, recent).filter(|_| exact) {
+                    let text = format!(
+                        "the order begins at node {shown} on map {}, the vehicle is on {}",
+                        quote(map),
+                        quote(on)
+                    );
+                    found.broken("ORD-03", text);
+                    return true;
+                }
                 if is_last || covered == Reach::Yes {
                     return true;
                 }
@@ -192,6 +205,15 @@ impl Start {
                 if covered == Reach::Yes {
                     return true;
                 }
+                let unlisted = |sheet: &Sheet| {
+                    let listed = sheet.supported.as_ref();
+                    listed.is_some_and(|listed| !listed.iter().any(|one| one.ends_with("allowedDeviationXY")))
+                };
+                // What the vehicle does not support need not be sent to it.
+                let unsupported = sheets.valid(entry, context).iter().any(|sheet| unlisted(sheet));
+                if is_last && allowed.is_none() && unsupported {
+                    return false;
+                }
                 if is_last && allowed.is_none() {
                     let text = format!("the order begins at node {shown} without a deviation that reaches the vehicle");
                     found.remark("ORD-CANCEL-17", text);
@@ -212,13 +234,26 @@ enum Reach {
     Yes,
 }
 
-/// Whether the place of a node covers where the vehicle says it is.
-fn covers(node: &Value, seen: &Seen) -> Reach {
+/// The map of a node and that of the vehicle, where it was on another one in every state that counts.
+fn other_map<'a>(node: &'a Value, recent: &[&'a Seen]) -> Option<(&'a str, &'a str)> {
+    let map = place_of(node)?.2;
+    let (_, _, first) = recent.first()?.pose.as_ref()?;
+    let elsewhere = recent
+        .iter()
+        .all(|seen| matches!(&seen.pose, Some((_, _, on)) if !on.is_empty() && on != map));
+    (!map.is_empty() && elsewhere).then_some((map, first.as_str()))
+}
+
+/// Whether the place of a node covers where the vehicle says it is; a deviation that is named has to reach it where
+/// that is known exactly.
+fn covers(node: &Value, seen: &Seen, exact: bool) -> Reach {
     let (Some((x, y, map)), Some((at_x, at_y, on))) = (place_of(node), seen.pose.as_ref()) else {
         return Reach::Unknown;
     };
     let allowed = node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64);
-    let near = (x - at_x).hypot(y - at_y) <= allowed.unwrap_or_default().max(0.0) + MEASURED;
+    let named = allowed.is_some_and(|allowed| allowed > 0.0);
+    let margin = if exact && named { ROUNDED } else { MEASURED };
+    let near = (x - at_x).hypot(y - at_y) <= allowed.unwrap_or_default().max(0.0) + margin;
     if near && (map == on || on.is_empty()) {
         Reach::Yes
     } else {

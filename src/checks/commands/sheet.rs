@@ -24,6 +24,8 @@ pub(super) struct Offered {
     pub blocking: Option<Vec<String>>,
     /// Key and whether it may be left out; `None`: not said.
     pub parameters: Option<BTreeMap<String, bool>>,
+    /// valueDataType by key, where it is said.
+    pub types: BTreeMap<String, String>,
 }
 
 /// What a factsheet says.
@@ -70,7 +72,12 @@ impl Offered {
             });
             all.collect()
         });
+        let typed = listed.into_iter().flatten().take(ELEMENTS).filter_map(|parameter| {
+            let kind = parameter.get("valueDataType")?.as_str()?;
+            Some((text(parameter, "key").to_owned(), kind.chars().take(32).collect()))
+        });
         Self {
+            types: typed.collect(),
             scopes: texts(action.get("actionScopes")).unwrap_or_default(),
             blocking: texts(action.get("blockingTypes")).filter(|types| !types.is_empty()),
             parameters,

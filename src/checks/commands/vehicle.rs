@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{ELEMENTS, said, short};
 use crate::checks::CheckContext;
-use crate::checks::orders::{may_abandon, number};
+use crate::checks::orders::{is_taken_out, number};
 use crate::checks::traffic::{elements, text};
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -29,8 +29,8 @@ pub(super) struct Seen {
     pub base: usize,
     pub horizon: usize,
     pub mode: String,
-    /// Whether it shows something that may end an order without a word.
-    pub abandons: bool,
+    /// Whether it shows something that may end an order without a word; of a failed action its states tell the rest.
+    pub taken_out: bool,
     /// Action ids with their status.
     pub actions: Vec<(String, String)>,
     /// orderUpdateIds of its order that an error names.
@@ -68,7 +68,7 @@ impl Seen {
             base: left(true),
             horizon: left(false),
             mode: text(state, "operatingMode").chars().take(64).collect(),
-            abandons: may_abandon(state),
+            taken_out: is_taken_out(state),
             actions,
             refused: refused(state),
         }
@@ -115,7 +115,7 @@ const MOVES: [&str; 14] = [
 ];
 
 /// What makes the states or the answers of a vehicle less than the truth.
-const DEVIATES: [&str; 12] = [
+const DEVIATES: [&str; 11] = [
     "answer-after",
     "state-interval",
     "lose-states",
@@ -127,7 +127,6 @@ const DEVIATES: [&str; 12] = [
     "publish",
     "speak-version",
     "stale-will",
-    "fail-actions",
 ];
 
 /// What happened to the vehicle from outside.

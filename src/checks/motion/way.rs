@@ -121,6 +121,8 @@ struct Plan {
     update: u64,
     stops: Vec<Stop>,
     edges: Vec<Demands>,
+    /// sequenceIds of what is only planned.
+    planned: Vec<u64>,
 }
 
 impl Plan {
@@ -136,7 +138,18 @@ impl Plan {
                 .take(ELEMENTS)
                 .filter_map(Demands::read)
                 .collect(),
+            planned: elements(message, "nodes")
+                .take(ELEMENTS)
+                .chain(elements(message, "edges").take(ELEMENTS))
+                .filter(|element| element.get("released").and_then(Value::as_bool) == Some(false))
+                .filter_map(|element| number(element, "sequenceId"))
+                .collect(),
         })
+    }
+
+    /// Whether what it says about an element still holds under an update: that replaces what was only planned.
+    fn holds(&self, sequence: u64, update: u64) -> bool {
+        self.update == update || !self.planned.contains(&sequence)
     }
 }
 
@@ -221,9 +234,7 @@ impl Walk {
             return None;
         }
         let (id, sequence) = self.shown.last.as_ref()?;
-        let node = self.agreed(order, update, |plan| {
-            plan.stops.iter().find(|stop| stop.sequence == *sequence)
-        })?;
+        let node = self.stop(order, update, *sequence)?;
         // Before the first node is reached, the last node is one of the order before.
         let first = self
             .shown
@@ -263,16 +274,23 @@ impl Walk {
     }
 
     fn lane(&self, order: &str, update: u64, from: &Stop) -> Option<Lane> {
+        let ahead = from.sequence + 1;
         let demands = self.agreed(order, update, |plan| {
-            plan.edges.iter().find(|edge| edge.sequence == from.sequence + 1)
+            let edge = plan.edges.iter().find(|edge| edge.sequence == ahead);
+            edge.filter(|_| plan.holds(ahead, update))
         })?;
-        let to = self.agreed(order, update, |plan| {
-            plan.stops.iter().find(|stop| stop.sequence == from.sequence + 2)
-        })?;
+        let to = self.stop(order, update, from.sequence + 2)?;
         Some(Lane {
             demands: demands.clone(),
             from: from.clone(),
             to: to.clone(),
+        })
+    }
+
+    fn stop(&self, order: &str, update: u64, sequence: u64) -> Option<&Stop> {
+        self.agreed(order, update, |plan| {
+            let stop = plan.stops.iter().find(|stop| stop.sequence == sequence);
+            stop.filter(|_| plan.holds(sequence, update))
         })
     }
 

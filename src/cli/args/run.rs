@@ -70,10 +70,10 @@ pub struct Run {
     /// Run against the built-in device in memory and in virtual time, without a network
     #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
     pub in_virtual_time: bool,
-    /// Send every message that can be broken after the schemas, and not a few of them
+    /// Try every case from schemas and matrices, and not a few of them
     #[arg(long)]
     pub thorough: bool,
-    /// Make identifiers, the order of events and what is drawn from the schemas repeatable
+    /// Make identifiers, the order of events and what is drawn from schemas and matrices repeatable
     #[arg(long, value_name = "NUMBER")]
     pub seed: Option<u64>,
     /// The same for everybody: set by `certify`.
@@ -104,7 +104,7 @@ pub struct Certify {
         required = true
     )]
     pub profile: Option<PathBuf>,
-    /// Send every message that can be broken after the schemas, and not a few of them
+    /// Try every case from schemas and matrices, and not a few of them
     #[arg(long)]
     pub thorough: bool,
     /// Where results go.

@@ -60,8 +60,20 @@ pub(super) fn of_profile(
     ))
 }
 
-/// A port of this machine that nobody uses now.
+/// Ports below those that an operating system gives to outgoing connections: what one of them is given is not free any
+/// more when the device is started again.
+const OWN_PORTS: std::ops::Range<u32> = 20_000..32_000;
+
+/// A port of this machine that nobody uses now. Harnesses that start at the same time begin to look in different places.
 fn free_port() -> Result<String, Problem> {
+    let span = OWN_PORTS.end - OWN_PORTS.start;
+    let first = std::process::id().wrapping_mul(97) % span;
+    for step in 0..100 {
+        let port = OWN_PORTS.start + (first + step) % span;
+        if std::net::TcpListener::bind(format!("127.0.0.1:{port}")).is_ok() {
+            return Ok(port.to_string());
+        }
+    }
     let listener = std::net::TcpListener::bind("127.0.0.1:0");
     let address = listener.and_then(|listener| listener.local_addr());
     let address = address.map_err(|error| Problem::Environment(format!("no port is free: {error}")))?;

@@ -22,6 +22,8 @@ pub(crate) struct Holding {
     ends: Moment,
     seen: u64,
     violated: Option<Violation>,
+    /// What a check of several requirements has found broken of one: the others are still looked at.
+    found: Option<Violation>,
     /// What a check remarked on without ending the step.
     remarked: Option<(u64, Holds, String)>,
     /// Whether the check had anything to judge.
@@ -81,6 +83,7 @@ impl Holding {
             ends,
             seen: 0,
             violated: None,
+            found: None,
             remarked: None,
             judged: false,
         };
@@ -159,10 +162,17 @@ impl Holding {
         }
     }
 
-    /// Keeps what the check found: a violation ends the step, anything softer waits for the end.
+    /// Keeps what the check found: a violation ends the step, unless it names the one of several requirements that it is
+    /// about; anything softer waits for the end.
     fn remark(&mut self, seq: u64, holds: Holds, message: String) {
         if holds == Holds::No {
-            self.violated.get_or_insert(Violation {
+            let check = self.check.as_ref();
+            let is_sorted = check.is_some_and(|check| check.sorted(&self.verb.checks).is_some());
+            let kept = match is_sorted && self.verb.checks.len() > 1 {
+                true => &mut self.found,
+                false => &mut self.violated,
+            };
+            kept.get_or_insert(Violation {
                 seq,
                 holds,
                 message,
@@ -219,7 +229,7 @@ impl Holding {
             .and_then(|violation| violation.near.as_ref()?.span.clone());
         let span = span.unwrap_or_else(|| self.selector.span.clone());
         let mut bound = bound_clauses(&self.verb.checks, "checks", &span, &holds, witness, &message);
-        self.sort_out(&mut bound);
+        self.sort_out(&mut bound, cut_short);
         for mut clause in bound {
             clause.expected = self.selector.expected();
             clause.nearest = self
@@ -252,7 +262,7 @@ impl Holding {
 
     /// A check that names the requirement it found broken decides the clause of that requirement; of the others
     /// nothing was wrong until then.
-    fn sort_out(&self, clauses: &mut [Clause]) {
+    fn sort_out(&self, clauses: &mut [Clause], cut_short: Option<&str>) {
         let Some(sorted) = self.check.as_ref().and_then(|check| check.sorted(&self.verb.checks)) else {
             return;
         };
@@ -264,8 +274,8 @@ impl Holding {
                     clause.witness = Some(seq).filter(|seq| *seq > 0);
                     clause.message = format!("#{seq}: {message}");
                 }
-                _ if ended => {
-                    let why = "the step ended with what was found about another requirement";
+                _ if ended || cut_short.is_some() => {
+                    let why = cut_short.unwrap_or("the step ended with what was found about another requirement");
                     clause.holds = Holds::Unseen(why.to_owned());
                     why.clone_into(&mut clause.message);
                 }
@@ -278,7 +288,7 @@ impl Holding {
     }
 
     fn held(&self, cut_short: Option<&str>) -> (Holds, String, Option<u64>) {
-        if let Some(violation) = &self.violated {
+        if let Some(violation) = self.violated.as_ref().or(self.found.as_ref()) {
             return (
                 violation.holds.clone(),
                 violation.message.clone(),

@@ -172,7 +172,17 @@ impl Weighing {
 /// or it names what was sent. True where nothing new is looked for.
 pub(super) fn convinces(entry: &Entry, topic: &str, mark: u64, selector: &Selector, scene: &Scene<'_>) -> bool {
     let looks_back = selector.pattern.as_ref().is_some_and(Bound::looks_back);
-    !looks_back || is_novel(entry, topic, mark, selector, scene) || names_what_was_sent(entry, mark, selector, scene)
+    !looks_back
+        || was_provoked(mark, scene)
+        || is_novel(entry, topic, mark, selector, scene)
+        || names_what_was_sent(entry, mark, selector, scene)
+}
+
+/// Whether the stimulus was a hook: what an operator provokes may be what he has provoked before, in the same words.
+fn was_provoked(mark: u64, scene: &Scene<'_>) -> bool {
+    let since = scene.entries.iter().rev().take_while(|entry| entry.seq() >= mark);
+    let mut since = since;
+    since.any(|entry| matches!(entry.event(), Event::Hook { ok: true, .. }))
 }
 
 /// Whether the message shows an element that none of those before the stimulus showed.

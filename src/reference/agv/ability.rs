@@ -38,11 +38,18 @@ impl Agv {
         self.check_memory(order, known)?;
         let usable = |path: &&String| path.rsplit('.').next().is_some_and(|field| self.config.uses(field));
         self.check_zone_set(order)?;
+        let unread = known > 0 && self.faults.has(F::R3UnsupportedFieldInUpdateIgnored);
+        if unread && !self.config.trajectories {
+            for edge in &mut order.edges {
+                (edge.trajectory, edge.corridor) = (None, None);
+            }
+        }
         if let Some(path) = order
             .unsupported
             .iter()
+            .filter(|path| !(path.ends_with("minHeight") && self.faults.has(F::R2MinHeightIgnored)))
             .find(|path| !usable(path))
-            .filter(|_| !self.faults.has(F::UnsupportedFieldIgnored))
+            .filter(|_| !unread && !self.faults.has(F::UnsupportedFieldIgnored))
         {
             return Err(Refusal::at_field(
                 Rule::Unable,
@@ -53,13 +60,20 @@ impl Agv {
         if let Some(defect) = order.defects.first().filter(|_| self.config.trajectories) {
             return Err(defect.clone().into());
         }
-        for node in &order.nodes {
+        for (index, node) in order.nodes.iter().enumerate() {
+            if node.position.is_none() && self.faults.has(F::R3NodePositionDemanded) {
+                let path = format!("{}.nodePosition", node.path);
+                let refusal = Refusal::at_field(Rule::Unable, "the vehicle needs the position of the node", &path);
+                return Err(refusal.naming("nodeId", &node.id));
+            }
             let Some(place) = self.place(node) else {
                 let path = format!("{}.nodePosition", node.path);
                 let refusal = Refusal::at_field(Rule::Unable, "the vehicle does not know where the node is", &path);
                 return Err(refusal.naming("nodeId", &node.id));
             };
-            self.check_map(node, &place)?;
+            if index == 0 || !self.faults.has(F::R3OnlyFirstMapChecked) {
+                self.check_map(node, &place)?;
+            }
         }
         for (index, edge) in order.edges.iter().enumerate() {
             let ends = order.nodes.get(index).zip(order.nodes.get(index + 1));
@@ -123,6 +137,9 @@ impl Agv {
                 .naming("mapId", &place.map_id)
                 .naming("nodeId", &node.id))
         };
+        if !node.released && self.faults.has(F::R2MapOfHorizonUnchecked) {
+            return Ok(());
+        }
         if self.faults.has(F::UnknownMapAccepted) {
             return Ok(());
         }
@@ -172,8 +189,12 @@ impl Agv {
     }
 
     fn check_actions(&self, order: &Order, known: usize) -> Result<(), Refusal> {
-        let nodes = order.nodes.iter().skip(known).flat_map(|node| &node.actions);
-        let edges = order.edges.iter().flat_map(|edge| &edge.actions);
+        let all = !self.faults.has(F::R2HorizonActionsUnchecked);
+        let nodes = order.nodes.iter().skip(known).filter(|node| node.released || all);
+        let nodes = nodes.flat_map(|node| &node.actions);
+        let none = self.faults.has(F::R3EdgeActionsUnchecked);
+        let edges = order.edges.iter().filter(|edge| (edge.released || all) && !none);
+        let edges = edges.flat_map(|edge| &edge.actions);
         let scoped = nodes
             .map(|action| (action, Scope::Node))
             .chain(edges.map(|action| (action, Scope::Edge)));
@@ -198,7 +219,16 @@ impl Agv {
                     kind.deed,
                     action_kinds::Deed::FinePositioning | action_kinds::Deed::DetectObject
                 );
-            if listed_refused || (!kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked)) {
+            let request_taken = self.faults.has(F::R2RequestsOnNodesTaken)
+                && matches!(
+                    kind.deed,
+                    action_kinds::Deed::StateRequest
+                        | action_kinds::Deed::FactsheetRequest
+                        | action_kinds::Deed::LogReport
+                );
+            if listed_refused
+                || (!request_taken && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked))
+            {
                 return unable("the action is not possible here", &request.path);
             }
             let found = action_kinds::refusal(kind, request, true)

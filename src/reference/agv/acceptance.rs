@@ -32,12 +32,18 @@ impl Agv {
         if self.ignores_order() {
             return;
         }
+        if self.loses_order() {
+            return;
+        }
         self.report.order_received = true;
+        if self.faults.has(F::R3HeaderIdCountsOrders) {
+            self.connection.skip_header_id();
+        }
         let message = if payload.len() > self.config.max_message {
             Err(Refusal::new(Rule::Malformed, "the message is too long"))
         } else {
             serde_json::from_slice::<Value>(payload)
-                .map_err(|_| Refusal::new(Rule::Malformed, "the message is not JSON"))
+                .map_err(|error| Refusal::new(Rule::Malformed, &format!("the message is not JSON: {error}")))
         };
         if message.is_err() && self.faults.has(F::R1UnreadableOrderDropped) {
             return;
@@ -55,7 +61,34 @@ impl Agv {
             return;
         }
         if let Err(refusal) = result {
+            self.third.posed = false;
+            if refusal.is_of_busy() && self.faults.has(F::R2RefusedOrderQueued) {
+                self.queued = message.as_ref().ok().cloned();
+            }
             self.refuse(message.as_ref().unwrap_or(&Value::Null), refusal);
+        }
+    }
+
+    /// `order-after-refusal-lost`: the first one after a refusal.
+    fn loses_order(&mut self) -> bool {
+        let loses = self.faults.has(F::OrderAfterRefusalLost)
+            && !self.is_busy()
+            && self.errors.lists_refusals()
+            && !self.order_lost;
+        self.order_lost = loses;
+        loses
+    }
+
+    /// `r2-refused-order-queued`: begins the order that came too early.
+    pub(super) fn begin_queued(&mut self) {
+        if self.queued.is_none() || self.is_busy() {
+            return;
+        }
+        self.flush();
+        if let Some(message) = self.queued.take()
+            && self.order_decided(&message).is_ok()
+        {
+            self.settle();
         }
     }
 
@@ -63,8 +96,20 @@ impl Agv {
         let taken = super::leniency::taken(message, self.faults);
         let mended = self.mended(&taken);
         let mut order = Order::read(mended.as_ref().unwrap_or(&taken))?;
+        if order.nodes.is_empty() && self.faults.has(F::R3EmptyOrderDropped) {
+            return Ok(());
+        }
+        if self.faults.has(F::R3MissingOrientationTypeGlobal) {
+            let sent = message.get("edges").and_then(Value::as_array).into_iter().flatten();
+            for (edge, sent) in order.edges.iter_mut().zip(sent) {
+                edge.global |= sent.get("orientationType").is_none();
+            }
+        }
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
+        }
+        if !order.nodes.is_empty() && self.faults.has(F::R2SurplusEdgeDropped) {
+            order.edges.truncate(order.nodes.len() - 1);
         }
         let tolerated = |defect: &Defect| {
             let unchecked = match defect.path.rsplit('.').next() {
@@ -87,10 +132,21 @@ impl Agv {
             Decision::Begin => self.begin(order),
             Decision::Continue => self.continue_with(order),
             Decision::Discard => {
+                let changed = self.third.content.as_ref() != Some(&content_of(message));
+                if changed && self.faults.has(F::R3ChangedDuplicateReported) {
+                    return Err(Refusal::new(
+                        Rule::Duplicate,
+                        "the order differs from what was received before",
+                    ));
+                }
+                if self.takes(T::R3DuplicateNotedInInformation) {
+                    self.third.repeated = Some(self.book.order_id.clone());
+                }
                 self.seen_again();
                 return Ok(());
             }
         }
+        self.third.content = Some(content_of(message));
         if self.faults.has(F::EchoesOrder) {
             self.echo_order(message);
         }
@@ -136,6 +192,10 @@ impl Agv {
         if self.faults.has(F::R1DuplicateClearsErrors) {
             self.errors.new_order();
         }
+        if self.waits_at_decision_point() && self.faults.has(F::R2DuplicateReleasesHorizon) {
+            self.book.unbound = true;
+        }
+        self.book.stunned |= self.is_busy() && self.faults.has(F::DuplicateHaltsDriving);
         if self.is_busy() && self.faults.has(F::R1DuplicateRepeatsActions) {
             self.repeat_actions(self.book.last_sequence);
         }
@@ -165,6 +225,7 @@ impl Agv {
                 return Err(Refusal::new(Rule::Duplicate, "the order was received before"));
             }
             let again = self.faults.has(F::DuplicateExecuted) && !self.is_busy();
+            let again = again || self.book.cancelled && self.faults.has(F::R3DuplicateAfterCancelExecuted);
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
         let late = self.faults.has(F::R1OutdatedContinuesCompleted) && !self.is_busy();
@@ -204,6 +265,10 @@ impl Agv {
     }
 
     fn check_new(&self, order: &mut Order) -> Result<(), Refusal> {
+        if self.third.posed && self.faults.has(F::R3OrderAfterInitPositionRefused) {
+            let refusal = Refusal::new(Rule::StartOutOfRange, "the first node is out of reach");
+            return Err(refusal.naming("nodeId", &order.nodes[0].id));
+        }
         let replaced = self.holds.pause && self.faults.has(F::R1NewOrderTakenInPause);
         if self.is_busy() && !replaced {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
@@ -237,7 +302,13 @@ impl Agv {
     /// Nodes left, an order action not ended, or a cancellation under way; a horizon keeps it busy.
     pub(super) fn is_busy(&self) -> bool {
         let free = |action: &Action| {
+            let left = self.book.cancelled && action.status == super::actions::Status::Waiting;
+            let trigger = action
+                .kind
+                .is_some_and(|kind| kind.deed == action_kinds::Deed::WaitForTrigger);
             self.faults.has(F::FreeActionIgnored) && action.request.blocking == super::order_message::Blocking::None
+                || left && self.faults.has(F::R3CancelLeavesHorizonWaiting)
+                || trigger && self.faults.has(F::R3TriggerNotCounted)
         };
         let open = |action: &Action| action.of_order() && !action.status.is_terminal() && !free(action);
         let actions = self.actions.iter().any(open) && !self.faults.has(F::RunningActionIgnored);
@@ -252,6 +323,9 @@ impl Agv {
         let pose = self.motion.pose(self.moment());
         if self.persona.lost {
             return false;
+        }
+        if node.id == self.book.last_node && self.faults.has(F::R2LastNodeTrusted) {
+            return true;
         }
         let temporary = self.faults.has(F::TemporaryNodeRefused)
             && self.config.node(&node.id).is_none()
@@ -284,6 +358,11 @@ impl Agv {
             self.errors.new_order();
         }
         self.latched = false;
+        self.field_latched = false;
+        self.third.visited.clear();
+        self.third.retried.clear();
+        self.third.repeated = None;
+        self.third.posed = false;
         self.actions.drop_lists();
         if self.faults.has(F::OldActionStatesKept) {
             let ids: Vec<&str> = order.actions().map(|action| action.id.as_str()).collect();
@@ -291,9 +370,11 @@ impl Agv {
         } else {
             let dropped = self.faults.has(F::RunningInstantDropped);
             let cancel_stays = self.faults.has(F::R1CancelOutlivesOrder);
+            let failed_stay = self.faults.has(F::R2FailedActionsOutliveOrder);
             self.actions.retain(|action| {
                 let stays = cancel_stays && action.request.action_type == "cancelOrder";
-                !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
+                let failed = action.of_order() && action.status == super::actions::Status::Failed;
+                failed && failed_stay || !action.of_order() && (stays || !action.status.is_terminal()) && !dropped
             });
         }
         let moment = self.moment();
@@ -308,7 +389,10 @@ impl Agv {
         }
         let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
         let last_update = self.book.has_order().then_some(self.book.update_id);
+        let after_cancel = self.book.cancelled && self.faults.has(F::R2OrderAfterCancelNotDriven);
         self.book = super::book::Book::empty(last.0);
+        let in_pause = (self.holds.pause || self.holds.button) && self.faults.has(F::R2OrderInPauseNeverStarts);
+        self.book.stunned = after_cancel || in_pause;
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
         let carried = last_update.filter(|_| self.faults.has(F::UpdateIdCarriedOver));
@@ -335,6 +419,9 @@ impl Agv {
         if self.takes(T::R1SetsOutLate) {
             self.lingers_until = Some(self.moment() + std::time::Duration::from_millis(700));
         }
+        if self.takes(T::R2AdoptsBeforeDriving) {
+            self.flush();
+        }
     }
 
     pub(super) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
@@ -342,6 +429,9 @@ impl Agv {
         for node in nodes {
             while let Some(edge) = edges.next_if(|edge| edge.sequence_id < node.sequence_id) {
                 self.push_edge(edge);
+            }
+            if !node.released {
+                self.book.planned.insert(node.sequence_id);
             }
             if node.released {
                 self.book.base_end = (node.id.clone(), node.sequence_id);
@@ -361,6 +451,9 @@ impl Agv {
 
     fn push_edge(&mut self, edge: Edge) {
         self.push_actions(edge.actions.clone(), Origin::Edge(edge.sequence_id));
+        if !edge.released {
+            self.book.planned.insert(edge.sequence_id);
+        }
         self.book.edges.push_back(edge);
     }
 
@@ -376,6 +469,12 @@ impl Agv {
             self.actions.push(Action::waiting(request, kind, origin));
         }
     }
+}
+
+/// Nodes and edges of an order message.
+fn content_of(message: &Value) -> Value {
+    let part = |key: &str| message.get(key).cloned().unwrap_or_default();
+    Value::Array(vec![part("nodes"), part("edges")])
 }
 
 /// Makes a number of a text that is one.

@@ -250,19 +250,25 @@ impl Actions {
     }
 
     /// Ids of actions that can begin now, if any.
-    pub(super) fn startable(&mut self) -> Vec<String> {
+    pub(super) fn startable(&mut self, faults: Faults) -> Vec<String> {
+        let unawaited =
+            |action: &Action| action.request.blocking == Blocking::None && faults.has(F::R3HardStartsBesideNone);
         for index in 0..self.lists.len() {
             let list = &self.lists[index];
-            let open = list
-                .running
-                .iter()
-                .any(|id| self.get(id).is_some_and(|action| !action.status.is_terminal()));
+            let open = list.running.iter().any(|id| {
+                self.get(id)
+                    .is_some_and(|action| !action.status.is_terminal() && !unawaited(action))
+            });
             let Some(next) = list.phases.front().filter(|_| !open) else {
                 continue;
             };
             let hard = next.iter().any(|id| self.blocking(id) == Some(Blocking::Hard));
             let occupied = self.all.iter().any(|action| {
-                action.occupies() && (hard && next.len() == 1 || action.request.blocking == Blocking::Hard)
+                let elsewhere = action.origin != list.origin && faults.has(F::R2HardIgnoresEarlierNode);
+                action.occupies()
+                    && !elsewhere
+                    && !unawaited(action)
+                    && (hard && next.len() == 1 || action.request.blocking == Blocking::Hard)
             });
             if occupied {
                 continue;
@@ -286,6 +292,9 @@ impl Actions {
         let stops = |action: &Action| match action.request.blocking {
             _ if action.status == Status::Initializing && faults.has(F::R1PreparesWhileDriving) => false,
             Blocking::None => false,
+            Blocking::Soft if matches!(action.origin, Origin::Edge(_)) && faults.has(F::R3SoftEdgeActionDrives) => {
+                false
+            }
             Blocking::Soft => !faults.has(F::SoftDrives),
             Blocking::Hard => !faults.has(F::HardDrives),
         };
@@ -294,13 +303,23 @@ impl Actions {
         ahead || self.all.iter().any(|action| action.occupies() && stops(action))
     }
 
+    /// Whether an action waits there.
+    pub(super) fn waiting_at(&self, origin: Origin) -> bool {
+        let mut actions = self.all.iter().filter(|action| action.origin == origin);
+        actions.any(|action| action.status == Status::Waiting)
+    }
+
     /// Whether an edge has actions that stop the vehicle.
-    pub(super) fn edge_stops(&self, sequence_id: u32) -> bool {
+    pub(super) fn edge_stops(&self, sequence_id: u32, faults: Faults) -> bool {
         let mut actions = self
             .all
             .iter()
             .filter(|action| action.origin == Origin::Edge(sequence_id));
-        actions.any(|action| action.request.blocking != Blocking::None && action.status == Status::Waiting)
+        let heeded = |blocking: Blocking| blocking == Blocking::Hard || !faults.has(F::R3SoftEdgeActionDrives);
+        actions.any(|action| {
+            let blocking = action.request.blocking;
+            blocking != Blocking::None && heeded(blocking) && action.status == Status::Waiting
+        })
     }
 
     /// The vehicle leaves the edge: its actions end (NODE-05).

@@ -1,6 +1,6 @@
 //! The order book: the order, what is left of it, and where the vehicle was last.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use crate::clock::Moment;
 
@@ -84,6 +84,10 @@ pub(super) struct Book {
     pub(super) hurried: bool,
     /// lastNodeId and lastNodeSequenceId before the present ones (`r1-last-node-after-actions` only).
     pub(super) previous: (String, u32),
+    /// sequenceIds that were in the horizon once (`r2-released-not-updated` only).
+    pub(super) planned: BTreeSet<u32>,
+    /// It drives whatever its actions forbid (`r2-blocking-forgotten-after-pause` only).
+    pub(super) unblocked: bool,
 }
 
 impl Book {
@@ -118,6 +122,8 @@ impl Book {
             heedless: false,
             hurried: false,
             previous: (String::new(), 0),
+            planned: BTreeSet::new(),
+            unblocked: false,
         }
     }
 

@@ -32,6 +32,14 @@ impl Agv {
             return;
         }
         let active = !self.book.nodes.is_empty() || self.actions.order_unfinished();
+        let acts = self
+            .actions
+            .iter()
+            .any(|action| action.of_order() && action.status.is_active());
+        let waits = self.waits_at_decision_point() && !self.motion.is_moving() && !acts;
+        let active = active
+            && !(waits && self.faults.has(F::R2CancelAtDecisionPointRefused))
+            && !(self.book.nodes.is_empty() && self.faults.has(F::R2CancelOfActingOrderRefused));
         if !active || self.book.cancel.is_some() || self.book.cancelled {
             self.nothing_to_cancel(action_id);
             return;
@@ -54,16 +62,27 @@ impl Agv {
             action_id: action_id.to_owned(),
             to_node,
         });
-        if let Some(action) = self.actions.get_mut(action_id) {
+        let unbegun = self.faults.has(F::R3CancelNotRunning);
+        if let Some(action) = self.actions.get_mut(action_id).filter(|_| !unbegun) {
             action.status = Status::Running;
         }
-        if self.config.has("cancelRunsFromReceipt") || self.faults.has(F::CancelFinishedEarly) {
+        if self.takes(T::R3CancelInSteps)
+            || self.config.has("cancelRunsFromReceipt")
+            || self.faults.has(F::CancelFinishedEarly)
+        {
             self.flush();
         }
     }
 
     /// No order, or one that was cancelled before (ORD-CANCEL-18 to ORD-CANCEL-20).
     fn nothing_to_cancel(&mut self, action_id: &str) {
+        let complete = self.book.has_order() && self.book.nodes.is_empty() && !self.book.cancelled;
+        if complete && self.faults.has(F::R2CompletedOrderCancelFinished) {
+            if let Some(action) = self.actions.get_mut(action_id) {
+                action.end(Status::Finished);
+            }
+            return;
+        }
         let again = self.book.cancelled && self.faults.has(F::R1SecondCancelFinished);
         let status = if again || self.faults.has(F::IdleCancelFinished) {
             Status::Finished
@@ -103,6 +122,15 @@ impl Agv {
     fn stop_actions(&mut self) {
         let (faults, interruptible) = (self.faults, self.config.interruptible);
         let base_end = self.book.base_end.1;
+        let here = Origin::Node(self.book.last_sequence);
+        let waiting = |action: &&Action| action.of_order() && action.status == Status::Waiting;
+        let unbegun = self
+            .actions
+            .iter()
+            .filter(waiting)
+            .map(|action| action.request.id.clone())
+            .collect();
+        let queue_survives = faults.has(F::R2QueuedActionsSurviveCancel);
         for action in self.actions.iter_mut().filter(|action| action.of_order()) {
             let deed = action.kind.map(|kind| kind.deed);
             let ends = match deed {
@@ -118,7 +146,9 @@ impl Agv {
                 Status::Waiting if planned && faults.has(F::R1CancelFinishesHorizonActions) => {
                     action.end(Status::Finished);
                 }
+                Status::Waiting if planned && faults.has(F::R3CancelLeavesHorizonWaiting) => {}
                 _ if survives(action, faults) => {}
+                Status::Waiting if queue_survives && action.origin == here => {}
                 Status::Waiting if !faults.has(F::CancelLeavesWaiting) => action.end(Status::Failed),
                 status if status.is_active() && ends => action.end(interrupted(action, faults)),
                 status if status.is_active() && faults.has(F::CancelFailsEarly) => action.masked = Some(Status::Failed),
@@ -126,7 +156,13 @@ impl Agv {
                 _ => {}
             }
         }
-        self.actions.drop_lists();
+        if !queue_survives {
+            self.actions.drop_lists();
+        }
+        if faults.has(F::R2CancelDropsWaiting) {
+            let unbegun: Vec<String> = unbegun;
+            self.actions.retain(|action| !unbegun.contains(&action.request.id));
+        }
     }
 
     /// Ends the cancellation once nothing moves or runs any more (ORD-CANCEL-07, ORD-CANCEL-11).
@@ -137,19 +173,30 @@ impl Agv {
         if self.holds.pause && self.faults.has(F::R1CancelWaitsForPause) {
             return false;
         }
+        let drives_on = self.book.updated && !self.holds.any() && self.faults.has(F::R3CancelAfterUpdateDrivesOn);
         let keeps_nodes = self.faults.has(F::CancelKeepsNodes);
         let under_way = cancel.to_node && self.book.entered && !self.book.nodes.is_empty()
             || cancel.to_node && !keeps_nodes && !self.book.nodes.is_empty()
             || self.motion.is_moving() && !self.faults.has(F::CancelFinishedMoving)
-            || (self.faults.has(F::CancelDrivesOn) && self.book.nodes.iter().any(|stop| stop.node.released));
-        let open =
-            |action: &Action| action.of_order() && !action.status.is_terminal() && !survives(action, self.faults);
+            || ((drives_on || self.faults.has(F::CancelDrivesOn))
+                && self.book.nodes.iter().any(|stop| stop.node.released));
+        let left =
+            |action: &Action| action.status == Status::Waiting && self.faults.has(F::R3CancelLeavesHorizonWaiting);
+        let open = |action: &Action| {
+            action.of_order() && !action.status.is_terminal() && !survives(action, self.faults) && !left(action)
+        };
         let unfinished = self.actions.iter().any(open)
             && !self.faults.has(F::CancelFinishedEarly)
             && !self.faults.has(F::CancelLeavesWaiting);
         let waits = self.holds.pause && self.faults.has(F::CancelWaitsForPause);
         if under_way || unfinished || waits || self.persona.holds_cancel() {
             return false;
+        }
+        if self.faults.has(F::R3RouteDroppedAfterCancelFinished) {
+            if let Some(action) = self.actions.get_mut(&cancel.action_id) {
+                action.end(Status::Finished);
+            }
+            self.flush();
         }
         self.book.cancel = None;
         self.book.cancelled = true;

@@ -95,7 +95,7 @@ impl Agv {
             "move-to" if arguments.get("nodeId").is_some() => self.place_on(text("nodeId")),
             "move-to" => self.move_to(arguments),
             // To the vehicle it is the same whether it was moved or only its idea of where it is.
-            "push-out" | "shift-position" => self.push_out(),
+            "push-out" | "shift-position" => self.push_out(arguments.get("by").and_then(Value::as_f64)),
             "place-obstacle" if self.obstacles.len() < MAX_OBSTACLES => {
                 self.obstacles.insert(text("edgeId").to_owned());
             }
@@ -118,7 +118,10 @@ impl Agv {
             "lock-charger" => self.charger_locked = true,
             "unlock-charger" => self.charger_locked = false,
             "enter-field" => self.set_holds(|holds| holds.field = true),
-            "leave-field" => self.set_holds(|holds| holds.field = false),
+            "leave-field" => {
+                self.field_latched = self.holds.field && self.faults.has(F::R2FieldViolationLatched);
+                self.set_holds(|holds| holds.field = false);
+            }
             "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
             "enable-map" => {
                 // A map that is not on board cannot be chosen on the vehicle's panel.
@@ -162,7 +165,7 @@ impl Agv {
     }
 
     /// The button that waitForTrigger waits for; it serves all of them unless one is named.
-    fn trigger(&mut self, wanted: &str) {
+    pub(super) fn trigger(&mut self, wanted: &str) {
         let waits = |action: &&super::actions::Action| {
             (wanted.is_empty() || action.request.id == wanted)
                 && action.status == Status::Running
@@ -192,7 +195,13 @@ impl Agv {
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
         let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
         let drives = self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen);
-        let keeps = leaves || drives || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
+        let acts = self
+            .actions
+            .iter()
+            .any(|action| action.of_order() && action.status.is_active());
+        let waits = mode == Mode::Manual && self.waits_at_decision_point() && !self.motion.is_moving() && !acts;
+        let keeps = leaves || drives || waits && self.faults.has(F::R2ManualKeepsWaitingOrder);
+        let keeps = keeps || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
         if by_hand && mode != self.mode && !keeps && self.is_occupied() {
             let given_up = self.book.clone();
             if self.faults.has(F::R1ManualFinishesActions) {
@@ -209,6 +218,9 @@ impl Agv {
             } else {
                 self.give_up_order();
             }
+            if mode == Mode::Manual && self.faults.has(F::R3ManualDropsActionStates) {
+                self.actions.retain(|action| !action.of_order());
+            }
             if self.faults.has(F::R1ManualKeepsHorizon) {
                 let planned = given_up.nodes.iter().filter(|stop| !stop.node.released);
                 self.book.nodes.extend(planned.cloned());
@@ -217,8 +229,14 @@ impl Agv {
             }
             self.remembered = Some(given_up).filter(|_| self.faults.has(F::OrderTakenUpAgain));
         }
+        if !by_hand && mode != self.mode && self.is_occupied() && self.faults.has(F::R2ModeSwitchParks) {
+            self.book.stunned = true;
+        }
         if mode == Mode::Semiautomatic && self.faults.has(F::SemiautomaticEndsOrder) {
             self.give_up_order();
+        }
+        if mode.takes_orders() != self.mode.takes_orders() && self.faults.has(F::R2OfflineInManual) {
+            self.publish_connection(if mode.takes_orders() { "ONLINE" } else { "OFFLINE" });
         }
         self.mode = mode;
         if let Some(order) = self.remembered.take_if(|_| mode.takes_orders()) {

@@ -6,6 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use super::instant::MAX_INSTANT_ACTIONS;
+use super::read::MAX_STRING;
 use super::tolerances::Tolerances;
 
 /// A node of the layout the vehicle knows.
@@ -206,6 +208,10 @@ pub struct AgvConfig {
     pub max_nodes: usize,
     /// Largest number of actions per node or edge.
     pub max_actions: usize,
+    /// Largest number of actions in an instantActions message.
+    pub max_instant_actions: usize,
+    /// Most characters of an id.
+    pub max_id: usize,
     /// Largest message in bytes.
     pub max_message: usize,
     /// The liberties it takes; see [`AgvConfig::tolerate`].
@@ -285,6 +291,8 @@ impl Default for AgvConfig {
             error_duration: Duration::from_secs(2),
             max_nodes: 200,
             max_actions: 20,
+            max_instant_actions: MAX_INSTANT_ACTIONS,
+            max_id: MAX_STRING,
             max_message: 1 << 20,
             tolerances: Tolerances::default(),
         }

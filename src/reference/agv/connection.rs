@@ -28,6 +28,8 @@ pub(super) struct Connection {
     header_ids: BTreeMap<&'static str, u32>,
     /// The factsheet that is published now was asked for.
     pub(super) factsheet_asked: bool,
+    /// It has answered a factsheetRequest (`r2-factsheet-only-once` only).
+    pub(super) factsheet_given: bool,
     /// When to say ONLINE (`online-late` only).
     pub(super) online_at: Option<Moment>,
     /// The time of the first message (`timestamp-stands-still` only).
@@ -45,6 +47,7 @@ impl Connection {
             sessions: 0,
             header_ids: BTreeMap::new(),
             factsheet_asked: false,
+            factsheet_given: false,
             online_at: None,
             first: None,
         }
@@ -69,6 +72,13 @@ impl Connection {
         self.online_at = None;
         self.shut_down = true;
         self.attempt_at = None;
+    }
+
+    /// `r3-header-id-counts-orders`: counts a message that is not sent.
+    pub(super) fn skip_header_id(&mut self) {
+        if let Some(next) = self.header_ids.get_mut("state") {
+            *next = next.wrapping_add(1);
+        }
     }
 
     /// Somebody wants the vehicle connected.
@@ -110,6 +120,9 @@ impl Agv {
             if self.faults.has(F::WillWithoutHeader) {
                 message.clear();
             }
+            if self.faults.has(F::R3WillHeaderIdMissing) {
+                message.remove("headerId");
+            }
             if self.persona.stale_will {
                 let utc = self.now.utc;
                 let long_ago = utc.checked_sub(jiff::SignedDuration::from_hours(24)).unwrap_or(utc);
@@ -138,17 +151,32 @@ impl Agv {
         } else {
             &["order", "instantActions"]
         };
-        let subscriptions = wanted
+        let mut topics: Vec<String> = wanted
             .iter()
             .filter_map(|name| self.config.topic(name))
-            .map(|topic| (topic.to_owned(), u8::from(self.takes(T::SubscribesWithQosOne))));
+            .map(str::to_owned)
+            .collect();
+        if self.takes(T::R2SubscribesWithWildcard) && wanted.len() == 2 {
+            // Its own messages come back to it; it has no use for them.
+            for topic in &mut topics {
+                if let Some((above, _)) = topic.rsplit_once('/') {
+                    *topic = format!("{above}/+");
+                }
+            }
+            topics.dedup();
+        }
+        let qos = u8::from(self.takes(T::SubscribesWithQosOne));
+        let subscriptions = topics.into_iter().map(|topic| (topic, qos));
         ConnectOptions {
             level: match () {
                 () if self.faults.has(F::OldMqtt) => 3,
                 () if self.takes(T::NewestMqtt) => 5,
                 () => 4,
             },
-            client_id: format!("{}.{}", self.config.manufacturer, self.config.serial_number),
+            client_id: match self.takes(T::R2ClientIdChanges) {
+                true => format!("{}-{}", self.config.serial_number, self.connection.sessions),
+                false => format!("{}.{}", self.config.manufacturer, self.config.serial_number),
+            },
             keep_alive,
             clean_session: !self.takes(T::SessionKept),
             will,
@@ -170,7 +198,25 @@ impl Agv {
         }
         self.connection.attempt_at = None;
         self.connection.shut_down = false;
-        if !first && self.faults.has(F::OnlineLate) {
+        if !first && self.is_busy() && self.faults.has(F::R2NodeActionsRepeatedAfterReconnect) {
+            self.repeat_actions(self.book.last_sequence);
+        }
+        let on_request = self.takes(T::R1FactsheetOnRequestOnly);
+        if !on_request && self.takes(T::R2FactsheetBeforeOnline) {
+            self.publish_factsheet();
+        }
+        if !first && self.faults.has(F::R3ReconnectAnnounced) {
+            self.publish_connection("RECONNECTING");
+        }
+        if !first && self.faults.has(F::R3DeletedMapBackAfterReconnect) {
+            for (id, version) in std::mem::take(&mut self.third.deleted_maps) {
+                self.maps.store(&id, &version, super::Faults::default());
+            }
+        }
+        let unsaid = !first && self.is_busy() && self.faults.has(F::R2OnlineNotSaidMidOrder);
+        if unsaid {
+            // It says nothing on this connection.
+        } else if !first && self.faults.has(F::OnlineLate) {
             self.connection.online_at = Some(self.moment() + Duration::from_secs(25));
         } else if !self.faults.has(F::NoOnline) && (first || !self.faults.has(F::NoOnlineAfterReconnect)) {
             let online = if self.faults.has(F::ConnectionStateConnected) {
@@ -182,10 +228,16 @@ impl Agv {
                 self.publish_connection(online);
             }
         }
-        if !self.takes(T::R1FactsheetOnRequestOnly) {
+        let before = self.takes(T::R2FactsheetBeforeOnline);
+        let after = !before && self.takes(T::R2FactsheetAfterState);
+        if !on_request && !before && !after {
             self.publish_factsheet();
         }
         self.start_reporting(first);
+        if !on_request && after {
+            self.flush();
+            self.publish_factsheet();
+        }
     }
 
     /// The link broke. The order goes on (MQTT-03, MQTT-04).
@@ -194,6 +246,7 @@ impl Agv {
             self.give_up_order();
             self.book.order_id.clear();
         }
+        self.pause_outlives |= self.holds.pause && self.faults.has(F::PauseStuckAfterCut);
         if self.faults.has(F::R1HorizonLostWithLink) {
             let gone = self.book.drop_horizon();
             self.actions.retain(|action| match action.origin {
@@ -201,10 +254,22 @@ impl Agv {
                 super::actions::Origin::Instant => true,
             });
         }
+        if self.faults.has(F::R2LoadForgottenWithLink) {
+            self.loads.clear();
+        }
+        if self.book.cancelled && self.faults.has(F::R2CancelledIdLostWithLink) {
+            self.book.order_id.clear();
+        }
         if self.faults.has(F::R1EndedActionsLostWithLink) {
             self.actions.retain(|action| !action.status.is_terminal());
         }
         self.book.cut = true;
+        if self.faults.has(F::R3RunningActionsFailWithLink) {
+            let of_order = self.actions.iter_mut().filter(|action| action.of_order());
+            of_order
+                .filter(|action| action.status.is_active())
+                .for_each(|action| action.end(super::actions::Status::Failed));
+        }
         if self.faults.has(F::UpdateForgottenOnLinkLoss) {
             self.book.update_id = 0;
         }
@@ -274,6 +339,21 @@ impl Agv {
         }
     }
 
+    /// `r2-acknowledges-on-instant-actions`: answers master control on its own topic.
+    pub(super) fn acknowledge_instant_actions(&mut self) {
+        let mut message = self.header("connection", false);
+        message.insert("actions".into(), json!([]));
+        if let Some(topic) = self.config.topic("instantActions").filter(|_| self.connection.online) {
+            let publication = Publication {
+                topic: topic.to_owned(),
+                payload: Value::Object(message).to_string().into_bytes(),
+                qos: 0,
+                retain: false,
+            };
+            self.pending.push(Output::Publish(publication));
+        }
+    }
+
     /// Publishes a message: the header, then the body. Nothing is published, or counted, while offline.
     ///
     /// `mangle` are replacements in the text of the message, for defects that no JSON writer produces.
@@ -320,6 +400,8 @@ impl Agv {
                 if self.faults.has(F::FactsheetQosTwo) { 2 } else { 0 },
                 self.config.has("retainedFactsheet") && !self.faults.has(F::FactsheetNotRetained),
             ),
+            "state" if !self.errors.is_empty() && self.faults.has(F::R2WarnedStateQosOne) => (1, false),
+            "state" if self.takes(T::R3StatesRetained) => (0, true),
             "state" => (u8::from(self.faults.has(F::StateQosOne)), false),
             _ => (0, false),
         };
@@ -340,6 +422,13 @@ impl Agv {
             Some(prefix) => format!("{prefix}fact_sheet"),
             None => topic,
         };
+        let topic = match topic
+            .strip_suffix("visualization")
+            .filter(|_| self.faults.has(F::R3VisualizationSpelledBritish))
+        {
+            Some(prefix) => format!("{prefix}visualisation"),
+            None => topic,
+        };
         self.pending.push(Output::Publish(Publication {
             topic,
             payload,
@@ -355,7 +444,11 @@ impl Agv {
         } else {
             name
         };
-        let start = if self.takes(T::R1HeaderIdStartsHigh) { 70_000 } else { 0 };
+        let start = match () {
+            () if self.takes(T::R3HeaderIdWraps) => u32::MAX - 12,
+            () if self.takes(T::R1HeaderIdStartsHigh) => 70_000,
+            () => 0,
+        };
         let next = self.connection.header_ids.entry(counter).or_insert(start);
         let repeated = name == "state"
             && counts
@@ -369,7 +462,10 @@ impl Agv {
         if counts && !(name == "state" && self.faults.has(F::HeaderIdConstant)) {
             *next = next.wrapping_add(1);
         }
-        let header_id = if self.faults.has(F::HeaderIdAsText) {
+        let zeroed = name == "visualization" && self.faults.has(F::R2VisualizationHeaderIdZero);
+        let header_id = if zeroed {
+            json!(0)
+        } else if self.faults.has(F::HeaderIdAsText) {
             json!(id.to_string())
         } else {
             json!(id)
@@ -392,6 +488,14 @@ impl Agv {
         let serial = &self.config.serial_number;
         let serial_number = match () {
             () if name == "visualization" && self.faults.has(F::R1VisualizationNamesComputer) => "localhost".to_owned(),
+            () if name == "connection" && self.faults.has(F::R2ConnectionSerialUpperCase) => {
+                let upper = serial.to_ascii_uppercase();
+                if upper == *serial {
+                    serial.to_ascii_lowercase()
+                } else {
+                    upper
+                }
+            }
             () if self.faults.has(F::OtherSerialNumber) => format!("{serial}0"),
             () if self.faults.has(F::SerialNumberWithSpace) => format!("No. {serial}"),
             () => serial.clone(),
@@ -402,6 +506,12 @@ impl Agv {
             Value::String(text) if name == "factsheet" && self.faults.has(F::R1FactsheetDated) => {
                 json!(text.split('T').next().unwrap_or_default())
             }
+            Value::String(text) if name == "connection" && self.faults.has(F::R2ConnectionTimestampSpaced) => {
+                json!(text.replacen('T', " ", 1))
+            }
+            Value::String(text) if name == "state" && self.faults.has(F::R3StateTimestampDecimalComma) => {
+                json!(text.replacen('.', ",", 1))
+            }
             timestamp => timestamp,
         };
         header.insert("timestamp".into(), timestamp);
@@ -410,6 +520,7 @@ impl Agv {
             let own = &self.config.manufacturer;
             let manufacturer = match () {
                 () if name == "state" && self.faults.has(F::ManufacturerEmpty) => String::new(),
+                () if name == "factsheet" && self.faults.has(F::R3FactsheetNamesCompany) => format!("{own} GmbH"),
                 () if self.faults.has(F::ManufacturerWithSlash) => format!("{own}/agv"),
                 () => own.clone(),
             };
@@ -425,6 +536,10 @@ impl Agv {
             () if self.faults.has(F::TimestampLocalAsUtc) => {
                 let hour = jiff::SignedDuration::from_hours(1);
                 self.now.utc.checked_add(hour).unwrap_or(self.now.utc)
+            }
+            () if self.takes(T::R3ClockAhead) => {
+                let ahead = jiff::SignedDuration::from_millis(1_500);
+                self.now.utc.checked_add(ahead).unwrap_or(self.now.utc)
             }
             () => self.now.utc,
         };

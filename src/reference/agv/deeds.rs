@@ -8,6 +8,7 @@ use super::action_kinds::Deed;
 use super::actions::{Action, Origin, Status};
 use super::faults::FaultName as F;
 use super::motion::Pose;
+use super::order_message::Blocking;
 use super::tolerances::ToleranceName as T;
 
 /// Coordinates beyond this are no place on any map of the site, in metres.
@@ -174,6 +175,11 @@ impl Agv {
     pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
         let stuck = self.faults.has(F::InstantActionStuck);
         let requests_stay = self.faults.has(F::StateRequestStuck);
+        let late = self.takes(T::R3DrivesOnLate) && !self.book.nodes.is_empty();
+        let stops = |action: &Action| action.of_order() && action.request.blocking != Blocking::None;
+        if late && self.actions.get(id).is_some_and(stops) {
+            self.lingers_until = Some(self.moment() + RESUMING);
+        }
         if let Some(action) = self.actions.get_mut(id) {
             let stuck = stuck || (requests_stay && action.request.action_type == "stateRequest");
             let stuck = stuck && action.origin == Origin::Instant;
@@ -187,6 +193,22 @@ impl Agv {
     pub(super) fn fail(&mut self, id: &str, problem: &Problem) {
         if let Some(action) = self.actions.get_mut(id) {
             action.end(Status::Failed);
+            if self.config.tolerances.has(T::R2FailuresDescribed) {
+                action.result = Some(problem.reason.clone());
+            }
+        }
+        let retried = |action: &Action| {
+            let deed = action.kind.map(|kind| kind.deed);
+            action.of_order() && matches!(deed, Some(Deed::Pick | Deed::Drop))
+        };
+        if self.faults.has(F::R3FailedPickRetried)
+            && self.actions.get(id).is_some_and(retried)
+            && !self.third.retried.iter().any(|other| other == id)
+        {
+            self.third.retried.push(id.to_owned());
+            self.flush();
+            self.run_action(id);
+            return;
         }
         if problem.silent {
             return;
@@ -200,6 +222,16 @@ impl Agv {
             Area::Charging => &names.charging,
         };
         let mut references = problem.references.clone();
+        let of_order = self.actions.get(id).is_some_and(Action::of_order);
+        let first = self
+            .actions
+            .iter()
+            .find(|action| action.of_order())
+            .filter(|_| of_order);
+        if let Some(first) = first.filter(|_| self.faults.has(F::R3FailureBlamesFirstAction)) {
+            let named = references.iter_mut().filter(|(key, _)| key == "actionId");
+            named.for_each(|(_, value)| value.clone_from(&first.request.id));
+        }
         references.retain(|(key, _)| key != "actionId" || !self.faults.has(F::FailureUnreferenced));
         self.warn(name.clone(), references, problem.reason.clone());
     }
@@ -229,9 +261,25 @@ impl Agv {
             Deed::StopPause => self.stop_pause(action),
             Deed::StartCharging => self.start_charging(action).into(),
             Deed::StopCharging => self.stop_charging(action).into(),
-            Deed::InitPosition => self.init_position(action).into(),
+            Deed::InitPosition => {
+                let result = self.init_position(action);
+                self.lost |= result.is_err() && self.faults.has(F::R3RefusedPoseLosesPosition);
+                self.third.posed |= result.is_ok() && !action.of_order();
+                result.into()
+            }
             Deed::EnableMap => {
                 let (id, version) = (action.text("mapId"), action.text("mapVersion"));
+                let busy = !self.book.nodes.is_empty() || self.actions.order_unfinished();
+                let known = self.maps.has_version(id, version);
+                if known && action.of_order() && self.faults.has(F::R3EnableOnNodeWithoutEffect) {
+                    return Outcome::Done(None);
+                }
+                if self.maps.is_enabled(id, version) && self.faults.has(F::R3EnableTwiceFails) {
+                    return Outcome::Failed(Problem::map(action, "the map is enabled already"));
+                }
+                if busy && self.maps.has_version(id, version) && self.faults.has(F::R2EnableIgnoredMidOrder) {
+                    return Outcome::Done(None);
+                }
                 if self.maps.has_version(id, version) && self.faults.has(F::R1EnableInTwoStates) {
                     self.maps.disable_all(id);
                     self.flush();
@@ -264,6 +312,10 @@ impl Agv {
             Deed::LogReport => {
                 self.logs += 1;
                 let name = format!("log-{}.txt", self.logs);
+                if self.tells_logs() {
+                    self.last_log = Some((action.request.id.clone(), name));
+                    return Outcome::Done(None);
+                }
                 Outcome::Done(Some(name).filter(|_| !self.faults.has(F::LogNameMissing)))
             }
             Deed::Pick => self.pick(action).into(),
@@ -272,7 +324,9 @@ impl Agv {
             Deed::FinePositioning => self.align(action).into(),
             Deed::FactsheetRequest => {
                 let mid_order = self.is_busy() && self.faults.has(F::R1FactsheetNotMidOrder);
-                if !self.faults.has(F::FactsheetRequestUnanswered) && !mid_order {
+                let again = std::mem::replace(&mut self.connection.factsheet_given, true);
+                let again = again && self.faults.has(F::R2FactsheetOnlyOnce);
+                if !self.faults.has(F::FactsheetRequestUnanswered) && !mid_order && !again {
                     self.connection.factsheet_asked = true;
                     self.publish_factsheet();
                     self.connection.factsheet_asked = false;
@@ -289,6 +343,11 @@ impl Agv {
                 Outcome::Open
             }
         }
+    }
+
+    /// Whether the name of a log is in the information instead of the result of its action.
+    pub(super) fn tells_logs(&self) -> bool {
+        self.takes(T::R2LogNameInInformation) && !self.takes(T::R1InformationOmitted)
     }
 
     /// Whether a switch forbids what a message asks for (ACT-16).
@@ -317,6 +376,12 @@ impl Agv {
         if self.faults.has(F::PauseDropsOrder) {
             self.give_up_order();
         }
+        if self.motion.is_moving() && self.faults.has(F::R3PauseFinishedBeforeStanding) {
+            self.third.braking = Some(self.moment() + Duration::from_secs(1));
+        }
+        if !self.holds.pause && self.faults.has(F::R2PausedFlagLate) {
+            self.pause_hidden_until = Some(self.moment() + Duration::from_millis(1_500));
+        }
         self.set_holds(|holds| holds.pause = true);
         Outcome::Done(None)
     }
@@ -342,6 +407,9 @@ impl Agv {
         if self.pauses > 0 {
             return Outcome::Done(None);
         }
+        if self.pause_outlives {
+            return Outcome::Done(None);
+        }
         if self.faults.has(F::PauseNotLifted) {
             self.set_holds(|holds| holds.stuck |= holds.pause);
         }
@@ -349,6 +417,10 @@ impl Agv {
         self.book.unbound |= waits && self.holds.pause && self.faults.has(F::R1HorizonDrivenAfterPause);
         self.book.hurried |= self.book.entered && self.holds.pause && self.faults.has(F::R1MaxSpeedForgottenInPause);
         self.book.heedless = false;
+        self.book.unblocked |= self.holds.pause && self.faults.has(F::R2BlockingForgottenAfterPause);
+        if self.holds.pause && self.faults.has(F::R2PauseForgetsQueue) {
+            self.actions.drop_lists();
+        }
         self.set_holds(|holds| holds.pause = false);
         if self.faults.has(F::PausedOrderSurvivesCancel)
             && let Some(order) = self.remembered.take()
@@ -370,12 +442,14 @@ impl Agv {
     pub(super) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
         let before = self.holds.any();
         let field = self.holds.field;
+        let paused = self.holds.pause;
         change(&mut self.holds);
         let moment = self.moment();
         let by_message = self.holds.pause && !self.holds.button && !self.holds.emergency && !self.holds.field;
         let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
         match (before, self.holds.any()) {
             (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
+            (true, false) if paused && self.faults.has(F::R3PausedActionsStayPaused) => {}
             (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
             (false, true) if by_message && self.takes(T::R1ActionsRunOnInPause) => {}
             (false, true) => self.actions.hold(moment, self.faults),
@@ -398,6 +472,7 @@ impl Agv {
         if self.charging && self.faults.has(F::ChargingEndsEarly) {
             self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
         }
+        self.third.charging_at = None;
         let toggled = !self.charging && self.faults.has(F::ChargingEndToggled);
         if action.of_order() && self.faults.has(F::R1NodeStopChargingUnreported) {
             return Ok(());
@@ -418,6 +493,10 @@ impl Agv {
         }
         if self.charging && self.faults.has(F::ChargingTwiceFails) {
             return Err(Problem::new(Area::Charging, action, "the vehicle charges already"));
+        }
+        if !self.charging && self.faults.has(F::R3ChargingReportedLate) {
+            self.third.charging_at = Some(self.moment() + Duration::from_secs(2));
+            return Ok(());
         }
         let toggled = self.charging && self.faults.has(F::ChargingToggled);
         self.charging = !toggled && !self.faults.has(F::ChargingUnreported);
@@ -452,6 +531,9 @@ impl Agv {
         if self.faults.has(F::R1InitPositionEnablesAll) {
             self.maps.enable_all(map_id);
         }
+        let node = self.config.node(action.text("lastNodeId"));
+        let snapped = node.filter(|node| node.map_id == map_id && self.faults.has(F::R3InitPositionSnapsToNode));
+        let (x, y) = snapped.map_or((x, y), |node| (node.x, node.y));
         let stale = action.of_order() && self.faults.has(F::LiftMapStale);
         let old = self.motion.pose(self.moment()).map_id;
         let kept = self.motion.pose(self.moment());
@@ -491,10 +573,19 @@ impl Agv {
         let here = self.motion.pose(self.moment()).map_id;
         let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
         let ahead = !self.faults.has(F::R1MapOfOrderDeleted);
-        let used = |map_id: &str| here == map_id || ahead && needed.iter().any(|needed| needed == map_id);
+        let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
+        let free = idle && self.faults.has(F::R2CurrentMapDeletedWhenIdle);
+        let used = |map_id: &str| here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
         let result = self
             .maps
             .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);
+        if result == Err("the map is in use") && self.faults.has(F::R3UsedMapDeletionFinished) {
+            return Ok(());
+        }
+        if result.is_ok() && self.faults.has(F::R3DeletedMapBackAfterReconnect) {
+            let deleted = (action.text("mapId").to_owned(), action.text("mapVersion").to_owned());
+            self.third.deleted_maps.push(deleted);
+        }
         result.map_err(|reason| Problem::map(action, reason))
     }
 }

@@ -24,6 +24,11 @@ impl Downloads {
         self.under_way.retain(|_, id| id != action_id);
     }
 
+    /// Whether none is under way.
+    pub(super) fn is_idle(&self) -> bool {
+        self.under_way.is_empty()
+    }
+
     /// Forgets all downloads.
     pub(super) fn clear(&mut self) {
         self.under_way.clear();
@@ -49,6 +54,8 @@ impl Agv {
         let twice = under_way
             .into_iter()
             .any(|other| other.text("mapId") == map_id && other.text("mapVersion") == version);
+        let failed = (map_id.to_owned(), version.to_owned());
+        let twice = twice || self.third.failed_downloads.contains(&failed);
         let refusal = match self.maps.room_for(map_id, version, self.faults) {
             Err(reason) => Some(reason),
             Ok(()) if twice => Some("the map is being downloaded already"),
@@ -147,8 +154,16 @@ impl Agv {
             self.finish(action_id, None);
             return;
         }
+        if self.faults.has(F::R2BrokenDownloadListed) {
+            let (id, version) = (action.text("mapId"), action.text("mapVersion"));
+            self.maps.store(id, version, self.faults);
+        }
         if self.faults.has(F::R1FailedDownloadPurges) {
             self.maps.purge(action.text("mapId"));
+        }
+        if self.faults.has(F::R3FailedDownloadBlocksRetry) {
+            let failed = (action.text("mapId").to_owned(), action.text("mapVersion").to_owned());
+            self.third.failed_downloads.push(failed);
         }
         let silent = self.faults.has(F::DownloadFailureSilent);
         self.fail(action_id, &Problem::map(&action, reason).silent_if(silent));

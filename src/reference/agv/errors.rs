@@ -89,6 +89,16 @@ impl Errors {
         });
     }
 
+    /// `r2-rejection-cleared-by-instant-action`: forgets what was refused.
+    pub(super) fn forget_refusals(&mut self) {
+        self.active.retain(|error| error.life != Life::UntilNewOrder);
+    }
+
+    /// Whether anything that was refused is still listed.
+    pub(super) fn lists_refusals(&self) -> bool {
+        self.active.iter().any(|error| error.life == Life::UntilNewOrder)
+    }
+
     /// The emergency stop was released.
     pub(super) fn released(&mut self) {
         self.active.retain(|error| error.life != Life::WhileStopped);
@@ -140,7 +150,8 @@ impl Errors {
             true => self.active.len().saturating_sub(1),
             false => 0,
         };
-        let shown = self.active.iter().skip(hidden);
+        let worst = faults.has(F::R2FatalHidesWarnings) && self.active.iter().any(|error| error.fatal);
+        let shown = self.active.iter().skip(hidden).filter(|error| error.fatal || !worst);
         shown.map(|error| picture_of(error, faults)).collect()
     }
 }
@@ -164,6 +175,12 @@ fn picture_of(error: &ActiveError, faults: Faults) -> Value {
         .collect();
     let level = match error.fatal {
         true => "FATAL",
+        false
+            if faults.has(F::R3MapErrorLevelCritical)
+                && error.references.iter().any(|(key, _)| key == "mapVersion") =>
+        {
+            "CRITICAL"
+        }
         false if faults.has(F::ErrorLevelUnknown) => "ERROR",
         false => "WARNING",
     };
@@ -172,6 +189,13 @@ fn picture_of(error: &ActiveError, faults: Faults) -> Value {
         "errorDescription": error.description,
         "errorLevel": level,
     });
+    let own = error.life == Life::WhileDefective;
+    if let Some(fields) = picture
+        .as_object_mut()
+        .filter(|_| own && faults.has(F::R2OwnErrorLevelMissing))
+    {
+        fields.remove("errorLevel");
+    }
     if faults.has(F::ReferencesAsMap) {
         let map = error.references.iter().map(|(key, value)| (key.clone(), json!(value)));
         picture["errorReferences"] = Value::Object(map.collect());

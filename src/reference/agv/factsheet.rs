@@ -45,6 +45,9 @@ impl Agv {
             return;
         }
         let mut body = self.shown_factsheet(self.true_factsheet());
+        if self.faults.has(F::R2FactsheetWithoutGeometry) {
+            body.remove("agvGeometry");
+        }
         if self.faults.has(F::FactsheetWithoutLimits) {
             body.remove("protocolLimits");
         }
@@ -86,6 +89,17 @@ impl Agv {
             } else {
                 json!({ "versions": [{ "key": "softwareVersion", "value": version }] })
             };
+            let leased = self.faults.has(F::R3AddressChanges);
+            if leased || self.takes(T::R3NetworkTold) {
+                let host = if leased { 20 + self.states_sent % 200 } else { 20 };
+                factsheet["vehicleConfig"]["network"] = json!({
+                    "dnsServers": ["10.1.0.1"],
+                    "ntpServers": ["10.1.0.2"],
+                    "localIpAddress": format!("10.1.0.{host}"),
+                    "netmask": "255.255.255.0",
+                    "defaultGateway": "10.1.0.1",
+                });
+            }
         }
         factsheet
     }
@@ -102,7 +116,11 @@ impl Agv {
             "agvKinematic": if self.faults.has(F::FactsheetKinematicsUnknown) { "DIFFERENTIAL" } else { "DIFF" },
             "agvClass": if self.faults.has(F::R1ClassUnknown) { "AMR" } else { "CARRIER" },
             "maxLoadMass": 500.0,
-            "localizationTypes": [if self.config.line_guided() { "RFID" } else { "NATURAL" }],
+            "localizationTypes": if self.faults.has(F::R3LocalizationTypesAsText) {
+                json!("NATURAL")
+            } else {
+                json!([if self.config.line_guided() { "RFID" } else { "NATURAL" }])
+            },
             "navigationTypes": [navigation],
         })
     }
@@ -138,7 +156,7 @@ impl Agv {
         let mut limits = json!({
             "maxStringLens": {
                 "msgLen": self.config.max_message,
-                "idLen": MAX_STRING,
+                "idLen": self.config.max_id,
                 "enumLen": MAX_STRING,
                 "idNumericalOnly": false,
             },
@@ -147,7 +165,7 @@ impl Agv {
                 "order.edges": nodes.saturating_sub(1),
                 "node.actions": self.config.max_actions,
                 "edge.actions": self.config.max_actions,
-                "instantActions": MAX_INSTANT_ACTIONS,
+                "instantActions": self.config.max_instant_actions,
                 "state.nodeStates": reported,
                 "state.edgeStates": reported,
                 "state.loads": 1,
@@ -204,7 +222,10 @@ impl Agv {
             .iter()
             .chain(special)
             .chain(zones)
-            .map(|name| json!({ "parameter": name, "support": support }))
+            .map(|name| match self.faults.has(F::R2OptionalParametersAsNames) {
+                true => json!(name),
+                false => json!({ "parameter": name, "support": support }),
+            })
             .collect();
         let missing = self.faults.has(F::FactsheetActionMissing);
         let unlisted = self.faults.has(F::StateRequestUnlisted);
@@ -273,22 +294,34 @@ impl Agv {
         }
         if !kind.parameters.is_empty() {
             let parameters = kind.parameters.iter().map(|parameter| {
-                json!({
+                let mut picture = json!({
                     "key": match parameter.key {
                         "stationType" if renamed => "station_type",
                         key => key,
                     },
                     "valueDataType": if unknown { "DOUBLE" } else { parameter.data_type },
                     "isOptional": parameter.optional,
-                })
+                });
+                if let Some(fields) = picture
+                    .as_object_mut()
+                    .filter(|_| !parameter.optional && self.takes(T::R3OptionalFlagOmitted))
+                {
+                    fields.remove("isOptional");
+                }
+                picture
             });
             picture.insert("actionParameters".into(), parameters.collect());
         }
-        if let Some(result) = kind.result {
+        let told = kind.deed == Deed::LogReport && self.tells_logs();
+        if let Some(result) = kind.result.filter(|_| !told) {
             picture.insert("resultDescription".into(), json!(result));
         }
         if self.config.has("vehicleConfig") {
-            picture.insert("blockingTypes".into(), json!(["NONE", "SOFT", "HARD"]));
+            let types = match self.faults.has(F::R2BlockingTypesLowerCase) {
+                true => json!(["none", "soft", "hard"]),
+                false => json!(["NONE", "SOFT", "HARD"]),
+            };
+            picture.insert("blockingTypes".into(), types);
         }
         Value::Object(picture)
     }

@@ -24,7 +24,9 @@ macro_rules! faults {
 
 with_blind_faults! { faults!
     // Transport
-    OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03"] "Throws its order away when the link breaks.";
+    OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-02"] "Throws its order away when the link breaks.";
+    PauseStuckAfterCut "pause-stuck-after-cut" ["ACT-13"] "Reports stopPause FINISHED and stays paused when the link was lost in the pause.";
+    PauseStuckAfterRefusal "pause-stuck-after-refusal" ["ACT-13"] "Reports stopPause FINISHED and stays paused when it has refused an order or an update in the pause.";
     UpdateForgottenOnLinkLoss "update-forgotten-on-link-loss" ["MQTT-03", "STATE-12", "STATE-MSG-13"] "Goes back to the first orderUpdateId of its order when the link breaks.";
     ActionsForgottenOnLinkLoss "actions-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-10"] "Forgets the actions of its order when the link breaks.";
     ActionEndMissedOffline "action-end-missed-offline" ["MQTT-04"] "Leaves an action RUNNING for ever that ends while the link is down.";
@@ -123,6 +125,7 @@ with_blind_faults! { faults!
     // Order
     NodeSkipped "node-skipped" ["ORD-01", "STATE-06", "NODE-03"] "Leaves plain nodes between others out of its reports.";
     FirstNodeRefused "first-node-refused" ["ORD-04"] "Refuses orders that begin where it stands.";
+    OrderAfterRefusalLost "order-after-refusal-lost" ["ORD-FLOW-06"] "Loses the first order that comes after a refused one while it has nothing to do.";
     DeviationIgnored "deviation-ignored" ["ORD-05", "ORD-CANCEL-16"] "Counts itself as on the first node only when it stands exactly there.";
     StopsBeforeEndOfBase "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base.";
     HorizonDriven "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05", "MQTT-04"] "Drives into the horizon without waiting for its release.";
@@ -149,9 +152,11 @@ with_blind_faults! { faults!
     StartRefusalSilent "start-refusal-silent" ["ORD-REJ-17"] "Raises no error when the first node of an order is out of reach.";
     OldActionStatesKept "old-action-states-kept" ["ORD-FLOW-05", "STATE-MSG-11"] "Keeps the action states of the old order.";
     HorizonNotReported "horizon-not-reported" ["ORD-FLOW-06", "STATE-12"] "Leaves the horizon out of its node and edge states.";
+    HorizonPositionsCopied "horizon-positions-copied" ["ORD-FLOW-06"] "Gives the nodes of the horizon in its states the place of the first node that is listed.";
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
+    UpdateIdCounted "update-id-counted" ["ORD-FLOW-09", "STATE-MSG-02"] "Shows an orderUpdateId that is one too high once an update was taken over.";
     UpdateIdsComparedAcrossOrders "update-ids-compared-across-orders" ["ORD-FLOW-06", "ORD-04", "ORD-13"] "Refuses a new order whose orderUpdateId is lower than that of the last order.";
     UpdateIdCarriedOver "update-id-carried-over" ["ORD-FLOW-06", "STATE-12"] "Reports a new order with the orderUpdateId of the last one.";
     OnlyFirstUpdate "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before.";
@@ -245,6 +250,10 @@ with_blind_faults! { faults!
     OutdatedUpdateMisnamed "outdated-update-misnamed" ["ORD-REJ-12"] "Reports an outdated update as validationError.";
     OutdatedUpdateFatal "outdated-update-fatal" ["ORD-REJ-12"] "Reports an outdated update as FATAL.";
     DuplicateReported "duplicate-reported" ["ORD-REJ-13"] "Raises an error for an order that is sent twice.";
+    DuplicateHaltsDriving "duplicate-halts-driving" ["ORD-06", "ORD-REJ-13"] "Stands still for ever when the order it drives is sent again.";
+    RefusalStallsAction "refusal-stalls-action" ["ACT-01", "ORD-FLOW-12"] "An order it refuses makes it forget to end the action that runs.";
+    RefusedUpdateDropsEdges "refused-update-drops-edges" ["ORD-FLOW-12", "STATE-12"] "An order it refuses makes it throw the edges of its horizon away.";
+    BusyRefusalUntyped "busy-refusal-untyped" ["ERR-02"] "The error of an order it refuses because of another one has an empty errorType.";
     DuplicateExecuted "duplicate-executed" ["ORD-REJ-13"] "Begins an order again when it is sent twice.";
     UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
     MemoryUnchecked "memory-unchecked" ["ORD-REJ-15", "STATE-12"] "Takes over orders larger than its stated limits, cut to what fits.";
@@ -308,6 +317,7 @@ with_blind_faults! { faults!
     TwoMapsEnabled "two-maps-enabled" ["MAP-14", "MAP-24"] "Leaves the old version of a map enabled beside the new one.";
     EnableDisablesOtherMaps "enable-disables-other-maps" ["MAP-24"] "Disables all other maps when one is enabled, whatever their mapId.";
     EnableWithoutEffect "enable-without-effect" ["MAP-24"] "Reports enableMap FINISHED and enables nothing.";
+    EnableBringsOther "enable-brings-other" ["MAP-06"] "Lists a map that nobody has sent it as soon as another one is enabled.";
     EnableUnknownFinished "enable-unknown-finished" ["MAP-25"] "Reports enableMap FINISHED for a map it does not have.";
     ManualEnableUnreported "manual-enable-unreported" ["MAP-26", "STATE-10"] "Does not report a map enabled on the vehicle.";
     DeleteKeepsEntry "delete-keeps-entry" ["MAP-29"] "Keeps listing a map it has deleted.";
@@ -343,6 +353,7 @@ with_blind_faults! { faults!
     PausesCounted "pauses-counted" ["ACT-13", "ACT-11"] "Counts its pauses, and ends them only with as many stopPause.";
     StopPauseIdleFails "stop-pause-idle-fails" ["ACT-11"] "Fails a stopPause while it is not paused.";
     PauseDrivesOn "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses.";
+    DrivingInPause "driving-in-pause" ["ACT-12", "ACT-15", "STATE-MSG-08"] "Says that it drives as long as it is paused with an order.";
     PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
@@ -429,6 +440,7 @@ with_blind_faults! { faults!
     ModeNumeric "mode-numeric" ["MODE-01", "JSON-10", "JSON-06"] "Gives a number as its operating mode.";
     EmptyListsNull "empty-lists-null" ["JSON-10", "JSON-06", "STATE-MSG-01"] "Writes null for lists of nodes, edges and actions that are empty.";
     OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02", "ORD-CANCEL-08"] "Empties the orderId when the order is complete.";
+    OrderIdPrefixed "order-id-prefixed" ["ORD-FLOW-06", "STATE-MSG-02"] "Shows orderIds with its own serial number in front.";
     UpdateIdResetWhenDone "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
     LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
@@ -441,7 +453,7 @@ with_blind_faults! { faults!
     LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
     DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";
     DrivingAsText "driving-as-text" ["JSON-07", "JSON-10", "STATE-MSG-08"] "Sends driving as a word in quotes.";
-    DrivingKept "driving-kept" ["STATE-MSG-08", "STATE-08"] "Says that it drives from its first order on, also when it stands.";
+    DrivingKept "driving-kept" ["STATE-MSG-08", "STATE-08", "ORD-UPD-01"] "Says that it drives from its first order on, also when it stands.";
     DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
     FinishedInstantForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
     LastInstantActionOnly "last-instant-action-only" ["STATE-MSG-10", "STATE-MSG-09"] "Removes finished instant actions from its states when another one arrives.";

@@ -10,6 +10,7 @@ use super::errors::{ActiveError, Life};
 use super::faults::FaultName as F;
 use super::order_message::{ActionRequest, Blocking, read_parameters};
 use super::read::{Defect, Fields};
+use super::tolerances::ToleranceName as T;
 
 /// At most this many actions of one message are taken.
 pub(super) const MAX_INSTANT_ACTIONS: usize = 50;
@@ -41,6 +42,9 @@ impl Agv {
             self.malformed("the message has no array of actions");
             return;
         };
+        if !elements.is_empty() && self.faults.has(F::R2RejectionClearedByInstantAction) {
+            self.errors.forget_refusals();
+        }
         if self.faults.has(F::LastInstantActionOnly) {
             self.actions
                 .retain(|action| action.of_order() || !action.status.is_terminal());
@@ -52,9 +56,23 @@ impl Agv {
         let limit = if self.faults.has(F::OnlyFirstInstantAction) {
             1
         } else {
-            MAX_INSTANT_ACTIONS
+            self.config.max_instant_actions
         };
-        for element in elements.iter().take(limit) {
+        let mut types: Vec<&Value> = Vec::new();
+        let mut elements: Vec<&Value> = elements.iter().collect();
+        if self.takes(T::R3BatchReversed) {
+            elements.reverse();
+        }
+        for element in elements.iter().copied().take(limit) {
+            if let Some(action_type) = element
+                .get("actionType")
+                .filter(|_| self.faults.has(F::R2SameTypeInMessageDropped))
+            {
+                if types.contains(&action_type) {
+                    continue;
+                }
+                types.push(action_type);
+            }
             self.instant_action(element);
             let id = element.get("actionId").and_then(Value::as_str).unwrap_or_default();
             let failed = self
@@ -65,10 +83,16 @@ impl Agv {
                 break;
             }
         }
+        if !elements.is_empty() && self.faults.has(F::R2AcknowledgesOnInstantActions) {
+            self.acknowledge_instant_actions();
+        }
     }
 
     fn malformed(&mut self, reason: &str) {
         self.malformed_side_effects();
+        if self.takes(T::R2UnreadableInstantIgnored) && reason.starts_with("the message") {
+            return;
+        }
         self.errors.raise(ActiveError {
             error_type: self.config.errors.validation.clone(),
             fatal: false,
@@ -105,11 +129,18 @@ impl Agv {
         let fit = kind.filter(|kind| kind.scopes.contains(&Scope::Instant) || anywhere);
         let by_hand = self.mode == super::Mode::Semiautomatic && self.faults.has(F::R1SemiautomaticInstantRefused);
         let fit = fit.filter(|_| !by_hand);
+        let fit = fit
+            .filter(|kind| kind.deed != action_kinds::Deed::LogReport || !self.faults.has(F::R2LogReportListedRefused));
         let refusal = match (&defect, fit) {
             (Some(defect), _) => Some(format!("{} {}", defect.path, defect.reason)),
             (None, None) => Some("the vehicle does not offer the action as an instant action".to_owned()),
             (None, Some(kind)) => {
-                action_kinds::refusal(kind, &request, false).map(|(key, reason)| format!("{key}: {reason}"))
+                let nodeless = kind.deed == action_kinds::Deed::InitPosition
+                    && request.parameter("lastNodeId").is_none()
+                    && self.faults.has(F::R2InitPositionWithoutNodeTaken);
+                let found = action_kinds::refusal(kind, &request, false);
+                let found = found.filter(|(key, _)| !(nodeless && key == "lastNodeId"));
+                found.map(|(key, reason)| format!("{key}: {reason}"))
             }
         };
         if defect.is_some() {
@@ -122,6 +153,21 @@ impl Agv {
             Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantWaits) => {}
             Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
             Some(_) if kind.is_none() && self.faults.has(F::R1UnknownInstantWaits) => {}
+            Some(_) if fit.is_some() && defect.is_none() && self.faults.has(F::R2BadParameterInstantFinished) => {
+                self.finish(&id, None);
+            }
+            None if !self.downloads.is_idle()
+                && self.faults.has(F::R3InstantWaitsForDownload)
+                && !matches!(
+                    action.request.action_type.as_str(),
+                    "startPause" | "stopPause" | "cancelOrder"
+                ) => {}
+            None if self.is_acting()
+                && self.faults.has(F::R2InstantWaitsForRunningAction)
+                && !matches!(
+                    action.request.action_type.as_str(),
+                    "startPause" | "stopPause" | "cancelOrder"
+                ) => {}
             None if self.holds.pause
                 && self.faults.has(F::R1InstantActionsWaitForPause)
                 && !matches!(
@@ -141,6 +187,13 @@ impl Agv {
             None if self.faults.has(F::InstantActionDeferred) && action.request.action_type != "cancelOrder" => {}
             None => self.begin_instant(&id),
         }
+    }
+
+    /// Whether an action of the order is under way.
+    fn is_acting(&self) -> bool {
+        self.actions
+            .iter()
+            .any(|action| action.of_order() && action.status.is_active())
     }
 
     fn make_room(&mut self) {
@@ -168,7 +221,7 @@ impl Agv {
             .actions
             .get(id)
             .and_then(|action| action.kind)
-            .is_some_and(|kind| kind.lasting);
+            .is_some_and(|kind| kind.lasting || self.takes_time(kind.deed));
         if lasting {
             self.run_action(id);
         } else {
@@ -176,11 +229,24 @@ impl Agv {
         }
     }
 
+    /// Whether it says RUNNING before an action that others do at once is done.
+    fn takes_time(&self, deed: action_kinds::Deed) -> bool {
+        use action_kinds::Deed;
+        match deed {
+            Deed::StartPause | Deed::StopPause => self.takes(T::R2PauseTakesTime),
+            Deed::InitPosition => self.takes(T::R2InitPositionTakesTime),
+            Deed::EnableMap | Deed::DeleteMap => self.takes(T::R2MapActionsTakeTime),
+            _ => false,
+        }
+    }
+
     /// `instant-action-deferred`: begins what had to wait for the end of the order.
     pub(super) fn begin_deferred(&mut self) -> bool {
         let after_pause = self.faults.has(F::R1InstantActionsWaitForPause) && !self.holds.pause;
         let after_order = self.faults.has(F::InstantActionDeferred) && !self.is_busy();
-        if !after_pause && !after_order {
+        let after_action = self.faults.has(F::R2InstantWaitsForRunningAction) && !self.is_acting();
+        let after_download = self.faults.has(F::R3InstantWaitsForDownload) && self.downloads.is_idle();
+        if !after_pause && !after_order && !after_action && !after_download {
             return false;
         }
         let waits = |action: &&Action| !action.of_order() && action.status == Status::Waiting;

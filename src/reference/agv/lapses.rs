@@ -37,10 +37,6 @@ pub const LAPSES: &[(&str, &str)] = &[
         "Gaps and repetitions of sequenceIds are for the master control to avoid; no vehicle has to refuse them.",
     ),
     (
-        "manual-keeps-actions",
-        "MODE-05 is plain about orders; what becomes of a running action in MANUAL is not said.",
-    ),
-    (
         "speed-min-above-max",
         "A contradiction within the factsheet is remarked on; no sentence forbids it.",
     ),
@@ -67,7 +63,6 @@ pub const LAPSES: &[(&str, &str)] = &[
         "positioning-as-instant-action",
         "The ruling of ACT-09 leaves a warning.",
     ),
-    ("unknown-instant-waits", "It breaks a recommendation only."),
     ("unknown-instant-silent", "It breaks a recommendation only."),
     ("unknown-instant-unreferenced", "It breaks a recommendation only."),
     (
@@ -118,10 +113,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     ("distance-negative", "It breaks a recommendation only."),
     ("distance-not-reset", "It breaks a recommendation only."),
     ("own-error-cleared-by-order", "It breaks a recommendation only."),
-    (
-        "semiautomatic-ends-order",
-        "The text says that orders are executed in both modes, and nothing about those that are switched over.",
-    ),
     (
         "traversal-split",
         "Two states of one moment are remarked on; tests that look at single states are not reached.",

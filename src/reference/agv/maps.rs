@@ -101,12 +101,22 @@ impl Maps {
         if kept || faults.has(F::EnableWithoutEffect) {
             return Ok(());
         }
+        if faults.has(F::EnableBringsOther) && !self.on_board("depot") {
+            self.all.push(OnboardMap {
+                map_id: "depot".to_owned(),
+                map_version: "1".to_owned(),
+                enabled: false,
+            });
+        }
         for map in &mut self.all {
             if map.map_id == map_id {
                 map.enabled = map.map_version == version || (faults.has(F::TwoMapsEnabled) && map.enabled);
             } else if faults.has(F::EnableDisablesOtherMaps) {
                 map.enabled = false;
             }
+        }
+        if faults.has(F::R2EnableRemovesOldVersion) {
+            self.purge(map_id);
         }
         Ok(())
     }
@@ -128,6 +138,12 @@ impl Maps {
     /// Whether exactly this version is on board.
     pub(super) fn has_version(&self, map_id: &str, version: &str) -> bool {
         self.position(map_id, version).is_some()
+    }
+
+    /// Whether exactly this version is on board and enabled.
+    pub(super) fn is_enabled(&self, map_id: &str, version: &str) -> bool {
+        self.position(map_id, version)
+            .is_some_and(|index| self.all[index].enabled)
     }
 
     /// `r1-failed-download-purges`: removes what is not enabled of a mapId.

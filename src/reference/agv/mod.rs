@@ -120,9 +120,35 @@ struct Load {
     position: String,
 }
 
+/// What only vehicles with faults or liberties of round three remember.
+#[derive(Clone, Debug, Default)]
+struct Third {
+    /// mapId and mapVersion of downloads that failed (`r3-failed-download-blocks-retry` only).
+    failed_downloads: Vec<(String, String)>,
+    /// mapId and mapVersion of maps that were deleted (`r3-deleted-map-back-after-reconnect` only).
+    deleted_maps: Vec<(String, String)>,
+    /// It was given a pose since the last order (`r3-order-after-init-position-refused` only).
+    posed: bool,
+    /// It still rolls although it is paused (`r3-pause-finished-before-standing` only).
+    braking: Option<Moment>,
+    /// When it shows that it charges (`r3-charging-reported-late` only).
+    charging_at: Option<Moment>,
+    /// Actions that were tried once more (`r3-failed-pick-retried` only).
+    retried: Vec<String>,
+    /// Nodes and edges of the last order message that was taken over.
+    content: Option<serde_json::Value>,
+    /// An order that came twice, and is mentioned.
+    repeated: Option<String>,
+    /// nodeIds of this order that were visited (`r3-loop-second-visit-without-actions` only).
+    visited: BTreeSet<String>,
+    /// Whether it was busy before.
+    busy: bool,
+}
+
 /// The reference AGV.
 #[derive(Clone, Debug)]
 pub struct Agv {
+    third: Third,
     config: AgvConfig,
     faults: Faults,
     /// The time of what is happening.
@@ -157,6 +183,8 @@ pub struct Agv {
     pause_blocked: bool,
     /// How often it was paused (`pauses-counted` only).
     pauses: u32,
+    /// Nothing ends the pause any more (`pause-stuck-…` only).
+    pause_outlives: bool,
     /// Something keeps it from ending its charging.
     charger_locked: bool,
     /// The order it gave up in a mode for people (`order-taken-up-again` only).
@@ -181,6 +209,16 @@ pub struct Agv {
     hidden_load: Option<Moment>,
     /// The e-stop is shown until the next order (`r1-e-stop-latched` only).
     latched: bool,
+    /// The field is shown violated until the next order (`r2-field-violation-latched` only).
+    field_latched: bool,
+    /// actionId and name of the last log (`r2-log-name-in-information` only).
+    last_log: Option<(String, String)>,
+    /// An order that was refused and waits all the same (`r2-refused-order-queued` only).
+    queued: Option<serde_json::Value>,
+    /// The last order was lost (`order-after-refusal-lost` only).
+    order_lost: bool,
+    /// The pause is not shown before this (`r2-paused-flag-late` only).
+    pause_hidden_until: Option<Moment>,
     /// What was decided and is still to be handed to the driver.
     pending: Vec<Output>,
     /// How a test told it to behave.
@@ -215,6 +253,7 @@ impl Agv {
         };
         let maps = Maps::new(config.maps.clone(), config.map_capacity);
         Ok(Self {
+            third: Third::default(),
             faults,
             now: Stamp {
                 moment: Moment::START,
@@ -239,6 +278,7 @@ impl Agv {
             undocking: None,
             pause_blocked: false,
             pauses: 0,
+            pause_outlives: false,
             charger_locked: false,
             remembered: None,
             lost: false,
@@ -253,6 +293,11 @@ impl Agv {
             logs: 0,
             hidden_load: None,
             latched: false,
+            field_latched: false,
+            last_log: None,
+            queued: None,
+            order_lost: false,
+            pause_hidden_until: None,
             pending: Vec::new(),
             persona: Persona::default(),
             config,
@@ -266,7 +311,11 @@ impl Agv {
 
     /// Reports a warning that has no rule for its end.
     fn warn(&mut self, error_type: String, references: Vec<(String, String)>, description: String) {
-        let life = Life::Until(self.moment() + self.config.error_duration);
+        let life = match () {
+            () if self.takes(T::R3ActionErrorsUntilNewOrder) => Life::UntilNewOrder,
+            () if self.takes(T::R3ActionErrorsBrief) => Life::Until(self.moment() + self.brief()),
+            () => Life::Until(self.moment() + self.config.error_duration),
+        };
         self.errors.raise(ActiveError {
             error_type,
             fatal: false,
@@ -290,6 +339,9 @@ impl Agv {
             self.inbox.front().map(|(due, _)| *due),
             self.shadow.as_ref().map(|(end, _)| *end),
             self.hidden_load,
+            self.pause_hidden_until,
+            self.third.braking,
+            self.third.charging_at,
             self.persona.next_end(),
             self.next_report(),
         ];
@@ -330,10 +382,17 @@ impl Agv {
         }
         self.shadow.take_if(|(end, _)| *end <= moment);
         self.hidden_load = self.hidden_load.filter(|end| *end > moment);
+        self.pause_hidden_until = self.pause_hidden_until.filter(|end| *end > moment);
+        self.third.braking = self.third.braking.filter(|end| *end > moment);
+        if self.third.charging_at.take_if(|at| *at <= moment).is_some() {
+            self.charging = true;
+        }
         self.a_moment_later();
         self.resume_if_due();
         self.attempt_connection();
         self.settle();
+        self.notice_end_of_order();
+        self.begin_queued();
         self.flush();
     }
 }
@@ -362,6 +421,16 @@ impl Device for Agv {
 }
 
 impl Agv {
+    /// `r3-rejection-gone-when-order-done`: forgets what was refused once the order is done.
+    fn notice_end_of_order(&mut self) {
+        let busy = self.is_busy();
+        let before = std::mem::replace(&mut self.third.busy, busy);
+        let done = before && !busy && !self.book.cancelled;
+        if done && self.faults.has(FaultName::R3RejectionGoneWhenOrderDone) {
+            self.errors.forget_refusals();
+        }
+    }
+
     /// Puts something into the inbox. What people do does not wait behind messages that are taken late.
     fn lay_down(&mut self, input: Input) {
         let is_message = |input: &Input| matches!(input, Input::Message { .. });

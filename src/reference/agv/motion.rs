@@ -203,6 +203,17 @@ impl Motion {
         });
     }
 
+    /// Begins to turn to an orientation, the long way.
+    pub(super) fn turn_round(&mut self, now: Moment, theta: f64, speed: f64) {
+        let short = wrapped(theta - self.pose.theta);
+        let by = short - 2.0 * PI * short.signum();
+        self.underway = Some(Underway {
+            leg: Leg::Turn { by },
+            begun: now,
+            lasts: lasting(by.abs(), speed),
+        });
+    }
+
     /// Begins to drive straight to a point.
     pub(super) fn roll(&mut self, now: Moment, to: (f64, f64), speed: f64, backwards: bool, to_node: bool) {
         let lasts = lasting(self.pose.distance(to.0, to.1), speed);

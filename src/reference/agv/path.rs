@@ -74,6 +74,9 @@ impl Agv {
             corridor.left *= 2.0;
             corridor.right *= 2.0;
         }
+        if self.faults.has(F::R2CorridorSidesSwapped) {
+            std::mem::swap(&mut corridor.left, &mut corridor.right);
+        }
         corridor.contour &= !self.faults.has(F::CorridorContourIgnored);
         Some(corridor)
     }
@@ -133,14 +136,15 @@ impl Agv {
     }
 
     /// Somebody pushed it to the left of the way it has before it.
-    pub(super) fn push_out(&mut self) {
+    pub(super) fn push_out(&mut self, by: Option<f64>) {
+        let by = by.unwrap_or(PUSHED);
         let moment = self.moment();
         let mut pose = self.motion.pose(moment);
         let ahead = self.book.nodes.front().map(|stop| &stop.place);
         let ahead = ahead.filter(|place| pose.distance(place.x, place.y) > ON_PATH);
         let heading = ahead.map_or(pose.theta, |place| (place.y - pose.y).atan2(place.x - pose.x));
-        pose.x -= PUSHED * heading.sin();
-        pose.y += PUSHED * heading.cos();
+        pose.x -= by * heading.sin();
+        pose.y += by * heading.cos();
         self.motion.place(pose);
     }
 
@@ -261,6 +265,12 @@ impl Agv {
         knots.push(1.0);
         if !self.faults.has(F::KnotsTooFew) {
             knots.push(1.0);
+        }
+        if self.faults.has(F::R2KnotsNotNormalized) {
+            let length = (to.0 - from.0).hypot(to.1 - from.1).max(2.0);
+            for knot in &mut knots {
+                *knot *= length;
+            }
         }
         let points: Vec<Value> = points
             .iter()

@@ -57,10 +57,11 @@ impl Agv {
     /// Begins actions of the order whose turn it is. A held vehicle begins nothing.
     fn begin_triggered(&mut self) -> bool {
         let offline = !self.connection.online && self.faults.has(F::R1ActionsHeldOffline);
+        let offline = offline || self.mode == Mode::Semiautomatic && self.faults.has(F::R3SemiautomaticActionsHeld);
         if self.holds.any() || offline || self.faults.has(F::ActionsIgnored) {
             return false;
         }
-        let ids = self.actions.startable();
+        let ids = self.actions.startable(self.faults);
         for id in &ids {
             self.begin_action(id);
         }
@@ -71,9 +72,12 @@ impl Agv {
     fn may_drive(&self) -> bool {
         let rolling_out = self.faults.has(F::PauseDrivesOn) && self.book.entered;
         let held = self.holds.any() && !((rolling_out || self.book.heedless) && self.holds.pause);
+        let stopped = self.holds.button || self.holds.emergency || self.holds.field || self.holds.defect;
+        let held = held && !(self.third.braking.is_some() && self.holds.pause && !stopped);
         let cancelled = match &self.book.cancel {
             Some(cancel) => {
                 let rolls_on = self.faults.has(F::CancelDrivesOn) || self.faults.has(F::CancelFinishedMoving);
+                let rolls_on = rolls_on || self.book.updated && self.faults.has(F::R3CancelAfterUpdateDrivesOn);
                 !cancel.to_node && !rolls_on
             }
             None => self.book.cancelled && !self.faults.has(F::CancelFinishedMoving),
@@ -96,6 +100,7 @@ impl Agv {
             && !self.book.stunned
             && !warned
             && (!self.actions.block_driving(self.faults)
+                || self.book.unblocked
                 || self.book.updated && self.faults.has(F::UpdateBreaksBlocking))
     }
 
@@ -153,6 +158,8 @@ impl Agv {
         let unreached = alone && self.faults.has(F::TemporaryNodeNotReached);
         let undriven = self.faults.has(F::ContinuationNotDriven) && self.book.continued;
         let stuck = self.book.stuck_at == Some(self.book.last_sequence);
+        let parked = !self.connection.online && !self.book.entered && self.faults.has(F::R2NextEdgeNotEnteredOffline);
+        let stuck = stuck || parked && self.book.edge_ahead().is_some();
         if early_end || unreached || undriven || stuck || self.faults.has(F::NeverStarts) {
             return false;
         }
@@ -169,8 +176,9 @@ impl Agv {
         let aligned = self.turns_late() || distance < 1e-6 || motion::wrapped(theta - pose.theta).abs() <= ALIGNED;
         let turns_before = edge.as_ref().is_some_and(|edge| edge.rotation_allowed == Some(false));
         self.charging = false;
+        self.third.charging_at = None;
         if !aligned && turns_before && !self.book.entered {
-            self.motion.turn(moment, theta, self.rotation_speed(edge.as_ref()));
+            self.turn_to(theta, edge.as_ref());
             return true;
         }
         if let Some(edge) = edge.as_ref().filter(|_| !self.book.entered) {
@@ -181,7 +189,7 @@ impl Agv {
         } else if aligned {
             self.roll(edge.as_ref(), stop, (distance, backwards), curve);
         } else {
-            self.motion.turn(moment, theta, self.rotation_speed(edge.as_ref()));
+            self.turn_to(theta, edge.as_ref());
         }
         true
     }
@@ -189,10 +197,17 @@ impl Agv {
     /// Enters an edge; its actions are triggered, at once if they do not stop the vehicle (NODE-06, NODE-07).
     fn enter(&mut self, edge: &Edge, stop: &Stop) {
         self.book.entered = true;
+        if edge.sequence_id == 1 && self.faults.has(F::R2FirstEdgeActionsFail) {
+            let of_edge = self
+                .actions
+                .iter_mut()
+                .filter(|action| action.origin == Origin::Edge(1));
+            of_edge.for_each(|action| action.end(super::actions::Status::Failed));
+        }
         if self.faults.has(F::NoneAborted) {
             self.actions.leave_node(self.book.last_sequence);
         }
-        if !self.actions.edge_stops(edge.sequence_id) && !self.faults.has(F::EdgeActionsLate) {
+        if !self.actions.edge_stops(edge.sequence_id, self.faults) && !self.faults.has(F::EdgeActionsLate) {
             self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
         }
         if self.faults.has(F::NodeActionsEarly) {
@@ -203,7 +218,7 @@ impl Agv {
     fn roll(&mut self, edge: Option<&Edge>, stop: &Stop, (distance, backwards): (f64, bool), curve: Option<Path>) {
         let moment = self.moment();
         let pose = self.motion.pose(moment);
-        let stops = edge.is_some_and(|edge| self.actions.edge_stops(edge.sequence_id));
+        let stops = edge.is_some_and(|edge| self.actions.edge_stops(edge.sequence_id, self.faults));
         let (way, to_node) = match stops && !self.faults.has(F::EdgeActionsLate) {
             true => (BRAKING.min(distance / 4.0), false),
             false if self.stops_before(&stop.node.id) => (distance / 2.0, false),
@@ -211,6 +226,7 @@ impl Agv {
             false if self.stops_short(stop) && distance > 1.0 => {
                 (distance - SHORT.min(self.config.tolerance * 0.8), true)
             }
+            false if self.ends_early(stop) => ((distance - 0.5).max(distance / 2.0), true),
             false if self.faults.has(F::TraversedEarly) => ((distance - 0.5).max(distance / 2.0), true),
             false => (distance, true),
         };
@@ -222,7 +238,8 @@ impl Agv {
         let to = if part < 1.0 { to } else { (stop.place.x, stop.place.y) };
         let permitted = edge
             .and_then(|edge| edge.max_speed)
-            .filter(|_| !self.faults.has(F::MaxSpeedIgnored) && !self.book.hurried);
+            .filter(|_| !self.faults.has(F::MaxSpeedIgnored) && !self.book.hurried)
+            .filter(|_| !(backwards && self.faults.has(F::R3MaxSpeedIgnoredBackwards)));
         let permitted = if self.faults.has(F::R1MaxSpeedOfEdgeBefore) {
             self.book.left.1.as_ref().and_then(|left| left.max_speed)
         } else {
@@ -236,7 +253,8 @@ impl Agv {
             _ if self.book.slipped => self.config.speed * 4.0,
             _ => self.config.speed,
         };
-        let speed = permitted.map_or(own, |permitted| permitted.min(own));
+        let share = if self.takes(T::R3KeepsBelowMaxSpeed) { 0.8 } else { 1.0 };
+        let speed = permitted.map_or(own, |permitted| (permitted * share).min(own));
         let Some(curve) = curve else {
             self.motion.roll(moment, to, speed, backwards, to_node);
             return;
@@ -249,6 +267,13 @@ impl Agv {
         self.motion.follow(moment, curve.first(way), speed, facing, to_node);
     }
 
+    /// `r3-zero-deviation-unlimited`: takes an allowed deviation of 0 for none given.
+    fn ends_early(&self, stop: &Stop) -> bool {
+        let position = stop.node.position.as_ref();
+        let allowed = position.and_then(|position| position.allowed_deviation);
+        allowed == Some(0.0) && self.faults.has(F::R3ZeroDeviationUnlimited)
+    }
+
     /// Whether it may stand a little beside the node, and does so.
     fn stops_short(&self, stop: &Stop) -> bool {
         let position = stop.node.position.as_ref();
@@ -258,7 +283,13 @@ impl Agv {
 
     /// `traversed-early`: the rest of the way to the last node, which is reported already.
     fn roll_out(&mut self) -> bool {
-        let Some(left) = self.book.left.0.as_ref().filter(|_| self.faults.has(F::TraversedEarly)) else {
+        let Some(left) = self
+            .book
+            .left
+            .0
+            .as_ref()
+            .filter(|left| self.faults.has(F::TraversedEarly) || self.ends_early(left))
+        else {
             return false;
         };
         let to = (left.place.x, left.place.y);
@@ -275,6 +306,17 @@ impl Agv {
         let pose = self.motion.pose(self.moment());
         let behind = |left: &Stop| pose.distance(left.place.x, left.place.y) > 0.2;
         self.faults.has(F::TurnsOnEdge) && !self.book.left.0.as_ref().is_some_and(behind)
+    }
+
+    /// Begins to turn. Which way round is the vehicle's own affair.
+    fn turn_to(&mut self, theta: f64, edge: Option<&Edge>) {
+        let (moment, speed) = (self.moment(), self.rotation_speed(edge));
+        let far = motion::wrapped(theta - self.motion.pose(moment).theta).abs() > 0.5;
+        if far && self.takes(T::R2TurnsTheLongWay) {
+            self.motion.turn_round(moment, theta, speed);
+        } else {
+            self.motion.turn(moment, theta, speed);
+        }
     }
 
     fn rotation_speed(&self, edge: Option<&Edge>) -> f64 {
@@ -304,7 +346,9 @@ impl Agv {
                 }
             })
         });
-        let backwards = relative.is_some_and(|relative| motion::wrapped(relative).abs() > FRAC_PI_2);
+        let behind = motion::wrapped(heading - pose.theta).abs() > FRAC_PI_2 + 0.1;
+        let backs_up = behind && edge.is_some() && curve.is_none() && self.takes(T::R2BacksUp);
+        let backwards = relative.map_or(backs_up, |relative| motion::wrapped(relative).abs() > FRAC_PI_2);
         let theta = if backwards { heading + PI } else { heading };
         (motion::wrapped(theta), backwards)
     }
@@ -321,7 +365,7 @@ impl Agv {
         let Some(sequence_id) = self.book.edge_ahead().map(|edge| edge.sequence_id) else {
             return;
         };
-        if self.actions.edge_stops(sequence_id) {
+        if self.actions.edge_stops(sequence_id, self.faults) {
             self.actions.trigger(Origin::Edge(sequence_id), self.faults);
         }
     }
@@ -329,9 +373,15 @@ impl Agv {
     /// At the position of a node: turns to its orientation, then counts it as traversed (NODE-01).
     fn arrive(&mut self, stop: &Stop) -> bool {
         let position = stop.node.position.as_ref();
+        let ends = stop.node.sequence_id > 0 && stop.node.sequence_id == self.book.base_end.1;
+        let own = (ends && self.takes(T::R2OwnOrientationAtEnd)).then_some(0.0);
         if let Some(theta) = position
-            .and_then(|position| position.theta)
+            .and_then(|position| position.theta.or(own))
             .filter(|_| !self.faults.has(F::ThetaIgnored))
+            .filter(|_| {
+                let fixed = self.book.edge_ahead().and_then(|edge| edge.rotation_allowed) == Some(false);
+                !(fixed && self.faults.has(F::R2NoTurnAfterFixedEdge))
+            })
             .filter(|_| stop.node.sequence_id == self.book.base_end.1 || !self.faults.has(F::R1ThetaAtEndOnly))
         {
             let allowed = position
@@ -343,10 +393,13 @@ impl Agv {
                 self.config.tolerance_theta
             };
             let off = motion::wrapped(theta - self.motion.pose(self.moment()).theta).abs();
+            let off = match self.faults.has(F::R3ThetaTakenAsAxis) {
+                true => off.min(PI - off),
+                false => off,
+            };
             if off > allowed {
                 let edge = self.book.edge_ahead().cloned();
-                self.motion
-                    .turn(self.moment(), theta, self.rotation_speed(edge.as_ref()));
+                self.turn_to(theta, edge.as_ref());
                 return true;
             }
         }
@@ -366,6 +419,7 @@ impl Agv {
         self.motion.reached = false;
         self.book.entered = false;
         self.book.hurried = false;
+        self.book.unblocked = false;
         let behind = |edge: &Edge| edge.sequence_id < sequence_id;
         while self.book.edges.front().is_some_and(behind) {
             let Some(edge) = self.book.edges.pop_front() else { break };
@@ -379,19 +433,34 @@ impl Agv {
                 };
                 self.actions.leave_edge(edge.sequence_id, self.faults, cut);
             }
+            if self.faults.has(F::R2EdgeActionsForgottenWithEdge) {
+                let origin = Origin::Edge(edge.sequence_id);
+                self.actions.retain(|action| action.origin != origin);
+            }
             self.book.left.1 = Some(edge);
         }
-        self.motion.set_map(stop.place.map_id.clone());
+        if self.maps.on_board(&stop.place.map_id) || !self.faults.has(F::R3OnlyFirstMapChecked) {
+            self.motion.set_map(stop.place.map_id.clone());
+        }
         if self.faults.has(F::TraversalSplit) {
             self.flush();
         }
         self.update_last_node(&stop);
+        let again = !self.third.visited.insert(stop.node.id.clone());
+        let skipped = again && self.faults.has(F::R3LoopSecondVisitWithoutActions)
+            || !self.connection.online && self.faults.has(F::R3NodeActionsSkippedOffline);
+        self.fail_actions_here(sequence_id);
+        if self.takes(T::R3NodeActionsInNextState) && self.actions.waiting_at(Origin::Node(sequence_id)) {
+            // It stands on the node, and says so.
+            self.lingers_until = Some(self.moment() + LINGERING);
+            self.flush();
+        }
         if self.book.cancel.is_none() {
             let first =
                 sequence_id == 0 && !self.book.nodes.is_empty() && self.faults.has(F::R1FirstNodeActionsSkipped);
             let continuation = self.book.continued && self.faults.has(F::R1ContinuationActionsSkipped);
             let of_update = sequence_id > self.book.first_end && self.faults.has(F::UpdateActionsNotPerformed);
-            if !(first || continuation || of_update) {
+            if !(first || continuation || of_update || skipped) {
                 self.actions.trigger(Origin::Node(sequence_id), self.faults);
             }
             let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == stop.node.id);
@@ -404,7 +473,37 @@ impl Agv {
             }
             self.stop_at_decision_point();
         }
+        let again = self.book.base_end.0 == stop.node.id && self.book.base_end.1 > sequence_id;
+        if again && self.book.cancel.is_none() && self.faults.has(F::R2LoopCutShort) {
+            self.book.drop_route();
+            for action in self.actions.iter_mut() {
+                let behind = match action.origin {
+                    Origin::Node(id) | Origin::Edge(id) => id > sequence_id,
+                    Origin::Instant => false,
+                };
+                if behind {
+                    action.end(super::actions::Status::Failed);
+                }
+            }
+        }
         self.book.left.0 = Some(stop);
+    }
+
+    /// What a faulty vehicle does not do on a node that it has just traversed.
+    fn fail_actions_here(&mut self, sequence_id: u32) {
+        let alone = sequence_id == 0 && self.book.nodes.is_empty() && self.faults.has(F::R3SingleNodeActionsFail);
+        let passes = self.book.nodes.front().is_some_and(|next| next.node.released);
+        let here = Origin::Node(sequence_id);
+        let free = |action: &super::actions::Action| action.request.blocking == Blocking::None;
+        let all_free = self.actions.iter().filter(|action| action.origin == here).all(free);
+        let passing = sequence_id > 0 && passes && all_free && self.faults.has(F::R3PassingActionsFail);
+        if !(alone || passing) || self.book.cancel.is_some() {
+            return;
+        }
+        let of_node = self.actions.iter_mut().filter(|action| action.origin == here);
+        of_node
+            .filter(|action| !action.status.is_terminal())
+            .for_each(|action| action.end(super::actions::Status::Failed));
     }
 
     /// What a faulty vehicle does at the decision point.

@@ -47,6 +47,11 @@ impl Refusal {
         self.rule == Rule::Malformed
     }
 
+    /// Whether the vehicle has no time for the order.
+    pub(super) fn is_of_busy(&self) -> bool {
+        self.rule == Rule::OtherOrderActive
+    }
+
     pub(super) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
         self.culprits.push((key.to_owned(), value.into()));
         self
@@ -76,12 +81,19 @@ impl Agv {
             Rule::Outdated => self.faults.has(F::R1OutdatedUpdateSilent),
             _ => false,
         };
+        let silent = silent || self.holds.pause && self.faults.has(F::R3RefusalSilentInPause);
         if silent || self.faults.has(F::RejectionSilent) {
             return;
         }
         let names = &self.config.errors;
         let name = match refusal.rule {
             Rule::Malformed if self.faults.has(F::ValidationErrorMisspelled) => "validationOrder",
+            Rule::Malformed
+                if self.faults.has(F::R3ActionDefectAsOrderError)
+                    && refusal.culprits.iter().any(|(_, path)| path.contains("actions")) =>
+            {
+                &names.order
+            }
             Rule::Malformed => &names.validation,
             Rule::Unable if self.faults.has(F::OrderErrorAsValidation) => &names.validation,
             Rule::Unable => &names.order,
@@ -90,6 +102,7 @@ impl Agv {
             Rule::OtherOrderActive if self.takes(T::R1OwnErrorNames) => "otherOrderActive",
             Rule::Memory => &names.memory,
             Rule::UnknownMap => &names.unknown_map,
+            Rule::OtherOrderActive if self.faults.has(F::BusyRefusalUntyped) => "",
             Rule::OtherOrderActive => &names.other_order_active,
             Rule::StartOutOfRange => &names.start_out_of_range,
             Rule::Outdated if self.faults.has(F::OutdatedUpdateMisnamed) => &names.validation,
@@ -132,7 +145,23 @@ impl Agv {
         if self.faults.has(F::UpdateIdUnreferenced) {
             references.retain(|(key, _)| key != "orderUpdateId");
         }
+        for (key, value) in &mut references {
+            if key == "orderUpdateId" && self.faults.has(F::R3UpdateIdUnderOtherKey) {
+                "updateId".clone_into(key);
+            }
+            if key == "field" && self.takes(T::R3CulpritAsJsonPath) {
+                (*key, *value) = ("jsonPath".to_owned(), format!("$.{value}"));
+            }
+        }
+        if self.takes(T::R3ReferencesNameAllNodes) {
+            let nodes = message.get("nodes").and_then(Value::as_array).into_iter().flatten();
+            let ids = nodes.filter_map(|node| node.get("nodeId")?.as_str()).take(20);
+            references.extend(ids.map(|id| ("nodeId".to_owned(), id.chars().take(256).collect())));
+        }
         if refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorUnreferenced) {
+            references.clear();
+        }
+        if refusal.rule == Rule::OtherOrderActive && self.faults.has(F::R2BusyRefusalUnreferenced) {
             references.clear();
         }
         let error = ActiveError {
@@ -142,6 +171,13 @@ impl Agv {
             description: refusal.reason,
             life,
         };
+        if self.takes(T::R3RefusalInTwoErrors) {
+            self.errors.raise(ActiveError {
+                error_type: "orderRejected".to_owned(),
+                fatal: false,
+                ..error.clone()
+            });
+        }
         self.errors.refused(error, self.now.moment, self.faults);
     }
 
@@ -168,6 +204,15 @@ impl Agv {
             self.book.update_id = id;
         }
         self.book.stunned |= rule == Rule::Outdated && self.faults.has(F::R1OutdatedHaltsDriving);
+        if self.faults.has(F::RefusalStallsAction) {
+            self.actions
+                .iter_mut()
+                .filter(|action| action.of_order())
+                .for_each(|action| action.due = None);
+        }
+        if self.faults.has(F::RefusedUpdateDropsEdges) {
+            self.book.edges.retain(|edge| edge.released);
+        }
         if rule == Rule::Malformed {
             if message.is_object() && self.faults.has(F::MalformedStopsOrder) {
                 self.give_up_order();
@@ -190,6 +235,16 @@ impl Agv {
                 action.end(Status::Failed);
                 self.actions.push(action);
             }
+        }
+        if rule == Rule::OtherOrderActive && self.faults.has(F::R3BusyRefusalFailsActions) {
+            let of_order = self.actions.iter_mut().filter(|action| action.of_order());
+            of_order
+                .filter(|action| action.status.is_active())
+                .for_each(|action| action.end(Status::Failed));
+        }
+        self.pause_outlives |= self.holds.pause && self.faults.has(F::PauseStuckAfterRefusal);
+        if self.faults.has(F::R2RejectionLiftsPause) {
+            self.set_holds(|holds| holds.pause = false);
         }
         if self.faults.has(F::RejectionDropsHorizon) {
             self.book.drop_horizon();

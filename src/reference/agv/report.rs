@@ -4,6 +4,7 @@
 //! part of the vehicle has to remember to announce what it changed, and changes of one instant share a state.
 
 mod picture;
+mod route;
 
 use std::time::Duration;
 
@@ -115,6 +116,9 @@ impl Agv {
         self.report.requested = true;
         let silent = !first && self.faults.has(F::SilentAfterReconnect);
         self.report.silent_until = silent.then(|| self.moment() + Duration::from_secs(35));
+        if !silent && self.takes(T::R2FirstStateLate) {
+            self.report.silent_until = Some(self.moment() + Duration::from_millis(1_200));
+        }
         self.report.next_visualization = self.visualization_interval().map(|_| self.moment());
     }
 
@@ -151,6 +155,7 @@ impl Agv {
         (held && self.faults.has(F::SilentWhileHeld))
             || (self.holds.pause && self.faults.has(F::SilentWhilePaused))
             || (self.mode == super::Mode::Manual && self.faults.has(F::SilentByHand))
+            || (self.holds.emergency && self.faults.has(F::R2SilentInEmergency))
             || (self.faults.has(F::SilentWhileActing) && acts())
     }
 
@@ -349,6 +354,9 @@ impl Agv {
             ..Report::default()
         };
         self.states_sent += 1;
+        if self.takes(T::R2OnlineAgain) && self.states_sent.is_multiple_of(10) {
+            self.publish_connection("ONLINE");
+        }
         if self.takes(T::FactsheetAgain) && self.states_sent.is_multiple_of(10) {
             self.publish_factsheet();
         }
@@ -383,7 +391,17 @@ impl Agv {
         {
             pose.remove("mapId");
         }
-        body.insert("velocity".into(), self.velocity_picture());
+        let velocity = self.velocity_picture();
+        if self.faults.has(F::R3VisualizationVelocityScalar) {
+            body.insert("velocity".into(), velocity["vx"].clone());
+        } else {
+            body.insert("velocity".into(), velocity);
+        }
+        if self.faults.has(F::R2VisualizationPoseAtRoot)
+            && let Some(Value::Object(pose)) = body.remove("agvPosition")
+        {
+            body.extend(pose);
+        }
         let body = self.shown_visualization(body);
         self.publish("visualization", body, &[]);
     }

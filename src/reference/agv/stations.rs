@@ -8,6 +8,7 @@ use super::action_kinds::{Deed, LOAD_POSITIONS};
 use super::actions::{Action, Origin};
 use super::deeds::{Area, Outcome, Problem};
 use super::faults::FaultName as F;
+use super::tolerances::ToleranceName as T;
 use super::{Agv, Load};
 
 impl Agv {
@@ -86,6 +87,11 @@ impl Agv {
         if self.faults.has(F::PickWithoutLoad) {
             return Ok(());
         }
+        let read = if self.takes(T::R3LoadsIdentified) {
+            format!("RFID-{site}")
+        } else {
+            String::new()
+        };
         self.stations.insert(site, false);
         if self.faults.has(F::R1PickReportedLate) {
             self.hidden_load = Some(self.moment() + Duration::from_secs(2));
@@ -95,7 +101,7 @@ impl Agv {
             None => other.to_owned(),
         };
         self.loads.push(Load {
-            id: given("loadId", ""),
+            id: given("loadId", &read),
             kind: given("loadType", "EPAL"),
             position: given("lhd", LOAD_POSITIONS[0]),
         });
@@ -109,6 +115,9 @@ impl Agv {
             .iter()
             .position(|load| wanted.is_empty() || load.id == wanted);
         let Some(found) = found else {
+            if self.loads.is_empty() && self.faults.has(F::R3DropWithoutLoadFinished) {
+                return Ok(());
+            }
             return self.load_problem(action, "the vehicle does not carry that load");
         };
         let site = self.site(action);

@@ -19,8 +19,15 @@ impl Agv {
         if self.refuses_updates_now() {
             return Err(Refusal::new(Rule::BrokenUpdate, "no update is taken now"));
         }
+        if order.nodes.len() == 1 && self.faults.has(F::R2StitchOnlyUpdateRefused) {
+            return Err(Refusal::new(Rule::BrokenUpdate, "the update brings nothing new"));
+        }
         if self.faults.has(F::CompletedNotContinued) && !busy {
             return Err(Refusal::new(Rule::BrokenUpdate, "the order is complete"));
+        }
+        let failed = |action: &Action| action.of_order() && action.status == Status::Failed;
+        if !busy && self.actions.iter().any(failed) && self.faults.has(F::R3FailedOrderNotContinued) {
+            return Err(Refusal::new(Rule::BrokenUpdate, "an action of the order has failed"));
         }
         let first = &order.nodes[0];
         let joins = if busy || cancelled {
@@ -74,12 +81,22 @@ impl Agv {
         }
         self.book.updated = true;
         self.report.update_received = true;
+        let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);
+        if plans_only && self.faults.has(F::R2HorizonChangeIgnored) {
+            self.book.update_id = order.update_id;
+            return;
+        }
         let keep = if order.nodes.iter().any(|node| !node.released) {
             self.faults.has(F::HorizonAppended)
         } else {
             self.faults.has(F::HorizonKept)
         };
         self.take_update_wrongly(&order);
+        if self.motion.is_moving() && self.faults.has(F::R3NewHorizonLostWhileDriving) {
+            order.nodes.retain(|node| node.released);
+            order.edges.retain(|edge| edge.released);
+        }
+        let kept = order.nodes.len() == 1 && self.faults.has(F::R3StitchOnlyUpdateIdKept);
         if !keep {
             self.drop_horizon();
         }
@@ -89,7 +106,7 @@ impl Agv {
                 self.book.edges.pop_front();
             }
         }
-        if !self.faults.has(F::UpdateIdKept) {
+        if !kept && !self.faults.has(F::UpdateIdKept) {
             self.book.update_id = order.update_id;
         }
         self.continue_actions_wrongly(&mut order);
@@ -103,6 +120,12 @@ impl Agv {
         }
         self.append(nodes.collect(), order.edges);
         self.book.dropped.clear();
+        if self.faults.has(F::R3UpdateServesAsTrigger) {
+            self.trigger("");
+        }
+        if self.takes(T::R2AdoptsBeforeDriving) {
+            self.flush();
+        }
     }
 
     /// The horizon goes, and the actions that wait there.
@@ -134,6 +157,9 @@ impl Agv {
 
     /// What a faulty vehicle does to its actions, or to those of an update, when it takes the update over.
     fn continue_actions_wrongly(&mut self, order: &mut Order) {
+        if self.faults.has(F::R2MaxSpeedOfUpdateIgnored) {
+            order.edges.iter_mut().for_each(|edge| edge.max_speed = None);
+        }
         if self.faults.has(F::UpdateEdgeActionsLost) {
             order.edges.iter_mut().for_each(|edge| edge.actions.clear());
         }
@@ -166,6 +192,9 @@ impl Agv {
     fn take_update_wrongly(&mut self, order: &Order) {
         if self.is_busy() && self.motion.is_moving() && self.faults.has(F::R1StopsAtStitch) {
             self.book.stuck_at = Some(self.book.base_end.1);
+        }
+        if self.faults.has(F::R3UpdateInPauseNotDriven) {
+            self.book.stuck_at = self.holds.pause.then_some(self.book.base_end.1);
         }
         self.book.heedless |= self.holds.pause && self.faults.has(F::R1UpdateDrivesInPause);
         let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);

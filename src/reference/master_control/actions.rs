@@ -89,7 +89,11 @@ impl Site {
         let offered: Vec<ParameterOffer> = offer
             .and_then(|offer| offer.action_parameters.clone())
             .unwrap_or_default();
-        for parameter in offered.iter().filter(|parameter| parameter.is_optional != Some(true)) {
+        let generous = self.takes(T::R2OptionalParametersFilled) && SCOPES.iter().all(|(name, _)| *name != kind);
+        for parameter in offered
+            .iter()
+            .filter(|parameter| generous || parameter.is_optional != Some(true))
+        {
             if !self.faults.has(F::RequiredKeyMissing) || !mandatory.is_empty() {
                 self.supply(vehicle, &mut parameters, &parameter.key, &parameter.value_data_type);
             }
@@ -119,14 +123,21 @@ impl Site {
             "actionId": self.failed_id(vehicle, kind).unwrap_or_else(|| self.next_id(vehicle, "action")),
             "blockingType": blocking,
         });
+        if vendor && self.faults.has(F::R3VendorActionWrapped) {
+            action["actionType"] = json!("customAction");
+            parameters.insert("name".into(), json!(kind));
+        }
         if kind == "startPause" && self.faults.has(F::R1PauseIdRepeats) {
             action["actionId"] = json!("pause");
         }
         if !parameters.is_empty() || self.takes(T::R1EmptyParameterLists) {
-            let list: Vec<Value> = parameters
+            let mut list: Vec<Value> = parameters
                 .into_iter()
                 .map(|(key, value)| json!({ "key": key, "value": value }))
                 .collect();
+            if self.takes(T::R2ParametersReversed) {
+                list.reverse();
+            }
             action["actionParameters"] = Value::Array(list);
         }
         action
@@ -163,6 +174,13 @@ impl Site {
             "triggerType" => json!("button"),
             "reason" => json!("requested"),
             "duration" => json!(1.0),
+            _ if self.faults.has(F::R2SuppliedValuesAsText) => json!(match data_type {
+                "BOOL" => "true",
+                "NUMBER" | "FLOAT" | "INTEGER" => "1",
+                "OBJECT" => "{}",
+                "ARRAY" => "[]",
+                _ => "default",
+            }),
             _ => match data_type {
                 "BOOL" => json!(true),
                 "NUMBER" | "FLOAT" => json!(1.0),
@@ -182,6 +200,11 @@ impl Site {
             .and_then(|sheet| sheet.load_types.first().cloned());
         listed.unwrap_or_else(|| self.config.load_type.clone())
     }
+}
+
+/// Whether an action is one of the table.
+pub(super) fn is_predefined(kind: &str) -> bool {
+    SCOPES.iter().any(|(name, _)| *name == kind)
 }
 
 /// Whether the text demands a parameter.

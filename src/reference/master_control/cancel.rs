@@ -6,6 +6,7 @@ use super::Site;
 use super::faults::{FaultName as F, Faults};
 use super::instant::ended;
 use super::seen::State;
+use super::tolerances::ToleranceName as T;
 use super::vehicle::{Cancel, Presence, Transport, Vehicle};
 
 impl Site {
@@ -22,9 +23,20 @@ impl Site {
             vehicle.queue.extend(then);
             return;
         }
+        if !running.accepted && self.faults.has(F::R2CancelForgottenBeforeAcceptance) {
+            vehicle.last_order = vehicle.running.take();
+            vehicle.queue.extend(then);
+            return;
+        }
         if vehicle.presence == Presence::Away && self.faults.has(F::R1CancelLostWhileAway) {
             return;
         }
+        if vehicle.r3_cancels > 0 && self.faults.has(F::R3CancelsOnlyOnce) {
+            return;
+        }
+        vehicle.r3_cancels += 1;
+        let position = vehicle.state.as_ref().and_then(|state| state.agv_position.clone());
+        vehicle.r3_cancelled_at = position;
         let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
         if self.faults.has(F::R1PauseInsteadOfCancel) {
             let pausing = vehicle.instants.iter().any(|instant| instant.kind() == "startPause");
@@ -33,7 +45,13 @@ impl Site {
             }
             return;
         }
-        if paused && self.faults.has(F::R1PausedOrderReplaced) {
+        let works = vehicle.state.as_ref().is_some_and(|state| {
+            let mut ids = running.actions().filter_map(|action| action["actionId"].as_str());
+            !state.driving && ids.any(|id| state.action(id).is_some_and(|action| !action.is_terminal()))
+        });
+        let replaced = (paused && self.faults.has(F::R1PausedOrderReplaced))
+            || (works && then.is_some() && self.faults.has(F::ReplacedAtWork));
+        if replaced {
             vehicle.last_order = vehicle.running.take();
             vehicle.r1_hasty = true;
             if let Some(transport) = then {
@@ -53,6 +71,12 @@ impl Site {
             let body =
                 json!({ "orderId": running.id, "orderUpdateId": running.update_id + 1, "nodes": [], "edges": [] });
             self.publish(vehicle, "order", &body);
+        }
+        if paused && self.takes(T::R3ResumesBeforeCancel) {
+            self.instant(vehicle, "stopPause", &Value::Null);
+        }
+        if !paused && self.takes(T::R2PausesBeforeCancel) {
+            vehicle.r2_resume = self.instant(vehicle, "startPause", &Value::Null).is_some();
         }
         let Some(action_id) = self.instant(vehicle, "cancelOrder", &Value::Null) else {
             return;
@@ -97,7 +121,9 @@ pub(super) fn watch_cancel(vehicle: &mut Vehicle, faults: Faults) {
         return;
     }
     vehicle.cancel = None;
-    if busy {
+    let over = busy && faults.has(F::R2FailedCancelTakenForDone);
+    vehicle.r1_hasty |= over;
+    if busy && !over {
         // It could not be called off, and is driven to its end.
         vehicle.queue.extend(cancel.then);
         return;

@@ -57,6 +57,13 @@ impl MasterControl {
                         .is_none_or(|serial| *serial == vehicle.config.serial_number)
                 });
                 let index = named.next().map(|(index, _)| index);
+                if matches!(name, "pause" | "resume") && self.site.faults.has(F::PauseForAll) {
+                    for vehicle in &mut self.fleet {
+                        self.site.vehicle_command(vehicle, name, arguments);
+                        vehicle.at(self.site.now.moment);
+                    }
+                    return;
+                }
                 if let Some(vehicle) = index.and_then(|index| self.fleet.get_mut(index)) {
                     self.site.vehicle_command(vehicle, name, arguments);
                     vehicle.at(self.site.now.moment);
@@ -92,6 +99,7 @@ impl Site {
             }
             "instant-action" => self.instant_asked(vehicle, arguments),
             "init-position" => self.init_position(vehicle, arguments),
+            "download-map" if vehicle.running.is_some() && self.faults.has(F::R3DownloadRefusedDuringOrder) => {}
             "download-map" if !self.faults.has(F::MapNotPreloaded) => {
                 if let Some(map) = self.map_named(arguments) {
                     self.download_map(vehicle, map);
@@ -111,6 +119,10 @@ impl Site {
             "unblock-edge" => {
                 if let Some(edge) = pair("from", "to") {
                     vehicle.blocked.remove(&edge);
+                    if self.faults.has(F::R2UnblockFreesBothWays) {
+                        let (from, to) = edge;
+                        vehicle.blocked.remove(&(to, from));
+                    }
                 }
             }
             _ => {}
@@ -153,7 +165,40 @@ impl Site {
             self.dispatch(vehicle, drop);
             return;
         }
+        if let Some(halfway) = self.halfway(vehicle, &transport) {
+            let first = Transport {
+                to: halfway,
+                ..transport.clone()
+            };
+            self.dispatch(vehicle, first);
+            let rest = Transport {
+                r1_follows: true,
+                ..transport
+            };
+            self.dispatch(vehicle, rest);
+            return;
+        }
         self.dispatch(vehicle, transport);
+        let waits = vehicle.queue.front().is_some_and(|next| next.r1_follows);
+        if self.takes(T::R2LatestTransportFirst)
+            && !waits
+            && let Some(latest) = vehicle.queue.pop_back()
+        {
+            vehicle.queue.push_front(latest);
+        }
+    }
+
+    /// `r3-long-ways-in-two-orders`: the node where the first of two orders ends.
+    fn halfway(&self, vehicle: &Vehicle, transport: &Transport) -> Option<String> {
+        let plain = transport.from.is_none() && transport.action.is_none() && transport.load_type.is_none();
+        let idle = vehicle.running.is_none() && vehicle.queue.is_empty();
+        if !(plain && idle && self.takes(T::R3LongWaysInTwoOrders)) {
+            return None;
+        }
+        let last = &vehicle.state.as_ref()?.last_node_id;
+        let way = self.config.way(last, &transport.to, &vehicle.blocked)?;
+        let middle = way.get((way.len() / 2).saturating_sub(1)).filter(|_| way.len() > 2)?;
+        Some(middle.to.clone())
     }
 
     /// The running transport, or the next one, is not wanted any more.
@@ -165,7 +210,8 @@ impl Site {
             self.cancel(vehicle, None);
         } else if vehicle.queue.pop_front().is_none() && vehicle.cancel.is_none() {
             let foreign = vehicle.state.as_ref().is_some_and(|state| !state.route_empty());
-            if foreign {
+            let now = self.online && self.commandable(vehicle);
+            if foreign || (now && self.takes(T::R3CancelSentToIdle)) {
                 self.instant(vehicle, "cancelOrder", &Value::Null);
             }
         }

@@ -5,12 +5,11 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use super::Site;
-use super::dispatch::Way;
 use super::faults::FaultName as F;
 use super::order::Window;
 use super::seen::State;
 use super::tolerances::ToleranceName as T;
-use super::vehicle::{MAX_QUEUE, Running, Transport, Vehicle};
+use super::vehicle::{Running, Transport, Vehicle};
 
 /// How often a faulty master control repeats a refused order.
 const FLOOD: u32 = 20;
@@ -83,6 +82,9 @@ impl Site {
             }
             Fate::Over => {
                 vehicle.last_order = Some(running);
+                if self.faults.has(F::R2EmptyMessageAfterOrder) {
+                    self.r2_empty_order(vehicle);
+                }
             }
             Fate::Again => {
                 let transport = again(&running, vehicle.state.as_ref());
@@ -96,6 +98,36 @@ impl Site {
                 self.cancel(vehicle, None);
             }
         }
+    }
+
+    /// What some master controls do of their own while an order is driven.
+    pub(super) fn r3_watch(&mut self, vehicle: &mut Vehicle) {
+        let Some(state) = &vehicle.state else { return };
+        let (informs, paused) = (state.informs(), state.is_paused());
+        let battery = &state.battery_state;
+        let low = battery
+            .battery_charge
+            .is_some_and(|charge| charge < self.config.low_battery)
+            && !battery.charging;
+        if let Some(running) = &mut vehicle.running {
+            running.r3_paused |= paused && running.accepted;
+        }
+        if informs
+            && vehicle.running.is_some()
+            && vehicle.cancel.is_none()
+            && self.faults.has(F::R3InformationCancelsOrder)
+        {
+            self.cancel(vehicle, None);
+        }
+        let due = low && !vehicle.r3_charged && vehicle.running.is_some();
+        if due && self.faults.has(F::R3ChargingOnLowBattery) {
+            vehicle.r3_charged = true;
+            if self.offers(vehicle.factsheet.as_ref(), "startCharging", "INSTANT") {
+                let action = self.action(vehicle, "startCharging", &Value::Null);
+                self.queue(vehicle, action);
+            }
+        }
+        vehicle.r3_charged &= low;
     }
 
     /// `updated-while-cancelled`: as if nobody had called the order off.
@@ -172,16 +204,32 @@ impl Site {
         if running.resends >= self.config.resend_limit {
             return false;
         }
-        if let Some(due) = self.next_order_at(vehicle) {
+        if let Some(due) = self
+            .next_order_at(vehicle)
+            .filter(|_| !self.faults.has(F::ResentTooSoon))
+        {
             vehicle.at(due);
             return true;
         }
         running.resends += 1;
         running.sent_at = now;
         vehicle.last_order_at = Some(now);
+        if self.faults.has(F::R3ResendWithoutHorizon) {
+            for key in ["nodes", "edges"] {
+                if let Some(list) = running.message[key].as_array_mut() {
+                    list.retain(|element| element["released"] == json!(true));
+                }
+            }
+        }
         vehicle.at(self.lost_after(now));
         if self.faults.has(F::ResentChanged) {
             slower(&mut running.message, running.resends);
+        }
+        if self.faults.has(F::R2ResendExtendsBase) && release_next(&mut running.message) {
+            running.released += 1;
+        }
+        if self.faults.has(F::R2ResendWithoutActions) {
+            without_actions(&mut running.message);
         }
         if self.faults.has(F::R1ResendAsUpdate) {
             running.update_id += 1;
@@ -286,14 +334,44 @@ impl Site {
     fn extend_base(&mut self, vehicle: &mut Vehicle, running: &mut Running) {
         let Some(state) = &vehicle.state else { return };
         let reached = running.reached(Some(state));
+        let last_order = vehicle
+            .last_order_at
+            .filter(|_| self.faults.has(F::R3BasePlannedEveryHalfMinute));
+        let due = last_order.map(|last| last + Duration::from_secs(30));
+        if let Some(due) = due.filter(|due| *due > self.now.moment) {
+            vehicle.at(due);
+            return;
+        }
+        if running.r3_held {
+            return;
+        }
+        let stopped = !matches!(state.safety_state.e_stop.as_str(), "NONE" | "");
+        let withdraws = stopped && self.faults.has(F::R2EStopWithdrawsBase);
+        if withdraws && running.released > reached + 1 && !running.r2_withdrawn {
+            running.r2_withdrawn = true;
+            running.released = reached + 1;
+            running.changed = true;
+        }
         let ahead = running.released.saturating_sub(reached + 1);
         let asked = state.new_base_request == Some(true) && !self.faults.has(F::NewBaseRequestIgnored);
         let deaf = (vehicle.r1_answered && self.faults.has(F::R1NewBaseAnsweredOnce))
             || (state.driving && self.faults.has(F::R1NewBaseOnlyAtRest));
-        let asked = asked && !deaf;
+        let half = state.operating_mode == "SEMIAUTOMATIC" && self.faults.has(F::R2NewBaseIgnoredInSemiautomatic);
+        let asked = asked && !deaf && !half;
+        running.r3_asked = asked;
+        let showing = asked && self.faults.has(F::R3NewBaseAnsweredByHorizon);
+        if showing && !running.r3_answered && !running.is_whole() {
+            running.r3_answered = true;
+            running.changed = true;
+        }
+        let warned = state.errors.iter().any(|error| error.error_level == "WARNING");
+        if warned && self.faults.has(F::R2WarningHoldsBase) {
+            return;
+        }
         let held = (vehicle.r1_stale && self.faults.has(F::R1VehicleReturnStopsUpdates))
             || (state.informs() && self.faults.has(F::R1InformationHoldsBase));
-        if held {
+        let first = self.config.vehicles.first() == Some(&vehicle.config);
+        if held || (!first && self.faults.has(F::FirstVehicleExtended)) {
             return;
         }
         let halts = !state.driving && ahead == 0;
@@ -307,7 +385,9 @@ impl Site {
         } else {
             1
         };
-        let wanted = if self.faults.has(F::BaseExtendedLate) {
+        let wanted = if withdraws || showing {
+            false
+        } else if self.faults.has(F::BaseExtendedLate) {
             ahead == 0 && !state.driving
         } else {
             ahead <= enough || asked || eager
@@ -328,7 +408,9 @@ impl Site {
         if target <= running.released && !running.changed {
             return;
         }
-        if let Some(due) = self.next_order_at(vehicle) {
+        let at_once = running.changed && self.faults.has(F::R2IntervalIgnoredOnReroute);
+        let at_once = at_once || (asked && self.faults.has(F::R3IntervalNotWhenBaseAsked));
+        if let Some(due) = self.next_order_at(vehicle).filter(|_| !at_once) {
             vehicle.at(due);
             return;
         }
@@ -339,15 +421,24 @@ impl Site {
             return;
         }
         let window = Window {
-            first: if self.faults.has(F::BaseSentAgain) {
+            first: if self.faults.has(F::BaseSentAgain)
+                || (running.r3_paused && self.faults.has(F::R3BaseSentAgainAfterPause))
+            {
                 0
             } else if self.faults.has(F::R1UpdateFromVehicle) {
                 reached.min(running.released.saturating_sub(1))
+            } else if self.faults.has(F::R2UpdateBeginsOneNodeEarly) {
+                running.released.saturating_sub(2)
             } else {
                 running.released.saturating_sub(1)
             },
             released: target.max(running.released),
-            end: free.min(target.max(running.released).saturating_add(self.config.horizon_length)),
+            end: free.min(target.max(running.released).saturating_add(self.horizon_length())),
+        };
+        let window = if self.takes(T::R2HorizonToTheGoal) {
+            Window { end: free, ..window }
+        } else {
+            window
         };
         let window = if self.takes(T::R1UpdatesWithoutHorizon) && target > running.released {
             Window {
@@ -359,6 +450,7 @@ impl Site {
         };
         let stuck = (running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats))
             || (running.changed && self.faults.has(F::R1UpdateIdKeptOnReroute));
+        let stuck = stuck || (running.resends > 0 && self.faults.has(F::R3UpdateIdKeptAfterResend));
         let before = running.update_id;
         running.update_id += u32::from(!stuck);
         match self.order_message(vehicle, running, window) {
@@ -373,7 +465,11 @@ impl Site {
 
     /// Calls the order off when a trigger does not come in time (ACT-39).
     fn supervise_trigger(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
-        if self.faults.has(F::TriggerUnsupervised) {
+        if self.faults.has(F::TriggerUnsupervised) || running.r2_unsupervised {
+            return Fate::Runs;
+        }
+        let first = running.message.pointer("/nodes/0/sequenceId").and_then(Value::as_u64);
+        if first.is_some_and(|first| first > 0) && self.faults.has(F::R3TriggerUnsupervisedAfterUpdate) {
             return Fate::Runs;
         }
         let trigger = |action: &Value| {
@@ -413,132 +509,10 @@ impl Site {
         vehicle.at(due);
         Fate::Runs
     }
-
-    /// Gives the running transport another destination: behind the base, or by calling it off.
-    pub(super) fn reroute(&mut self, vehicle: &mut Vehicle, to: &str) {
-        if self.config.node(to).is_none() {
-            return;
-        }
-        let Some(mut running) = vehicle.running.take() else {
-            match vehicle.queue.front_mut() {
-                Some(next) => to.clone_into(&mut next.to),
-                None => self.dispatch(
-                    vehicle,
-                    Transport {
-                        to: to.to_owned(),
-                        ..Transport::default()
-                    },
-                ),
-            }
-            return;
-        };
-        let mut transport = again(&running, vehicle.state.as_ref());
-        to.clone_into(&mut transport.to);
-        vehicle.r1_blind = self.faults.has(F::R1RerouteOverBlockedEdge);
-        if !running.is_whole() && self.faults.has(F::R1RerouteCutsBase) {
-            let next = running.reached(vehicle.state.as_ref()) + 2;
-            running.released = running.released.min(next);
-        }
-        if running.is_whole() && self.faults.has(F::BaseReplaced) {
-            running.released = running.reached(vehicle.state.as_ref()) + 1;
-        }
-        let led = vehicle.cancel.is_none() && !running.is_whole() && !running.refused;
-        let led = led && !self.takes(T::R1ReroutesByCancel);
-        let led = led && self.lead_on(vehicle, &mut running, transport.clone());
-        vehicle.running = Some(running);
-        if !led {
-            self.cancel(vehicle, Some(transport));
-        }
-        vehicle.at(self.now.moment);
-    }
-
-    /// Replaces the way behind the base.
-    fn lead_on(&mut self, vehicle: &mut Vehicle, running: &mut Running, transport: Transport) -> bool {
-        let base = running.released;
-        let Some(end) = running.stops.get(base.saturating_sub(1)) else {
-            return false;
-        };
-        let here = end.id.clone();
-        let picks = running.stops.iter().take(base).any(|stop| {
-            let mut kinds = stop.actions.iter().filter_map(|action| action["actionType"].as_str());
-            kinds.any(|kind| kind == "pick")
-        });
-        let mut on_edges = running
-            .legs
-            .iter()
-            .take(base.saturating_sub(1))
-            .flat_map(|leg| &leg.actions);
-        let picks = picks || (self.takes(T::R1ActionsOnEdges) && on_edges.any(|action| action["actionType"] == "pick"));
-        let transport = Transport {
-            loaded: transport.loaded || picks,
-            ..transport
-        };
-        let mut way = Way {
-            stops: vec![super::vehicle::Stop::default()],
-            legs: Vec::new(),
-        };
-        let led = self.config.node(&here).is_some() && self.lead(vehicle, &mut way, &here, &transport).is_some();
-        // What is done at the end of the base is fixed; more cannot be done there.
-        if !led || way.stops.len() < 2 || !way.stops[0].actions.is_empty() || !self.names_fit(vehicle, &way) {
-            return false;
-        }
-        if self.faults.has(F::R1SequenceGapAfterReroute) && running.r1_gap.is_none() {
-            running.r1_gap = Some((base, 2 * running.stops.len().saturating_sub(base)));
-        }
-        running.r1_rerouted = true;
-        running.stops.truncate(base);
-        running.legs.truncate(base.saturating_sub(1));
-        running.stops.extend(way.stops.into_iter().skip(1));
-        running.legs.extend(way.legs);
-        running.transport = Transport {
-            begun: running.transport.begun,
-            loaded: running.transport.loaded,
-            ..transport
-        };
-        running.changed = true;
-        true
-    }
-
-    /// Closes a way. A base that leads over it is called off, a horizon led round it.
-    pub(super) fn block(&mut self, vehicle: &mut Vehicle, from: &str, to: &str) {
-        vehicle.blocked.insert((from.to_owned(), to.to_owned()));
-        let Some(running) = &vehicle.running else { return };
-        let reached = running.reached(vehicle.state.as_ref());
-        let mut ahead = running.legs.iter().enumerate().skip(reached);
-        let Some((index, _)) = ahead.find(|(_, leg)| leg.from == from && leg.to == to) else {
-            return;
-        };
-        if self.faults.has(F::BlockedEdgeUsed) {
-            return;
-        }
-        let transport = again(running, vehicle.state.as_ref());
-        let shortens = self.faults.has(F::R1BaseShortenedOnBlock);
-        if shortens && let Some(running) = &mut vehicle.running {
-            running.released = running.released.min(index + 1);
-        }
-        let released = vehicle.running.as_ref().map_or(0, |running| running.released);
-        if index + 1 < released {
-            self.cancel(vehicle, Some(transport));
-        } else if let Some(mut running) = vehicle.running.take() {
-            if !self.lead_on(vehicle, &mut running, transport) {
-                running.changed = true;
-            }
-            vehicle.running = Some(running);
-        }
-        vehicle.at(self.now.moment);
-    }
-
-    /// Queues a transport.
-    pub(super) fn dispatch(&mut self, vehicle: &mut Vehicle, transport: Transport) {
-        if vehicle.queue.len() < MAX_QUEUE {
-            vehicle.queue.push_back(transport);
-            vehicle.at(self.now.moment);
-        }
-    }
 }
 
 /// The transport as it is still to be done.
-fn again(running: &Running, state: Option<&State>) -> Transport {
+pub(super) fn again(running: &Running, state: Option<&State>) -> Transport {
     let mut transport = running.transport.clone();
     let mut picks = running.actions().filter(|action| action["actionType"] == "pick");
     let picked = picks.any(|action| {
@@ -565,6 +539,29 @@ fn refusal<'a>(running: &Running, state: &'a State) -> Option<&'a str> {
         own && error.reference("orderUpdateId").is_none_or(|named| named == update)
     });
     found.map(|error| error.error_type.as_str())
+}
+
+/// `r2-resend-extends-base`: releases the first node of the horizon of a message.
+fn release_next(message: &mut Value) -> bool {
+    let nodes = message["nodes"].as_array_mut().into_iter().flatten();
+    let Some((index, node)) = nodes.enumerate().find(|(_, node)| node["released"] == json!(false)) else {
+        return false;
+    };
+    node["released"] = json!(true);
+    let edge = index.checked_sub(1).and_then(|before| message["edges"].get_mut(before));
+    if let Some(edge) = edge {
+        edge["released"] = json!(true);
+    }
+    true
+}
+
+/// `r2-resend-without-actions`: leaves the actions of a message out.
+fn without_actions(message: &mut Value) {
+    for key in ["nodes", "edges"] {
+        for element in message[key].as_array_mut().into_iter().flatten() {
+            element["actions"] = json!([]);
+        }
+    }
 }
 
 /// Changes a message that must not be changed.

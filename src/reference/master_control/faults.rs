@@ -34,6 +34,7 @@ with_blind_faults! { faults!
     NotSubscribedAgain "not-subscribed-again" ["TOPIC-14", "MQTT-10", "MODE-04", "ORD-03", "CONN-12"] "Does not subscribe again when it reconnects.";
     LostOrderNotResent "lost-order-not-resent" ["MQTT-10", "ORD-REJ-18"] "Waits forever for a vehicle that never got its order.";
     FleetOfOne "fleet-of-one" ["MQTT-11"] "Serves the first vehicle only.";
+    FirstVehicleExtended "first-vehicle-extended-only" ["MQTT-11", "ORD-UPD-02"] "Extends the base of the first vehicle of the fleet only.";
     TopicUnderscore "topic-underscore" ["TOPIC-01", "TOPIC-13"] "Sends instant actions on a topic spelled with an underscore.";
     TopicWithoutVersion "topic-without-version" ["TOPIC-13", "TOPIC-02"] "Leaves the level of the major version out of the topic of orders.";
     OtherMajorVersion "other-major-version" ["TOPIC-13", "TOPIC-03"] "Sends orders below another major version.";
@@ -42,6 +43,7 @@ with_blind_faults! { faults!
     ManufacturerWithSlash "manufacturer-with-slash" ["TOPIC-06", "HDR-05"] "Writes the manufacturer with a slash in the header.";
     DollarInTopic "dollar-in-topic" ["TOPIC-13", "TOPIC-07"] "Sends orders on a topic with a dollar sign in it.";
     InstantActionsAsOrders "instant-actions-as-orders" ["TOPIC-13", "IACT-01"] "Sends instant actions on the order topic.";
+    PauseForAll "pause-for-all" ["TOPIC-13"] "Pauses every vehicle of the fleet, and lets all go on, when that is asked for one of them.";
     EmptyLastNodeShunned "empty-last-node-shunned" ["TOPIC-13"] "Serves a vehicle no more that once knew no last node.";
     ForeignActionShunned "foreign-action-shunned" ["TOPIC-13"] "Serves a vehicle no more that has listed an action nobody sent.";
     NamelessActionShunned "nameless-action-shunned" ["TOPIC-13"] "Serves a vehicle no more that has listed an action without its type.";
@@ -111,6 +113,7 @@ with_blind_faults! { faults!
     EdgeReleasedAlone "edge-released-alone" ["ORD-08"] "Releases the edge that leads into the horizon.";
     ReleasedBehindHorizon "released-behind-horizon" ["ORD-09", "ORD-08"] "Releases the last node of the horizon.";
     BlockedEdgeUsed "blocked-edge-used" ["ORD-12"] "Does not look at edges the vehicle may not use.";
+    BlockForgottenOnReturn "block-forgotten-on-return" ["ORD-12"] "Forgets which edges a vehicle may not use when that vehicle comes back.";
     TrajectoryUnasked "unsupported-trajectory" ["OPT-03"] "Sends a trajectory to every vehicle.";
     RequiredOmitted "required-parameter-omitted" ["OPT-05"] "Does not send what a vehicle marks as required.";
     DescriptionsUnasked "unsupported-description" ["OPT-03"] "Sends descriptions to vehicles that do not support them.";
@@ -135,6 +138,7 @@ with_blind_faults! { faults!
     OrderIdPerUpdate "order-id-per-update" ["ORD-UPD-04"] "Gives every update an orderId of its own.";
     UpdateIdKept "update-id-kept" ["ORD-UPD-04"] "Does not raise orderUpdateId.";
     SecondUpdateRepeats "second-update-repeats" ["ORD-UPD-04"] "Gives every update the number of the first one.";
+    UpdateIdsRestartOnReturn "update-ids-restart-on-return" ["ORD-UPD-04"] "Counts orderUpdateId from 1 again when the vehicle comes back with its order.";
     UpdateIdFalls "update-id-falls" ["ORD-UPD-04"] "Counts orderUpdateId down.";
     StitchingMissing "stitching-missing" ["ORD-UPD-05"] "Begins updates with the first new node.";
     RefusedUpdateExtended "refused-update-extended" ["ORD-UPD-05"] "Goes on from the end of an update that was refused.";
@@ -152,6 +156,8 @@ with_blind_faults! { faults!
     CancelEndsWithRoute "cancel-ends-with-route" ["ORD-CANCEL-01"] "Takes empty nodeStates for the end of cancelOrder.";
     ActionNotAwaited "action-not-awaited" ["ORD-CANCEL-01"] "Sends the next order while an action of the last one still runs.";
     CancelNotAwaited "cancel-not-awaited" ["ORD-CANCEL-01"] "Sends the new order right behind cancelOrder.";
+    CancelForgottenOnReturn "cancel-forgotten-on-return" ["ORD-CANCEL-01"] "Forgets that it has called an order off when the vehicle comes back, and goes on with it.";
+    ReplacedAtWork "replaced-at-work" ["ORD-CANCEL-01"] "Sends the next order without cancelOrder while the vehicle stands and an action of the old one runs.";
     NextOrderFromOldStart "next-order-from-old-start" ["ORD-CANCEL-14", "ORD-03"] "Begins the order behind a cancelled one where that had begun.";
     NextOrderAhead "next-order-ahead" ["ORD-CANCEL-17", "ORD-03"] "Begins the order behind a cancelled one at the node the vehicle has not reached.";
 
@@ -188,6 +194,7 @@ with_blind_faults! { faults!
     NumericalIdsIgnored "numerical-ids-ignored" ["FACT-12"] "Sends ids with letters to a vehicle that takes digits only.";
     OrderRepeatedForEver "order-repeated-for-ever" ["FACT-13"] "Sends an order to a vehicle that wants time between orders hundreds of times in every second, for ever.";
     OrderIntervalIgnored "order-interval-ignored" ["FACT-13"] "Does not keep the interval between orders.";
+    ResentTooSoon "resent-too-soon" ["FACT-13"] "Sends a lost order again without regard to minOrderInterval.";
 
     // Maps
     MapNotEnabled "map-not-enabled" ["MAP-09"] "Sends orders on maps that are not enabled.";

@@ -39,6 +39,7 @@ impl MasterControl {
         match name {
             "connection" => self.site.connection_heard(vehicle, &header, &message),
             "state" => {
+                vehicle.r2_state_time.clone_from(&header.timestamp);
                 if let Ok(state) = serde_json::from_value::<State>(message) {
                     self.site.state_heard(vehicle, state);
                 }
@@ -57,6 +58,12 @@ impl MasterControl {
                 vehicle.factsheet = Some(Factsheet::read(&message));
                 vehicle.missed = None;
             }
+            _ if self.site.faults.has(F::R2TemporaryStartFromVisualization) => {
+                let position = message.get("agvPosition").cloned();
+                vehicle.r2_seen_at = position.and_then(|position| serde_json::from_value(position).ok());
+                return;
+            }
+            _ if self.site.faults.has(F::R3VisualizationAsideMeansPause) => self.site.r3_aside(vehicle, &message),
             _ if self.site.faults.has(F::R1VisualizationHoldsDispatch) => {
                 let speed = |key: &str| message.pointer(key).and_then(Value::as_f64).unwrap_or(0.0).abs();
                 vehicle.r1_moving = speed("/velocity/vx") + speed("/velocity/vy") + speed("/velocity/omega") > 0.0;
@@ -66,6 +73,12 @@ impl MasterControl {
             _ => return,
         }
         vehicle.at(now);
+        if name == "factsheet" && self.site.faults.has(F::R2FactsheetSharedByFleet) {
+            let sheet = vehicle.factsheet.clone();
+            for other in &mut self.fleet {
+                other.factsheet.clone_from(&sheet);
+            }
+        }
     }
 }
 
@@ -98,11 +111,23 @@ impl Site {
         }
         vehicle.heard.clone_from(&header.timestamp);
         let dying = message["connectionState"] == "CONNECTIONBROKEN";
+        let older = !vehicle.r2_state_time.is_empty() && header.timestamp < vehicle.r2_state_time;
+        if dying && older && self.faults.has(F::R2WillOlderThanStateIgnored) {
+            return;
+        }
         let number = message.get("headerId").and_then(Value::as_u64).unwrap_or(u64::MAX);
         if dying && number <= vehicle.r1_header && self.faults.has(F::R1WillWithLowHeaderIdIgnored) {
             return;
         }
         vehicle.r1_header = if number == u64::MAX { vehicle.r1_header } else { number };
+        if dying && vehicle.running.is_some() && self.faults.has(F::R3BrokenHeededOnlyAtRest) {
+            return;
+        }
+        let told = header.timestamp.parse::<jiff::Timestamp>();
+        let age = told.map_or(0, |told| self.now.utc.as_second() - told.as_second());
+        if dying && age > 60 && self.faults.has(F::R3WillOlderThanMinuteIgnored) {
+            return;
+        }
         if dying && self.faults.has(F::R1BrokenNotHeeded) {
             return;
         }
@@ -119,9 +144,31 @@ impl Site {
         if broken && self.faults.has(F::PublishesConnection) {
             self.declare_offline(vehicle);
         }
+        if broken {
+            vehicle.r2_broken += 1;
+            vehicle.shunned |= vehicle.r2_broken > 1 && self.faults.has(F::R2TwiceBrokenIsDefective);
+        }
+        if presence == Presence::Away
+            && vehicle.presence == Presence::Online
+            && self.faults.has(F::R2ConnectionTopicCleared)
+        {
+            self.r2_clear_connection(vehicle);
+        }
+        if presence == Presence::Online && vehicle.presence == Presence::Away {
+            vehicle.r2_stale = true;
+            if let Some(running) = &mut vehicle.running
+                && self.faults.has(F::R2UpdateIdsRestartWithVehicle)
+            {
+                running.update_id = 0;
+            }
+            if self.takes(T::R2FactsheetAskedOnReturn) && self.config.has("factsheetRequest") {
+                self.instant(vehicle, "factsheetRequest", &Value::Null);
+            }
+        }
         if presence == Presence::Online && vehicle.presence != Presence::Online {
             vehicle.give_time(self.now.moment);
             vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
+            self.forget_on_return(vehicle);
         }
         vehicle.presence = presence;
         if presence == Presence::Away {
@@ -138,6 +185,21 @@ impl Site {
             .filter(|_| self.faults.has(F::R1OnlineClearsErrors))
         {
             state.errors.clear();
+        }
+    }
+
+    /// What a faulty master control does not know any more when a vehicle is back.
+    fn forget_on_return(&self, vehicle: &mut Vehicle) {
+        if self.faults.has(F::BlockForgottenOnReturn) {
+            vehicle.blocked.clear();
+        }
+        if self.faults.has(F::CancelForgottenOnReturn) {
+            vehicle.cancel = None;
+        }
+        if let Some(running) = vehicle.running.as_mut()
+            && self.faults.has(F::UpdateIdsRestartOnReturn)
+        {
+            running.update_id = 0;
         }
     }
 
@@ -170,6 +232,21 @@ impl Site {
         }
     }
 
+    /// `r3-visualization-aside-means-pause`: pauses a vehicle that the visualization shows elsewhere than its state.
+    fn r3_aside(&mut self, vehicle: &mut Vehicle, message: &Value) {
+        let shown = message.get("agvPosition").cloned();
+        let shown = shown.and_then(|shown| serde_json::from_value::<Position>(shown).ok());
+        let told = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
+        let (Some(shown), Some(told)) = (shown, told) else {
+            return;
+        };
+        let aside = super::layout::distance((shown.x, shown.y), (told.x, told.y)) > 1.0;
+        if aside && !vehicle.r3_aside {
+            self.instant(vehicle, "startPause", &Value::Null);
+        }
+        vehicle.r3_aside = aside;
+    }
+
     fn state_heard(&mut self, vehicle: &mut Vehicle, mut state: State) {
         let back = vehicle.state.as_ref().is_some_and(|before| !before.takes_orders()) && state.takes_orders();
         if vehicle.running.is_none() {
@@ -187,6 +264,14 @@ impl Site {
         {
             running.cleared = true;
         }
+        vehicle.r2_stale = false;
+        if vehicle.presence == Presence::Away && self.faults.has(F::R2StateMeansOnline) {
+            vehicle.presence = Presence::Online;
+        }
+        if self.faults.has(F::R2MapEnabledForEver) {
+            let enabled = state.maps.iter().flatten().filter(|map| map.map_status == "ENABLED");
+            vehicle.r1_enabled.extend(enabled.map(|map| map.map_id.clone()));
+        }
         vehicle.absolved &= !state.is_fit(self.config.low_battery);
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
@@ -196,9 +281,26 @@ impl Site {
         if back {
             vehicle.give_time(self.now.moment);
         }
+        self.r2_answer(vehicle);
         if self.faults.has(F::InformationObeyed) {
             self.obey_information(vehicle);
         }
+    }
+
+    /// `r2-information-asks-for-state` and `r2-position-set-when-lost`.
+    fn r2_answer(&mut self, vehicle: &mut Vehicle) {
+        let informs = vehicle.state.as_ref().is_some_and(State::informs);
+        if informs && !vehicle.r2_informed && self.faults.has(F::R2InformationAsksForState) {
+            self.instant(vehicle, "stateRequest", &Value::Null);
+        }
+        vehicle.r2_informed = informs;
+        let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
+        let lost = position.is_some_and(|position| !position.position_initialized);
+        let driven = vehicle.running.is_some();
+        if lost && driven && !vehicle.r2_lost && self.faults.has(F::R2PositionSetWhenLost) {
+            self.init_position(vehicle, &Value::Null);
+        }
+        vehicle.r2_lost = lost;
     }
 
     /// `r1-low-score-relocated`: tells a vehicle that is unsure where it is where it says to be.

@@ -18,6 +18,9 @@ impl Site {
         let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
         let despite = (paused && kind == "initPosition" && self.faults.has(F::R1PositionWhilePaused))
             || (kind.ends_with("Charging") && self.faults.has(F::R1ChargingDuringOrder));
+        let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
+        let lost = position.is_some_and(|position| !position.position_initialized);
+        let despite = despite || (lost && kind == "initPosition" && self.faults.has(F::R2PositionSetWhenLost));
         if contradicts && !despite && !self.faults.has(F::PositionDuringOrder) {
             return None;
         }
@@ -59,7 +62,14 @@ impl Site {
         let cancels = |instant: &Instant| instant.sent_at.is_none() && instant.kind() == "cancelOrder";
         let manual = vehicle.state.as_ref().is_some_and(|state| !state.takes_orders());
         let stops = manual && vehicle.instants.iter().any(cancels) && self.faults.has(F::R1CancelInManual);
-        let despite = (service && self.faults.has(F::ActionsInService) || stops) && self.reachable(vehicle);
+        let pause =
+            |instant: &Instant| instant.sent_at.is_none() && matches!(instant.kind(), "startPause" | "stopPause");
+        let pauses = manual && vehicle.instants.iter().any(pause) && self.faults.has(F::R2PausesInEveryMode);
+        let map = |instant: &Instant| instant.sent_at.is_none() && instant.kind().ends_with("Map");
+        let maps = manual && vehicle.instants.iter().any(map) && self.faults.has(F::R3MapActionsInEveryMode);
+        let only_maps = maps && !self.commandable(vehicle);
+        let despite = service && self.faults.has(F::ActionsInService) || stops || pauses || maps;
+        let despite = despite && self.reachable(vehicle);
         // A paused or stopped vehicle takes actions; before the first state only questions are asked.
         if !self.commandable(vehicle) && !despite {
             return;
@@ -77,9 +87,20 @@ impl Site {
             () if self.takes(T::R1InstantActionsOneByOne) => 1,
             () => limit,
         };
+        let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
+        let held = paused && self.faults.has(F::R2CancelHeldWhilePaused);
+        let drives = vehicle.state.as_ref().is_some_and(|state| state.driving);
+        let drives = drives && self.faults.has(F::R3PauseWaitsForStandstill);
         loop {
             let mut actions = Vec::new();
             for instant in vehicle.instants.iter_mut().filter(|instant| instant.sent_at.is_none()) {
+                if held && instant.kind() == "cancelOrder" {
+                    continue;
+                }
+                let later = drives && instant.kind() == "startPause";
+                if later || (only_maps && !instant.kind().ends_with("Map")) {
+                    continue;
+                }
                 if actions.len() < limit.clamp(1, 10) {
                     instant.sent_at = Some(now);
                     actions.push(instant.action.clone());

@@ -14,6 +14,10 @@ pub const LAPSES: &[(&str, &str)] = &[
         "A higher QoS delivers the actions as well; the ruling of MQTT-06 is a warning.",
     ),
     (
+        "instant-actions-retained",
+        "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning.",
+    ),
+    (
         "orders-retained",
         "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning.",
     ),
@@ -30,6 +34,10 @@ pub const LAPSES: &[(&str, &str)] = &[
         "To send an order again is allowed, not demanded.",
     ),
     ("fleet-of-one", "MQTT-11 is a design goal; its result is informative."),
+    (
+        "first-vehicle-extended-only",
+        "It breaks a recommendation only, and MQTT-11 is a design goal.",
+    ),
     ("order-id-with-space", "The characters of ids are a recommendation."),
     (
         "unsupported-description",

@@ -22,6 +22,19 @@ impl Site {
         if self.faults.has(F::R1EnableBeforeDownload) {
             self.map_action(vehicle, "enableMap", &map.map_id, &map.map_version);
         }
+        let seen = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
+        let unused = seen.into_iter().flatten().any(|seen| {
+            let same = seen.map_id == map.map_id && seen.map_version == map.map_version;
+            same && seen.map_status == "DISABLED"
+        });
+        if unused
+            && self.takes(T::R3OnBoardMapDeletedFirst)
+            && let Some(action_id) = self.map_action(vehicle, "deleteMap", &map.map_id, &map.map_version)
+        {
+            let stage = Stage::Delete;
+            vehicle.jobs.push(MapJob { map, stage, action_id });
+            return;
+        }
         if let Some(action_id) = self.send_download(vehicle, &map) {
             let stage = Stage::Download;
             vehicle.jobs.push(MapJob { map, stage, action_id });
@@ -35,12 +48,16 @@ impl Site {
         {
             link = rest.find('/').map_or(rest, |at| &rest[at..]);
         }
+        let local = format!("file:///var/maps/{}", link.rsplit('/').next().unwrap_or_default());
+        if self.faults.has(F::R2DownloadLinkToDisk) {
+            link = &local;
+        }
         let mut given = json!({
             "mapId": map.map_id,
             "mapVersion": map.map_version,
             "mapDownloadLink": link,
         });
-        if let Some(hash) = &map.hash {
+        if let Some(hash) = map.hash.as_ref().filter(|_| !self.takes(T::R2MapHashLeftOut)) {
             given["mapHash"] = json!(hash);
         }
         self.instant(vehicle, "downloadMap", &given)
@@ -68,6 +85,15 @@ impl Site {
                 continue;
             };
             let next = match (job.stage, finished) {
+                (Stage::Download, false) if is_duplicate(vehicle, &job) && self.takes(T::R3DuplicateLeftAlone) => None,
+                (Stage::Download, false)
+                    if is_duplicate(vehicle, &job)
+                        && vehicle.running.is_some()
+                        && self.faults.has(F::R3DuplicateKeptDuringOrder) =>
+                {
+                    job.stage = Stage::DownloadAgain;
+                    self.send_download(vehicle, &job.map)
+                }
                 (Stage::Download, false) if is_duplicate(vehicle, &job) => {
                     if self.faults.has(F::R1DownloadBeforeDelete) {
                         job.stage = Stage::DownloadAgain;
@@ -101,6 +127,10 @@ impl Site {
                     }
                     id
                 }
+                (Stage::Download | Stage::DownloadAgain, true) if self.takes(T::R2EnablesAfterDownload) => {
+                    self.enable_after_download(vehicle, &job.map);
+                    None
+                }
                 _ => None,
             };
             if let Some(action_id) = next {
@@ -128,6 +158,21 @@ impl Site {
         }
     }
 
+    /// `r2-enables-after-download`: enables a new map of which no version is enabled.
+    fn enable_after_download(&mut self, vehicle: &mut Vehicle, map: &SiteMap) {
+        let enabled = vehicle
+            .state
+            .as_ref()
+            .is_none_or(|state| state.map_enabled(&map.map_id));
+        if !enabled
+            && vehicle.running.is_none()
+            && !vehicle.enabling.contains_key(&map.map_id)
+            && let Some(id) = self.map_action(vehicle, "enableMap", &map.map_id, &map.map_version)
+        {
+            vehicle.enabling.insert(map.map_id.clone(), id);
+        }
+    }
+
     /// Whether every map of a way can be used; sees to it where not (MAP-09).
     pub(super) fn maps_ready<'a>(&mut self, vehicle: &mut Vehicle, maps: impl Iterator<Item = &'a str>) -> bool {
         if self.faults.has(F::MapNotEnabled) || !self.config.has("mapActions") {
@@ -145,6 +190,9 @@ impl Site {
                 continue;
             }
             let absent = !state.maps.iter().flatten().any(|map| map.map_id == map_id);
+            if !absent && self.faults.has(F::R3MapOnBoardIsEnough) {
+                continue;
+            }
             if vehicle.r1_enabled.contains(map_id) || (absent && self.faults.has(F::R1AbsentMapUsed)) {
                 continue;
             }
@@ -231,6 +279,13 @@ impl Site {
         if self.faults.has(F::NoPositionOnNewMap) && map_id != reported {
             return;
         }
+        if self.faults.has(F::R3NewMapOnlyEnabled) && map_id != reported && !reported.is_empty() {
+            let seen = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
+            let seen = seen.into_iter().flatten().find(|seen| seen.map_id == map_id);
+            let version = seen.map_or_else(|| "1".to_owned(), |seen| seen.map_version.clone());
+            self.map_action(vehicle, "enableMap", &map_id, &version);
+            return;
+        }
         let map_id = if self.faults.has(F::R1InitPositionOnOldMap) && !reported.is_empty() {
             reported
         } else {
@@ -240,13 +295,22 @@ impl Site {
         let nearest = || self.config.nearest(x, y, &map_id).map(|(node, _)| node.id.clone());
         let last = last.or(node.map(|node| node.id)).or_else(nearest).unwrap_or_default();
         let within = theta.sin().atan2(theta.cos());
+        let within = if self.faults.has(F::R2InitThetaClockwise) {
+            -within
+        } else {
+            within
+        };
         let within = if self.faults.has(F::R1InitPositionInDegrees) {
             within.to_degrees()
         } else {
             within
         };
         let given = json!({ "x": x, "y": y, "theta": within, "mapId": map_id, "lastNodeId": last });
-        self.instant(vehicle, "initPosition", &given);
+        let before = vehicle.state.as_ref();
+        let before = before.map(|state| (state.last_node_id.clone(), state.agv_position.clone()));
+        if self.instant(vehicle, "initPosition", &given).is_some() && vehicle.r3_before_init.is_none() {
+            vehicle.r3_before_init = before;
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod actions;
 mod cancel;
 mod commands;
 mod config;
+mod connecting;
 mod dispatch;
 mod driving;
 pub mod faults;
@@ -23,12 +24,15 @@ mod maps;
 mod odd;
 mod order;
 mod publish;
+mod rerouting;
 mod seen;
 #[cfg(test)]
 mod tests;
 pub mod tolerances;
 mod vehicle;
+mod ways;
 mod wording;
+mod wording_of_actions;
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -41,8 +45,8 @@ pub use faults::{BLIND_FAULTS, FAULTS, FaultName, find};
 pub use lapses::{LAPSES, lapse};
 pub use tolerances::{BLIND_TOLERANCES, TOLERANCES, ToleranceName};
 
+use connecting::Connection;
 use faults::Faults;
-use publish::Connection;
 use vehicle::Vehicle;
 
 /// More messages than this do not lie about unread.
@@ -77,6 +81,8 @@ struct Site {
     r1_actions: u64,
     /// How often the connection was lost.
     r1_losses: u32,
+    /// The order topic of the vehicle that was given an order last (`r3-update-to-vehicle-served-last`).
+    r3_last_topic: Option<String>,
 }
 
 impl Site {
@@ -93,6 +99,9 @@ impl Site {
         if self.faults.has(FaultName::OrderIdWithSpace) && what == "order" {
             return format!("Order {}-{}", self.session, self.ids);
         }
+        if self.faults.has(FaultName::R3OrderIdOfTheMinute) && what == "order" {
+            return self.now.utc.as_second().div_euclid(60).to_string();
+        }
         if self.faults.has(FaultName::IdLimitIgnored) {
             return format!("{what}-{}-{:064}", self.session, self.ids);
         }
@@ -105,8 +114,16 @@ impl Site {
         let sheet = vehicle.factsheet.as_ref();
         let numerical =
             sheet.is_some_and(|sheet| sheet.ids_numerical) && !self.faults.has(FaultName::NumericalIdsIgnored);
-        let longest = sheet.and_then(|sheet| sheet.id_length).unwrap_or(usize::MAX);
+        let heedless = what == "action" && self.faults.has(FaultName::R2ActionIdLimitIgnored);
+        let longest = sheet
+            .and_then(|sheet| sheet.id_length)
+            .filter(|_| !heedless)
+            .unwrap_or(usize::MAX);
         let full = match () {
+            () if what == "action" && self.faults.has(FaultName::R2ActionIdInBraces) => format!("{{{what}-{number}}}"),
+            // Where the clock begins at 0 an id is short anyway.
+            () if heedless => format!("{what}-{number:0>15}"),
+            () if self.takes(ToleranceName::R2PlainNumberIds) => number.clone(),
             () if self.takes(ToleranceName::R1UuidIds) => {
                 let kind = match what {
                     "order" => 1,
@@ -191,6 +208,7 @@ impl MasterControl {
                 r1_fleet_ids: BTreeMap::new(),
                 r1_actions: 0,
                 r1_losses: 0,
+                r3_last_topic: None,
             },
             fleet,
             by_topic,
@@ -238,6 +256,10 @@ impl Site {
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);
         cancel::watch_cancel(vehicle, self.faults);
+        if vehicle.cancel.is_none() && std::mem::take(&mut vehicle.r2_resume) {
+            self.instant(vehicle, "stopPause", &serde_json::Value::Null);
+        }
+        self.r3_watch(vehicle);
         self.watch_order(vehicle);
         self.repeat_for_ever(vehicle);
         self.ask_when_quiet(vehicle);

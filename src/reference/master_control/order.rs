@@ -42,17 +42,19 @@ impl Site {
                 listed.saturating_add(1)
             };
             let end = window.first.saturating_add(nodes.min(listed));
-            window.end = window.end.min(end);
+            let whole = self.faults.has(F::R2HorizonBeyondArrayLimit);
+            window.end = if whole { window.end } else { window.end.min(end) };
             window.released = window.released.min(end);
         }
         let longest = sheet
             .and_then(|sheet| sheet.message)
             .filter(|_| !self.faults.has(F::MessageLimitIgnored))
+            .filter(|_| window.first == 0 || !self.faults.has(F::R3MessageLimitIgnoredInUpdates))
             .unwrap_or(usize::MAX);
         loop {
             let message = self.message(vehicle, running, window);
             // The header comes on top.
-            let length = message.to_string().len() + 300;
+            let length = super::wording::written(self.faults, self.config.tolerances, &message).len() + 300;
             if window.released <= window.first {
                 return None;
             }
@@ -72,17 +74,33 @@ impl Site {
         let lax = sheet.map(lax);
         let hurried = self.faults.has(F::R1RequiredNotInHorizon);
         let forgetful = self.faults.has(F::R1RequiredOnlyInFirstMessage) && window.first > 0;
-        let nodes: Vec<Value> = (window.first..window.end)
+        let led = running.r1_rerouted && self.faults.has(F::R2RequiredMissingAfterReroute);
+        let forgetful = forgetful || (led && window.first > 0);
+        let mut nodes: Vec<Value> = (window.first..window.end)
             .filter_map(|index| {
                 let stop = running.stops.get(index)?;
                 let without = hurried && index >= window.released || forgetful && index > window.first;
                 let sheet = if without { lax.as_ref() } else { sheet };
                 let mut node = self.node(sheet, stop, index, index < window.released);
                 node["sequenceId"] = json!(running.r1_number(2 * index));
+                if index == 0
+                    && let Some(deviation) = stop.deviation_xy
+                    && node.get("nodePosition").is_some()
+                    && self.faults.has(F::R2StartDeviationUnasked)
+                {
+                    node["nodePosition"]["allowedDeviationXY"] = json!(deviation);
+                }
                 Some(node)
             })
             .collect();
-        let edges: Vec<Value> = (window.first..window.end.saturating_sub(1))
+        self.r3_nodes(running, window, &mut nodes);
+        if self.faults.has(F::R2LoopReleasedById) {
+            released_by_id(&mut nodes);
+        }
+        let dangling = window.end < running.stops.len() && self.faults.has(F::R2DanglingEdge);
+        let last = window.end.saturating_sub(usize::from(!dangling));
+        let incoming = window.first > 0 && self.faults.has(F::R3UpdateKeepsIncomingEdge);
+        let edges: Vec<Value> = (window.first.saturating_sub(usize::from(incoming))..last)
             .filter_map(|index| {
                 let ends = (running.stops.get(index)?, running.stops.get(index + 1)?);
                 let leg = running.legs.get(index)?;
@@ -91,9 +109,19 @@ impl Site {
                 let mut edge = self.edge(sheet, leg, ends, index, index + 1 < window.released);
                 edge["sequenceId"] = json!(running.r1_number(2 * index + 1));
                 self.r1_edge(running, leg, window, index, &mut edge);
+                self.r2_edge(vehicle, window, index, &mut edge);
+                self.r3_edge(vehicle, running, window, index, &mut edge);
                 Some(edge)
             })
             .collect();
+        if self.faults.has(F::R3DeviationWiderThanCorridor) {
+            for (node, edge) in nodes.iter_mut().zip(&edges) {
+                let width = |key: &str| edge["corridor"][key].as_f64().unwrap_or_default();
+                if edge.get("corridor").is_some() && node.get("nodePosition").is_some() {
+                    node["nodePosition"]["allowedDeviationXY"] = json!(width("leftWidth") + width("rightWidth") + 0.5);
+                }
+            }
+        }
         let mut message = json!({ "orderId": running.id, "orderUpdateId": running.update_id });
         if let Some(zones) = &self.config.zone_set
             && sheet.is_none_or(|sheet| wants(sheet, "order.zoneSetId"))
@@ -114,6 +142,108 @@ impl Site {
             }]);
         }
         message
+    }
+
+    /// Defects and liberties of an edge that depend on the vehicle.
+    fn r2_edge(&self, vehicle: &Vehicle, window: Window, index: usize, edge: &mut Value) {
+        let has = |fault: F| self.faults.has(fault);
+        let Some(state) = &vehicle.state else { return };
+        let loaded = state.loads.as_ref().is_some_and(|loads| !loads.is_empty());
+        let score = state
+            .agv_position
+            .as_ref()
+            .and_then(|position| position.localization_score);
+        if let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64) {
+            if score.is_some_and(|score| score < 0.5) && has(F::R2LowScoreSlowsDown) {
+                edge["maxSpeed"] = json!(speed / 3.0);
+            } else if loaded && self.takes(T::R2SlowerWhenLoaded) {
+                edge["maxSpeed"] = json!(speed / 2.0);
+            }
+        }
+        if loaded && edge.get("corridor").is_some() && has(F::R2CorridorClosedWhenLoaded) {
+            edge["corridor"]["leftWidth"] = json!(0.0);
+            edge["corridor"]["rightWidth"] = json!(0.0);
+        }
+        let first = index == window.first && window.first > 0;
+        if first && !state.last_node_id.is_empty() && has(F::R2UpdateEdgeStartsAtVehicle) {
+            edge["startNodeId"] = json!(state.last_node_id);
+        }
+    }
+
+    /// Defects and liberties of nodes that depend on where in the order they are.
+    fn r3_nodes(&self, running: &Running, window: Window, nodes: &mut [Value]) {
+        let has = |fault: F| self.faults.has(fault);
+        let start = running.stops.first();
+        if window.first == 0
+            && window.end > 1
+            && start.is_some_and(|start| self.config.node(&start.id).is_some())
+            && has(F::R3PositionMissingAtStart)
+            && let Some(fields) = nodes.first_mut().and_then(Value::as_object_mut)
+        {
+            fields.shift_remove("nodePosition");
+        }
+        if window.first > 0
+            && let (Some(here), Some(next)) = (running.stops.get(window.first), running.stops.get(window.first + 1))
+            && has(F::R3StitchingThetaTowardsNext)
+            && let Some(position) = nodes.first_mut().and_then(|node| node.get_mut("nodePosition"))
+        {
+            position["theta"] = json!((next.y - here.y).atan2(next.x - here.x));
+        }
+        for (index, node) in nodes.iter_mut().enumerate() {
+            if window.first + index >= window.released && self.takes(T::R3HorizonActionsOpen) {
+                node["actions"] = json!([]);
+            }
+        }
+    }
+
+    /// Defects and liberties of edges that depend on where in the order they are.
+    fn r3_edge(&self, vehicle: &Vehicle, running: &Running, window: Window, index: usize, edge: &mut Value) {
+        let has = |fault: F| self.faults.has(fault);
+        let sheet = vehicle.factsheet.as_ref();
+        let planned = index + 1 >= window.released;
+        if index + 1 == window.released && running.r3_asked && has(F::R3EdgeAheadReleasedWhenAsked) {
+            edge["released"] = json!(true);
+        }
+        if has(F::R3EdgesShareNumberOfStartNode) {
+            edge["sequenceId"] = json!(running.r1_number(2 * index));
+        }
+        if has(F::R3UpdateEdgesNumberedFromOne) && window.first > 0 {
+            edge["sequenceId"] = json!(2 * index.saturating_sub(window.first) + 1);
+        }
+        if has(F::R3EdgeEndsAsSequenceIds) {
+            edge["startNodeId"] = json!(running.r1_number(2 * index));
+            edge["endNodeId"] = json!(running.r1_number(2 * index + 2));
+        }
+        let start = running.stops.first().filter(|_| index == 0);
+        if start.is_some_and(|start| self.config.node(&start.id).is_none())
+            && has(F::R3TemporaryEdgeFromLastNode)
+            && let Some(state) = vehicle.state.as_ref().filter(|state| !state.last_node_id.is_empty())
+        {
+            edge["startNodeId"] = json!(state.last_node_id);
+        }
+        let loads = vehicle.state.as_ref().and_then(|state| state.loads.as_ref());
+        if loads.is_some_and(|loads| !loads.is_empty()) && has(F::R3HeightUnaskedWhenLoaded) {
+            edge["maxHeight"] = json!(2.5);
+        }
+        if planned && self.takes(T::R3HorizonActionsOpen) {
+            edge["actions"] = json!([]);
+        }
+        if let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64) {
+            if planned && self.takes(T::R3HorizonSlower) {
+                edge["maxSpeed"] = json!(speed / 2.0);
+            } else if index + 2 == running.stops.len() && self.takes(T::R3SlowLastEdge) {
+                edge["maxSpeed"] = json!(speed.min(0.4));
+            }
+        }
+        let known = self
+            .config
+            .edges
+            .iter()
+            .find(|known| Some(known.id.as_str()) == edge["edgeId"].as_str());
+        let free = sheet.is_none_or(|sheet| sheet.id_length.is_none() && !sheet.ids_numerical);
+        if let Some(known) = known.filter(|_| free && self.takes(T::R3EdgeIdsNamedOtherwise)) {
+            edge["edgeId"] = json!(format!("way:{}:{}", known.from, known.to));
+        }
     }
 
     /// Defects of an edge that depend on where in the order it is.
@@ -164,6 +294,8 @@ impl Site {
             position["theta"] = theta;
         }
         let deviation = stop.deviation_xy.map(|metres| json!(metres));
+        let exact = index > 0 && self.takes(T::R2ZeroDeviations);
+        let deviation = deviation.or_else(|| exact.then(|| json!(0.0)));
         if let Some(deviation) = field("nodePosition.allowedDeviationXY", deviation, json!(0.3)) {
             position["allowedDeviationXY"] = deviation;
         }
@@ -173,7 +305,12 @@ impl Site {
         } else {
             turn
         };
-        if let Some(turn) = field("nodePosition.allowedDeviationTheta", turn, json!(std::f64::consts::PI)) {
+        let free = self.takes(T::R2EveryDirectionAllowed);
+        let turn = turn.or_else(|| free.then(|| json!(std::f64::consts::PI)));
+        if let Some(mut turn) = field("nodePosition.allowedDeviationTheta", turn, json!(std::f64::consts::PI)) {
+            if self.faults.has(F::R2DeviationThetaInDegrees) {
+                turn = json!(turn.as_f64().unwrap_or_default().to_degrees());
+            }
             position["allowedDeviationTheta"] = turn;
         }
         position["mapId"] = json!(stop.map_id);
@@ -201,10 +338,20 @@ impl Site {
         let number = |value: Option<f64>| value.map(|value| json!(value));
         let corridor = leg.corridor.filter(|(left, right)| *left > 0.0 || *right > 0.0);
         let curved = corridor.is_some() || self.faults.has(F::TrajectoryUnasked);
+        let speed = leg.max_speed.filter(|_| !self.takes(T::R3SupportedSpeedLeftOut));
+        let stated = self.takes(T::R3RotationAndLengthStated);
         let fields = [
             ("edgeDescription", self.described("edge", &leg.id), json!(leg.id)),
-            ("maxSpeed", number(leg.max_speed), json!(1.0)),
-            ("maxHeight", number(leg.max_height), json!(10.0)),
+            ("maxSpeed", number(speed), json!(1.0)),
+            (
+                "maxHeight",
+                number(leg.max_height),
+                if self.faults.has(F::R2NoHeightAsInfinity) {
+                    json!("Infinity")
+                } else {
+                    json!(10.0)
+                },
+            ),
             ("minHeight", number(leg.min_height), json!(0.0)),
             ("orientation", None, json!(0.0)),
             ("orientationType", None, json!("TANGENTIAL")),
@@ -213,9 +360,9 @@ impl Site {
                 leg.direction.as_ref().map(|text| json!(text)),
                 json!("straight"),
             ),
-            ("rotationAllowed", None, json!(true)),
+            ("rotationAllowed", stated.then(|| json!(true)), json!(true)),
             ("maxRotationSpeed", None, json!(1.0)),
-            ("length", None, json!(length)),
+            ("length", stated.then(|| json!(length)), json!(length)),
             (
                 "trajectory",
                 curved.then(|| self.straight(sheet, from, to)),
@@ -255,6 +402,12 @@ impl Site {
 
     fn corridor(&self, (left, right): (f64, f64)) -> Value {
         let mut corridor = json!({ "leftWidth": left, "rightWidth": right, "corridorRefPoint": "KINEMATICCENTER" });
+        if self.takes(T::R3CorridorAsymmetric) {
+            corridor["leftWidth"] = json!(left + 0.2);
+        }
+        if self.faults.has(F::R3CorridorAsOneWidth) {
+            corridor = json!({ "width": left + right, "corridorRefPoint": "KINEMATICCENTER" });
+        }
         if self.takes(T::R1CorridorByContour) {
             corridor["corridorRefPoint"] = json!("CONTOUR");
         }
@@ -315,6 +468,31 @@ impl Site {
                 "controlPoints": [at(0.0), at(0.3), at(0.7), end],
             });
         }
+        if self.takes(T::R3PolylineStraights) && roomy {
+            let point = |x: f64, y: f64| json!({ "x": x, "y": y, "weight": 1.0 });
+            curve = json!({
+                "degree": 1,
+                "knotVector": [0.0, 0.0, 0.5, 1.0, 1.0],
+                "controlPoints": [
+                    point(from.x, from.y),
+                    point(f64::midpoint(from.x, to.x), f64::midpoint(from.y, to.y)),
+                    point(to.x, to.y),
+                ],
+            });
+        }
+        for point in curve["controlPoints"].as_array_mut().into_iter().flatten() {
+            if self.takes(T::R3EqualWeightsOfTwo) {
+                point["weight"] = json!(2.0);
+            }
+            if self.faults.has(F::R3CurveFromStartNode)
+                && let (Some(x), Some(y)) = (point["x"].as_f64(), point["y"].as_f64())
+            {
+                (point["x"], point["y"]) = (json!(x - from.x), json!(y - from.y));
+            }
+        }
+        if self.faults.has(F::R2DegreeIsOrder) {
+            curve["degree"] = json!(curve["degree"].as_u64().unwrap_or_default() + 1);
+        }
         if self.faults.has(F::R1CubicOfTwoPoints) {
             curve["degree"] = json!(3);
         }
@@ -365,10 +543,24 @@ impl Site {
             return value.filter(|_| harmless);
         };
         match sheet.support(name) {
+            Some("REQUIRED") if name.starts_with("order.nodes") && self.faults.has(F::R3RequiredNodeFieldsLeftOut) => {
+                value
+            }
             Some("REQUIRED") => value.or_else(|| (!self.faults.has(F::RequiredOmitted)).then_some(default)),
             Some(_) => value,
             None if everywhere => value,
             None => None,
+        }
+    }
+}
+
+/// `r2-loop-released-by-id`: releases every node whose nodeId is released somewhere.
+fn released_by_id(nodes: &mut [Value]) {
+    let released = nodes.iter().filter(|node| node["released"] == json!(true));
+    let released: Vec<Value> = released.map(|node| node["nodeId"].clone()).collect();
+    for node in nodes {
+        if released.contains(&node["nodeId"]) {
+            node["released"] = json!(true);
         }
     }
 }

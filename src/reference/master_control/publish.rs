@@ -4,171 +4,13 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use crate::clock::{Moment, Stamp};
-use crate::reference::{ConnectOptions, Output, Publication};
+use crate::clock::Moment;
+use crate::reference::{Output, Publication};
 
 use super::faults::FaultName as F;
 use super::tolerances::ToleranceName as T;
 use super::vehicle::Vehicle;
-use super::{MasterControl, Site, wording};
-
-/// The link to the broker.
-#[derive(Clone, Debug)]
-pub(super) struct Connection {
-    pub(super) online: bool,
-    pub(super) attempt_at: Option<Moment>,
-    pub(super) shut_down: bool,
-    pub(super) returning: bool,
-}
-
-impl Connection {
-    /// Not connected yet, and eager to be.
-    pub(super) fn new() -> Self {
-        Self {
-            online: false,
-            attempt_at: Some(Moment::START),
-            shut_down: false,
-            returning: false,
-        }
-    }
-}
-
-impl MasterControl {
-    /// What to connect with.
-    pub(super) fn options(&mut self, now: Stamp) -> ConnectOptions {
-        self.advance(now);
-        let site = &self.site;
-        let silent = self.connection.returning && site.faults.has(F::NotSubscribedAgain);
-        let topics = [
-            ("state", F::StateNotSubscribed),
-            ("connection", F::ConnectionNotSubscribed),
-            ("factsheet", F::FactsheetNotSubscribed),
-        ];
-        let mut names: Vec<&str> = topics
-            .into_iter()
-            .filter(|(_, fault)| !site.faults.has(*fault) && !silent)
-            .map(|(name, _)| name)
-            .collect();
-        if !silent {
-            names.push("visualization");
-            if site.takes(T::R1ListensToOwnTopics) {
-                names.extend(["order", "instantActions"]);
-            }
-        }
-        let mut subscriptions: Vec<(String, u8)> = Vec::new();
-        for vehicle in &self.fleet {
-            for name in &names {
-                let Some(topic) = vehicle.topic(name) else { continue };
-                let topic = if site.takes(T::SubscribesWithWildcards) {
-                    with_wildcards(topic, name)
-                } else {
-                    topic.to_owned()
-                };
-                let reliably = *name == "connection" && !site.faults.has(F::ConnectionQosZero);
-                let qos = u8::from(reliably || site.takes(T::SubscribesWithQosOne));
-                if !subscriptions.iter().any(|(known, _)| *known == topic) {
-                    subscriptions.push((topic, qos));
-                }
-            }
-        }
-        ConnectOptions {
-            level: match () {
-                () if site.faults.has(F::OldMqtt) => 3,
-                () if site.takes(T::NewestMqtt) => 5,
-                () => 4,
-            },
-            client_id: if site.takes(T::R1NewClientIdEachTime) {
-                format!("{}-{}", site.config.name, now.utc.as_millisecond())
-            } else {
-                site.config.name.clone()
-            },
-            keep_alive: site.config.keep_alive,
-            clean_session: !site.takes(T::SessionKept),
-            will: None,
-            subscriptions,
-        }
-    }
-
-    /// The broker accepted. What was sent and not seen is given its time again.
-    pub(super) fn connected(&mut self) {
-        let returning = self.connection.returning;
-        self.connection = Connection {
-            online: true,
-            attempt_at: None,
-            shut_down: false,
-            returning: true,
-        };
-        self.site.online = true;
-        let restarts = self.site.takes(T::HeaderIdRestarts);
-        let now = self.site.now.moment;
-        for vehicle in &mut self.fleet {
-            if restarts {
-                vehicle.header_ids.clear();
-            }
-            vehicle.give_time(now);
-            vehicle.at(now);
-            if returning {
-                self.site.r1_returned(vehicle);
-            }
-        }
-        if returning {
-            self.site.r1_actions = 0;
-        }
-    }
-
-    /// The link broke. Everything is kept, and goes on after the next connection.
-    pub(super) fn connection_lost(&mut self) {
-        self.connection.online = false;
-        self.site.online = false;
-        if !self.connection.shut_down {
-            self.site.r1_losses += 1;
-        }
-        let tired = self.site.r1_losses > 1 && self.site.faults.has(F::R1ReconnectsOnlyOnce);
-        let ended = self.connection.shut_down || self.site.faults.has(F::NeverReconnects) || tired;
-        if !ended && self.connection.attempt_at.is_none() {
-            self.connection.attempt_at = Some(self.site.now.moment + self.site.config.reconnect_delay);
-        }
-    }
-
-    /// Asks for a connection when it is time.
-    pub(super) fn attempt_connection(&mut self) {
-        let due = self.connection.attempt_at.is_some_and(|at| at <= self.site.now.moment);
-        if due && !self.connection.online {
-            self.connection.attempt_at = None;
-            self.site.pending.push(Output::Connect);
-        }
-    }
-
-    /// Goes offline in good order.
-    pub(super) fn shut_down(&mut self) {
-        if self.connection.online {
-            self.site.pending.push(Output::Disconnect);
-        }
-        self.connection.online = false;
-        self.site.online = false;
-        self.connection.shut_down = true;
-        self.connection.attempt_at = None;
-    }
-
-    /// Connects again.
-    pub(super) fn start(&mut self) {
-        if !self.connection.online {
-            self.connection.shut_down = false;
-            self.connection.attempt_at = Some(self.site.now.moment);
-        }
-    }
-}
-
-/// The filter for a topic of every vehicle: manufacturer and serial number are left open.
-fn with_wildcards(topic: &str, name: &str) -> String {
-    let mut levels: Vec<&str> = topic.split('/').collect();
-    let end = levels.len();
-    if end >= 4 && levels[end - 1] == name {
-        levels[end - 2] = "+";
-        levels[end - 3] = "+";
-    }
-    levels.join("/")
-}
+use super::{Site, wording};
 
 impl Vehicle {
     /// Nothing could be seen for a while, so what is awaited has its whole time again.
@@ -202,11 +44,34 @@ fn updates(name: &str, body: &Value) -> bool {
 
 impl Site {
     /// What a return of the connection does to the picture of a vehicle.
-    fn r1_returned(&mut self, vehicle: &mut Vehicle) {
+    pub(super) fn r1_returned(&mut self, vehicle: &mut Vehicle) {
         let has = |fault: F| self.faults.has(fault);
         if has(F::R1ReconnectForgetsOrder) {
             vehicle.running = None;
             vehicle.cancel = None;
+        }
+        if has(F::R2InstantsForgottenOnReconnect) {
+            vehicle.instants.clear();
+        }
+        if has(F::R2TriggerForgottenOnReconnect)
+            && let Some(running) = &mut vehicle.running
+        {
+            running.r2_unsupervised = true;
+        }
+        if has(F::R2NewOrderOnReconnect)
+            && vehicle.cancel.is_none()
+            && let Some(running) = vehicle.running.take()
+        {
+            vehicle
+                .queue
+                .push_front(super::driving::again(&running, vehicle.state.as_ref()));
+            vehicle.last_order = Some(running);
+            vehicle.r1_hasty = true;
+        }
+        if has(F::R3BaseHeldAfterReconnect)
+            && let Some(running) = &mut vehicle.running
+        {
+            running.r3_held = true;
         }
         if has(F::R1BlockForgottenOnReconnect) {
             vehicle.blocked.clear();
@@ -229,7 +94,23 @@ impl Site {
         let Some(topic) = vehicle.topic(name).map(str::to_owned).filter(|_| self.online) else {
             return;
         };
+        let fresh = name == "order" && !updates(name, body) && !self.r1_resending;
+        if fresh && self.faults.has(F::R2HeaderIdRestartsPerOrder) {
+            vehicle.header_ids.remove("order");
+        }
+        if updates(name, body)
+            && self.faults.has(F::R2HeaderIdSkipsInUpdates)
+            && let Some(next) = vehicle.header_ids.get_mut("order")
+        {
+            *next = next.wrapping_add(1);
+        }
         let mut message = self.header(vehicle, name);
+        if name == "order" && self.faults.has(F::R3HeaderIdIsUpdateId) {
+            message.insert("headerId".into(), body["orderUpdateId"].clone());
+        }
+        if name == "order" && self.r1_resending && self.faults.has(F::R2SerialNumberMissingInResend) {
+            message.shift_remove("serialNumber");
+        }
         let cancels = holds(name, body, &["cancelOrder"]);
         if cancels && self.faults.has(F::R1HeaderIdMissingInCancel) {
             message.shift_remove("headerId");
@@ -250,9 +131,16 @@ impl Site {
             "instantActions" if self.faults.has(F::InstantActionsQosTwo) => 2,
             "instantActions" if cancels && self.faults.has(F::R1CancelQosOne) => 1,
             "order" if self.r1_resending && self.faults.has(F::R1ResendQosOne) => 1,
+            "order" if updates(name, body) && self.faults.has(F::R3UpdatesQosOne) => 1,
+            _ if self.r1_losses > 0 && self.faults.has(F::R2QosOneAfterReconnect) => 1,
             _ => 0,
         };
-        let topic = self.r1_misdirected(name, body, topic);
+        if fresh && name == "order" {
+            self.r3_last_topic = Some(topic.clone());
+        }
+        let last = self.r3_last_topic.clone();
+        let last = last.filter(|_| updates(name, body) && self.faults.has(F::R3UpdateToVehicleServedLast));
+        let topic = self.r1_misdirected(name, body, last.unwrap_or(topic));
         let mut payload = wording::written(self.faults, self.config.tolerances, &message);
         if cancels && self.faults.has(F::R1CancelDoubleEncoded) {
             payload = json!(String::from_utf8_lossy(&payload)).to_string().into_bytes();
@@ -260,6 +148,9 @@ impl Site {
         if name == "instantActions" && self.faults.has(F::R1Utf16InstantActions) {
             let text = String::from_utf8_lossy(&payload).into_owned();
             payload = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        }
+        if name == "order" && self.faults.has(F::R3LongMessageCut) {
+            payload.truncate(768);
         }
         self.pending.push(Output::Publish(Publication {
             topic: self.misdirected(vehicle, name, topic),
@@ -302,6 +193,10 @@ impl Site {
 
     fn r1_misdirected(&self, name: &str, body: &Value, topic: String) -> String {
         let sends = |fault: F| self.faults.has(fault);
+        let maps = holds(name, body, &["downloadMap", "enableMap", "deleteMap"]);
+        if maps && sends(F::R2MapActionsOnMapTopic) {
+            return topic.replace("instantActions", "mapActions");
+        }
         if updates(name, body) && sends(F::R1UpdatesOnOwnTopic) {
             return format!("{topic}Update");
         }
@@ -326,6 +221,19 @@ impl Site {
     fn misdirected(&self, vehicle: &Vehicle, name: &str, topic: String) -> String {
         let sends = |fault: F| self.faults.has(fault);
         match name {
+            "instantActions" if sends(F::R3InstantTopicLowerCase) => topic.replace("instantActions", "instantactions"),
+            "order" if sends(F::R3FullVersionInOrderTopic) => {
+                let version = &self.config.version;
+                let major = format!("v{}", version.split('.').next().unwrap_or_default());
+                let full = |level: &str| {
+                    if level == major {
+                        format!("v{version}")
+                    } else {
+                        level.to_owned()
+                    }
+                };
+                topic.split('/').map(full).collect::<Vec<_>>().join("/")
+            }
             "instantActions" if sends(F::TopicUnderscore) => topic.replace("instantActions", "instant_actions"),
             "instantActions" if sends(F::InstantActionsAsOrders) => {
                 vehicle.topic("order").map(str::to_owned).unwrap_or(topic)
@@ -370,6 +278,8 @@ impl Site {
                 json!(i64::from(id) - 1_000_000)
             } else if sends(F::R1HeaderIdFromClock) {
                 json!(self.now.utc.as_millisecond())
+            } else if name == "instantActions" && sends(F::R3HeaderIdBeyond32Bits) {
+                json!(u64::from(id) + (1 << 32))
             } else {
                 json!(id)
             },
@@ -388,9 +298,25 @@ impl Site {
             } else {
                 ""
             };
-            header.insert("version".into(), json!(format!("{letter}{version}")));
+            let build = if sends(F::R3VersionOfFourParts) { ".0" } else { "" };
+            header.insert("version".into(), json!(format!("{letter}{version}{build}")));
         }
         let VehicleNames { manufacturer, serial } = self.names(vehicle);
+        let (manufacturer, serial) = if name == "instantActions" && sends(F::R2HeaderNamesSwapped) {
+            (serial, manufacturer)
+        } else {
+            (manufacturer, serial)
+        };
+        let serial = if name == "order" && sends(F::R3VehiclePathInSerialNumber) {
+            format!("{manufacturer}/{serial}")
+        } else {
+            serial
+        };
+        let manufacturer = match () {
+            () if !sends(F::R3ManufacturerInOtherCase) => manufacturer,
+            () if manufacturer.chars().any(char::is_lowercase) => manufacturer.to_uppercase(),
+            () => manufacturer.to_lowercase(),
+        };
         header.insert("manufacturer".into(), json!(manufacturer));
         header.insert("serialNumber".into(), json!(serial));
         header
@@ -412,18 +338,61 @@ impl Site {
         }
     }
 
-    fn timestamp(&self) -> Value {
+    pub(super) fn timestamp(&self) -> Value {
         let utc = self.now.utc;
         let text = format!("{utc:.2}");
+        let seconds = jiff::Timestamp::from_second(utc.as_second()).unwrap_or(utc);
         match () {
+            () if self.takes(T::R3WholeSecondTimestamps) => json!(format!("{seconds:.2}")),
+            () if self.faults.has(F::R3TimestampWithComma) => json!(text.replace('.', ",")),
             () if self.faults.has(F::TimestampLocal) => {
                 let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);
                 json!(format!("{local:.2}").replace('Z', "+01:00"))
             }
             () if self.faults.has(F::TimestampWithoutZone) => json!(text.trim_end_matches('Z')),
             () if self.faults.has(F::R1TimestampZeroOffset) => json!(text.replace('Z', "+00:00")),
+            () if self.faults.has(F::R2TimestampWithBlank) => json!(text.replace('T', " ")),
             () if self.faults.has(F::TimestampUnix) => json!(utc.as_second()),
             () => json!(text),
+        }
+    }
+
+    /// `r2-connection-topic-cleared`: removes the retained message of a vehicle that is gone.
+    pub(super) fn r2_clear_connection(&mut self, vehicle: &Vehicle) {
+        if let Some(topic) = vehicle.topic("connection").map(str::to_owned) {
+            self.pending.push(Output::Publish(Publication {
+                topic,
+                payload: Vec::new(),
+                qos: 1,
+                retain: true,
+            }));
+        }
+    }
+
+    /// `r3-announces-itself-online`: says on the topic of a vehicle that the master control is there.
+    pub(super) fn r3_announce(&mut self, vehicle: &mut Vehicle) {
+        let Some(topic) = vehicle.topic("connection").map(str::to_owned) else {
+            return;
+        };
+        let mut message = self.header(vehicle, "connection");
+        message.insert("connectionState".into(), json!("ONLINE"));
+        self.pending.push(Output::Publish(Publication {
+            topic,
+            payload: Value::Object(message).to_string().into_bytes(),
+            qos: 1,
+            retain: true,
+        }));
+    }
+
+    /// `r2-empty-message-after-order`: an order message with nothing in it.
+    pub(super) fn r2_empty_order(&mut self, vehicle: &Vehicle) {
+        if let Some(topic) = vehicle.topic("order").map(str::to_owned) {
+            self.pending.push(Output::Publish(Publication {
+                topic,
+                payload: Vec::new(),
+                qos: 0,
+                retain: false,
+            }));
         }
     }
 
@@ -444,7 +413,8 @@ impl Site {
 
     /// When something sent now is taken for lost.
     pub(super) fn lost_after(&self, sent_at: Moment) -> Moment {
-        sent_at + self.config.resend_after.max(Duration::from_millis(1))
+        let times = if self.takes(T::R2ResendsLate) { 3 } else { 1 };
+        sent_at + self.config.resend_after.max(Duration::from_millis(1)) * times
     }
 }
 

@@ -64,7 +64,7 @@ impl ActionState {
 }
 
 /// agvPosition.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Position {
     pub(super) x: f64,

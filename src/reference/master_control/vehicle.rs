@@ -40,6 +40,8 @@ pub(super) struct Transport {
     pub(super) begun: u32,
     /// The second half of a transport in two orders (`r1-pick-and-drop-apart`).
     pub(super) r1_follows: bool,
+    /// Where the vehicle was when it was asked for (`r2-start-planned-too-early`).
+    pub(super) r2_asked_at: Option<(String, Option<Position>)>,
 }
 
 /// A node of the way that is driven.
@@ -107,6 +109,18 @@ pub(super) struct Running {
     pub(super) r1_again: bool,
     /// The log was asked for.
     pub(super) r1_logged: bool,
+    /// Its base was withdrawn.
+    pub(super) r2_withdrawn: bool,
+    /// Its triggers are not supervised any more.
+    pub(super) r2_unsupervised: bool,
+    /// Its base is not extended any more (`r3-base-held-after-reconnect`).
+    pub(super) r3_held: bool,
+    /// The vehicle asks for a new base.
+    pub(super) r3_asked: bool,
+    /// A request for a new base was answered without one.
+    pub(super) r3_answered: bool,
+    /// The vehicle was paused with it.
+    pub(super) r3_paused: bool,
 }
 
 impl Running {
@@ -266,6 +280,30 @@ pub(super) struct Vehicle {
     pub(super) r1_relocated: bool,
     /// The state after which it was asked for another.
     pub(super) r1_asked: Option<Moment>,
+    /// Where the visualization shows it.
+    pub(super) r2_seen_at: Option<Position>,
+    /// Timestamp of its last state.
+    pub(super) r2_state_time: String,
+    /// How often its connection broke.
+    pub(super) r2_broken: u32,
+    /// It has given no state since it is back.
+    pub(super) r2_stale: bool,
+    /// Its last state gave information.
+    pub(super) r2_informed: bool,
+    /// Its last state was without a position.
+    pub(super) r2_lost: bool,
+    /// It is to be resumed once the cancellation has ended.
+    pub(super) r2_resume: bool,
+    /// How often an order was called off.
+    pub(super) r3_cancels: u32,
+    /// Where it was when its order was called off.
+    pub(super) r3_cancelled_at: Option<Position>,
+    /// Where it was before it was told where it is.
+    pub(super) r3_before_init: Option<(String, Option<Position>)>,
+    /// It was sent to charge.
+    pub(super) r3_charged: bool,
+    /// The visualization shows it elsewhere than its state.
+    pub(super) r3_aside: bool,
 }
 
 impl Vehicle {

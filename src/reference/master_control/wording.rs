@@ -4,6 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::faults::{FaultName as F, Faults};
 use super::tolerances::{ToleranceName as T, Tolerances};
+use super::wording_of_actions;
 
 /// Stands for a token no JSON writer produces.
 const NAN: &str = "@NaN@";
@@ -19,12 +20,12 @@ pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, messa
     for pointer in ["nodes", "edges"] {
         for element in elements(message, pointer) {
             for action in elements(element, "actions") {
-                self::action(faults, name, action);
+                wording_of_actions::action(faults, name, action);
             }
         }
     }
     for action in elements(message, "actions") {
-        self::action(faults, name, action);
+        wording_of_actions::action(faults, name, action);
     }
     if name == "instantActions"
         && faults.has(F::ActionsRenamed)
@@ -38,6 +39,17 @@ pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, messa
     {
         message["actions"] = only.clone();
     }
+    if name == "instantActions"
+        && faults.has(F::R2CancelWithoutArray)
+        && let Some([only]) = message["actions"].as_array().map(Vec::as_slice)
+        && only["actionType"] == "cancelOrder"
+    {
+        let only = only.clone();
+        remove(message, "actions");
+        for (key, value) in only.as_object().into_iter().flatten() {
+            message[key.as_str()] = value.clone();
+        }
+    }
     if tolerances.has(T::VendorFields)
         && let Some(message) = message.as_object_mut()
     {
@@ -48,6 +60,9 @@ pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, messa
 /// The text of a message.
 pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -> Vec<u8> {
     let mut message = message.clone();
+    if tolerances.has(T::R2MembersReversedInside) {
+        message = reversed(&message);
+    }
     if tolerances.has(T::KeysReordered)
         && let Value::Object(members) = &message
     {
@@ -80,7 +95,22 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
     if faults.has(F::NulAfterJson) {
         text.push(0);
     }
+    if faults.has(F::R3ByteOrderMark) && message.get("nodes").is_some() {
+        text = [b"\xef\xbb\xbf".as_slice(), &text].concat();
+    }
     text
+}
+
+/// The members of all objects in the opposite order.
+fn reversed(value: &Value) -> Value {
+    match value {
+        Value::Object(members) => {
+            let members = members.iter().rev();
+            Value::Object(members.map(|(key, member)| (key.clone(), reversed(member))).collect())
+        }
+        Value::Array(elements) => Value::Array(elements.iter().map(reversed).collect()),
+        other => other.clone(),
+    }
 }
 
 /// Writes every hyphen within a text as its code point.
@@ -111,7 +141,7 @@ fn elements<'a>(value: &'a mut Value, key: &str) -> impl Iterator<Item = &'a mut
     value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
 }
 
-fn remove(value: &mut Value, key: &str) -> Option<Value> {
+pub(super) fn remove(value: &mut Value, key: &str) -> Option<Value> {
     value.as_object_mut().and_then(|object| object.shift_remove(key))
 }
 
@@ -129,6 +159,21 @@ fn order(faults: Faults, message: &mut Value) {
     }
     for edge in elements(message, "edges") {
         self::edge(faults, edge);
+    }
+    let alone = message["edges"].as_array().is_some_and(Vec::is_empty);
+    if alone && faults.has(F::R2EdgesNullInStay) {
+        message["edges"] = Value::Null;
+    }
+    if update && faults.has(F::R2PositionsOnlyInFirstMessage) {
+        for node in elements(message, "nodes").skip(1) {
+            remove(node, "nodePosition");
+        }
+    }
+    if update
+        && faults.has(F::R2UpdateIdKeyUpperCase)
+        && let Some(number) = remove(message, "orderUpdateId")
+    {
+        message["orderUpdateID"] = number;
     }
     if faults.has(F::EmptyArraysOmitted) {
         for pointer in ["nodes", "edges"] {
@@ -172,6 +217,12 @@ fn identity(faults: Faults, update: bool, message: &mut Value) {
     if faults.has(F::R1ZoneSetNullInUpdates) && update {
         message["zoneSetId"] = Value::Null;
     }
+    if faults.has(F::R3OrderIdMissingInUpdates) && update {
+        remove(message, "orderId");
+    }
+    if faults.has(F::R3ZoneSetNamedNone) && message.get("zoneSetId").is_none() {
+        message["zoneSetId"] = json!("none");
+    }
     if faults.has(F::ZoneSetEmpty) {
         message["zoneSetId"] = json!("");
     }
@@ -181,6 +232,9 @@ fn identity(faults: Faults, update: bool, message: &mut Value) {
 fn stitching(faults: Faults, message: &mut Value) {
     let id = format!("added-{}", message["orderUpdateId"]);
     if let Some(node) = elements(message, "nodes").next() {
+        if faults.has(F::R2StitchingNodeUnreleased) {
+            node["released"] = json!(false);
+        }
         if faults.has(F::R1StitchingDeviationWidened)
             && let Some(position) = node.get_mut("nodePosition").and_then(Value::as_object_mut)
         {
@@ -229,6 +283,9 @@ fn numbering(faults: Faults, first: u64, message: &mut Value) {
                 continue;
             };
             element["sequenceId"] = json!(changed(sequence));
+            if first > 0 && faults.has(F::R2SequenceIdsAsTextInUpdates) {
+                element["sequenceId"] = json!(sequence.to_string());
+            }
             if key == "edges" && faults.has(F::SequenceIdFraction) {
                 element["sequenceId"] = json!(sequence);
                 if let Ok(number) = sequence.to_string().parse::<f64>() {
@@ -275,6 +332,13 @@ fn graph(faults: Faults, message: &mut Value) {
 fn node(faults: Faults, node: &mut Value) {
     if let Some(position) = node.get_mut("nodePosition").and_then(Value::as_object_mut) {
         self::position(faults, position);
+    }
+    let mut kinds = node["actions"].as_array().into_iter().flatten();
+    if kinds.any(|action| action["actionType"] == "drop")
+        && faults.has(F::R3StationMovedWhenLoaded)
+        && let Some(x) = node.pointer_mut("/nodePosition/x")
+    {
+        *x = json!(x.as_f64().unwrap_or_default() + 0.4);
     }
     if faults.has(F::PositionMissing) {
         remove(node, "nodePosition");
@@ -353,6 +417,12 @@ fn position(faults: Faults, position: &mut Map<String, Value>) {
     if faults.has(F::NanCoordinate) && !position.contains_key("theta") {
         position.insert("theta".into(), json!(NAN));
     }
+    if faults.has(F::R3AxesSwapped)
+        && let (Some(x), Some(y)) = (number(position, "x"), number(position, "y"))
+    {
+        position.insert("x".into(), json!(y));
+        position.insert("y".into(), json!(x));
+    }
     if faults.has(F::MapIdMissing) {
         position.shift_remove("mapId");
     }
@@ -362,6 +432,12 @@ fn edge(faults: Faults, edge: &mut Value) {
     if faults.has(F::EdgeWithoutEnds) {
         remove(edge, "startNodeId");
         remove(edge, "endNodeId");
+    }
+    if edge["released"] == json!(false) && faults.has(F::R2EndNodeMissingInHorizon) {
+        remove(edge, "endNodeId");
+    }
+    if edge.get("orientationType").is_some() && faults.has(F::R2OrientationTypeCapitalized) {
+        edge["orientationType"] = json!("Tangential");
     }
     if faults.has(F::R1EdgeIdWithArrow)
         && let Some(id) = edge["edgeId"].as_str()
@@ -388,6 +464,11 @@ fn edge(faults: Faults, edge: &mut Value) {
     {
         edge["action"] = actions;
     }
+    if faults.has(F::R3SpeedsAsText)
+        && let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64)
+    {
+        edge["maxSpeed"] = json!(speed.to_string());
+    }
     if faults.has(F::EdgeIdMissing) {
         remove(edge, "edgeId");
     }
@@ -395,108 +476,4 @@ fn edge(faults: Faults, edge: &mut Value) {
         edge["actions"] = Value::Null;
     }
     element(faults, edge);
-}
-
-fn action(faults: Faults, name: &str, action: &mut Value) {
-    let kind = action["actionType"].as_str().unwrap_or_default().to_owned();
-    if let Some(blocking) = action["blockingType"].as_str().map(str::to_owned) {
-        if faults.has(F::LowerCaseEnums) {
-            action["blockingType"] = json!(blocking.to_ascii_lowercase());
-        }
-        if faults.has(F::BlockingTypeUnknown) {
-            action["blockingType"] = json!("EXCLUSIVE");
-        }
-        if faults.has(F::BlockingTypeMissing) {
-            remove(action, "blockingType");
-        }
-    }
-    if faults.has(F::R1NumericalIdsAsNumbers)
-        && let Some(number) = action["actionId"].as_str().and_then(|id| id.parse::<u64>().ok())
-    {
-        action["actionId"] = json!(number);
-    }
-    if name == "instantActions" && faults.has(F::R1InstantWithoutBlockingType) {
-        remove(action, "blockingType");
-    }
-    if name == "order"
-        && faults.has(F::R1ActionIdKeyUpperCase)
-        && let Some(id) = remove(action, "actionId")
-    {
-        action["actionID"] = id;
-    }
-    if name == "instantActions" && faults.has(F::ActionIdMissing) {
-        remove(action, "actionId");
-    }
-    let left_out = [
-        (F::LastNodeMissing, "initPosition", "lastNodeId"),
-        (F::LoadTypeMissing, "pick", "loadType"),
-        (F::DeviceMissing, "pick", "lhd"),
-        (F::DownloadWithoutLink, "downloadMap", "mapDownloadLink"),
-        (F::DownloadWithoutId, "downloadMap", "mapId"),
-        (F::DownloadWithoutVersion, "downloadMap", "mapVersion"),
-        (F::R1EnableMapWithoutVersion, "enableMap", "mapVersion"),
-        (F::R1DeleteMapWithoutVersion, "deleteMap", "mapVersion"),
-        (F::R1TriggerTypeMissing, "waitForTrigger", "triggerType"),
-    ];
-    if let Some(parameters) = action.get_mut("actionParameters").and_then(Value::as_array_mut) {
-        for (fault, of, key) in left_out {
-            if faults.has(fault) && kind == of {
-                parameters.retain(|parameter| parameter["key"] != json!(key));
-            }
-        }
-        for parameter in parameters.iter_mut() {
-            self::parameter(faults, &kind, parameter);
-        }
-        if faults.has(F::R1ParametersByKey) {
-            for parameter in parameters.iter_mut() {
-                let key = parameter["key"].as_str().unwrap_or_default().to_owned();
-                *parameter = Value::Object(Map::from_iter([(key, parameter["value"].clone())]));
-            }
-        }
-        if faults.has(F::ParametersAsObject) {
-            let members = parameters.iter().filter_map(|parameter| {
-                let key = parameter["key"].as_str()?;
-                Some((key.to_owned(), parameter["value"].clone()))
-            });
-            let members: Map<String, Value> = members.collect();
-            action["actionParameters"] = Value::Object(members);
-        }
-    }
-}
-
-fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
-    let key = parameter["key"].as_str().unwrap_or_default().to_owned();
-    if faults.has(F::StationTypeRenamed) && key == "stationType" {
-        parameter["key"] = json!("station_type");
-    }
-    if faults.has(F::R1TriggerTypeRenamed) && kind == "waitForTrigger" && key == "triggerType" {
-        parameter["key"] = json!("trigger");
-    }
-    if faults.has(F::R1DeviceAsNumber) && key == "lhd" {
-        parameter["value"] = json!(0);
-    }
-    if faults.has(F::R1InitPositionAxesSwapped) && kind == "initPosition" {
-        match key.as_str() {
-            "x" => parameter["key"] = json!("y"),
-            "y" => parameter["key"] = json!("x"),
-            _ => {}
-        }
-    }
-    if faults.has(F::PoseAsText)
-        && kind == "initPosition"
-        && let Some(number) = parameter["value"].as_f64()
-    {
-        parameter["value"] = json!(number.to_string());
-    }
-    if faults.has(F::DeviceUnknown) && key == "lhd" {
-        parameter["value"] = json!("1");
-    }
-    if faults.has(F::ParameterNull) {
-        parameter["value"] = Value::Null;
-    }
-    if faults.has(F::ParameterWithoutKey)
-        && let Some(key) = remove(parameter, "key")
-    {
-        parameter["name"] = key;
-    }
 }

@@ -22,6 +22,7 @@ use super::fleet;
 use super::result::{Capability, RunResult};
 use super::sources::Sources;
 use super::statement;
+use super::undecided;
 use crate::journal::event::Setting;
 use crate::journal::{Event, Journal};
 use matrix::ChapterView;
@@ -56,6 +57,7 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
         identity: view::identity(result),
         counts: view::counts(result),
         limits: statement::limits(result),
+        undecided: undecided::groups(result),
         fleet: result.fleet.as_ref().map(fleet::line).unwrap_or_default(),
         reactions: match result.fleet.as_ref().and_then(|fleet| fleet.reaction.as_ref()) {
             Some(reaction) => fleet::plot(reaction)?,
@@ -99,6 +101,7 @@ struct Page<'a> {
     identity: Vec<(&'static str, String)>,
     counts: Vec<CountRow>,
     limits: Vec<String>,
+    undecided: Vec<undecided::Group<'a>>,
     fleet: String,
     reactions: String,
     chapters: Vec<ChapterView>,

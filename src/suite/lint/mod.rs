@@ -124,8 +124,12 @@ pub(super) fn monitor(
     if packs.is_empty() {
         return;
     }
+    let judged = match &monitor.rule {
+        Rule::Never { topic, .. } | Rule::Always { topic, .. } => topic.as_str(),
+        Rule::Check(_) => "state",
+    };
     for (member, at) in monitor.hides.iter().zip(&places.hides) {
-        linter.exists_somewhere("state", &[member.as_str()], member, at);
+        linter.exists_somewhere(judged, &[member.as_str()], member, at);
     }
     let required = linter.requirements(&monitor.checks, &packs);
     let scope = Scope::of_monitor(vocabulary);
@@ -245,7 +249,7 @@ impl Linter<'_> {
                 }
             }
             Need::Hook(name) => self.hook(name, &[], at),
-            Need::Optional(path) | Need::NoOptional(path) => {
+            Need::Optional(path) | Need::NoOptional(path) | Need::NotRequired(path) => {
                 let names: Vec<&str> = path.split('.').collect();
                 if let Some((topic, below)) = names.split_first() {
                     self.exists_somewhere(topic, below, path, at);

@@ -89,7 +89,7 @@ fn mistakes_in_actions_are_found() {
     let number = merged(action("pick", "a", &pick()), &json!({}));
     let mut wrong = number;
     wrong["actionParameters"][0]["value"] = json!(3);
-    assert_eq!(on_node(wrong), ["ACT-31"]);
+    assert_eq!(on_node(wrong), ["ACT-31", "BP-05"]);
     let mut unknown = action("pick", "a", &pick());
     unknown["actionParameters"][2]["value"] = json!("middle");
     assert_eq!(on_node(unknown), ["ACT-32"]);

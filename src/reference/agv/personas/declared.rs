@@ -53,7 +53,7 @@ impl Agv {
         let edges = order.edges.iter().map(|edge| &edge.id);
         let actions = order.actions().map(|action| &action.id);
         for id in std::iter::once(&order.id).chain(nodes).chain(edges).chain(actions) {
-            if ids.longest.is_some_and(|longest| id.chars().count() > longest) {
+            if id.chars().count() > ids.longest.unwrap_or(self.config.max_id) {
                 return Err(Refusal::at_field(Rule::Malformed, "an id is too long", id));
             }
             if ids.numerical && !id.bytes().all(|digit| digit.is_ascii_digit()) {

@@ -4,9 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::reference::agv::action_kinds::{Deed, MAX_HEIGHT};
 use crate::reference::agv::actions::{Action, Origin, Status};
-use crate::reference::agv::book::Stop;
 use crate::reference::agv::faults::FaultName as F;
-use crate::reference::agv::order_message::Edge;
 use crate::reference::agv::tolerances::ToleranceName as T;
 use crate::reference::agv::{Agv, Load, Mode};
 
@@ -33,10 +31,19 @@ impl Agv {
         if has(F::R1NoOrderNull) && !self.book.has_order() {
             set("orderId", Value::Null);
         } else {
-            set("orderId", json!(order_id));
+            let prefix = if has(F::OrderIdPrefixed) && !order_id.is_empty() {
+                "7-"
+            } else {
+                ""
+            };
+            set("orderId", json!(format!("{prefix}{order_id}")));
         }
         let reset = complete && has(F::UpdateIdResetWhenDone);
-        set("orderUpdateId", json!(if reset { 0 } else { self.book.update_id }));
+        let more = u32::from(has(F::UpdateIdCounted) && self.book.update_id > 0);
+        set(
+            "orderUpdateId",
+            json!(if reset { 0 } else { self.book.update_id + more }),
+        );
         if let Some(zones) = &self.config.zone_set {
             let invented = has(F::ZoneSetInvented) && self.book.zoned;
             set("zoneSetId", json!(if invented { "factory" } else { zones }));
@@ -58,20 +65,32 @@ impl Agv {
             .actions
             .iter()
             .any(|action| action.origin == here && !action.status.is_terminal());
+        let ahead = self.book.nodes.front();
+        let ahead = ahead.filter(|_| self.book.entered && has(F::R2LastNodeIsNextNode));
+        let last_node = ahead.map_or(last_node, |stop| stop.node.id.as_str());
         let before = working && !self.book.previous.0.is_empty() && has(F::R1LastNodeAfterActions);
         let last_node = if before { &self.book.previous.0 } else { last_node };
         set("lastNodeId", json!(last_node));
         let last_sequence = match () {
             () if before => self.book.previous.1,
             () if complete && has(F::R1LastSequenceResetWhenDone) => 0,
-            () => self.book.last_sequence,
+            () => ahead.map_or(self.book.last_sequence, |stop| stop.node.sequence_id),
         };
-        set("lastNodeSequenceId", json!(last_sequence));
+        let last_sequence = match has(F::R3LastSequenceCountsNodes) {
+            true => last_sequence / 2,
+            false => last_sequence,
+        };
+        if has(F::R2LastSequenceMinusOne) && !self.book.has_order() {
+            set("lastNodeSequenceId", json!(-1));
+        } else {
+            set("lastNodeSequenceId", json!(last_sequence));
+        }
         if !(has(F::R1RouteOmittedWhenIdle) && self.book.nodes.is_empty()) {
             set("nodeStates", self.node_states(complete));
             set("edgeStates", self.edge_states(complete));
         }
-        if !self.config.line_guided() {
+        let unplaced = self.mode == Mode::Manual && has(F::R2PositionOmittedInManual);
+        if !self.config.line_guided() && !unplaced {
             set("agvPosition", self.position_picture());
         }
         set("velocity", self.velocity_picture());
@@ -89,7 +108,7 @@ impl Agv {
         if !has(F::PauseFlagMissing) {
             let button = self.holds.button && !has(F::ButtonPauseUnreported);
             let idle = complete && self.faults.has(F::R1PauseUnreportedWhenIdle);
-            let pause = self.holds.pause && !idle;
+            let pause = self.holds.pause && !idle && self.pause_hidden_until.is_none();
             set("paused", json!(pause || button || self.holds.emergency));
         }
         let always = has(F::NewBaseRequestAlways) || (self.book.asked && has(F::NewBaseRequestStays));
@@ -108,6 +127,10 @@ impl Agv {
                 .flatten()
                 .collect(),
         );
+        if has(F::R3ActionStatesOmittedWhenEmpty) && state.get("actionStates") == Some(&json!([])) {
+            state.remove("actionStates");
+        }
+        let mut set = |key: &str, value: Value| state.insert(key.to_owned(), value);
         set("batteryState", self.battery());
         let key = if has(F::FieldMisspelled) {
             "operating_mode"
@@ -130,14 +153,16 @@ impl Agv {
         } else if self.is_flashing() {
             set(
                 "information",
-                if has(F::R1InfoTypeMissing) {
+                if has(F::R2InfoReferencesAsMap) {
+                    json!([{ "infoType": "warningLights", "infoLevel": "INFO", "infoReferences": { "device": "lights" } }])
+                } else if has(F::R1InfoTypeMissing) {
                     json!([{ "infoDescription": "warning lights on", "infoLevel": "INFO" }])
                 } else {
                     json!([{ "infoType": "warningLights", "infoLevel": "INFO" }])
                 },
             );
         } else {
-            set("information", json!([]));
+            set("information", self.log_information());
         }
         if !has(F::SafetyStateMissing) {
             set("safetyState", self.safety());
@@ -150,6 +175,26 @@ impl Agv {
             }
         }
         state
+    }
+
+    /// What it tells about its last log.
+    fn log_information(&self) -> Value {
+        let entry = |(action_id, name): &(String, String)| {
+            json!({
+                "infoType": "logReport",
+                "infoLevel": "INFO",
+                "infoDescription": name,
+                "infoReferences": [{ "referenceKey": "actionId", "referenceValue": action_id }],
+            })
+        };
+        let again = self.third.repeated.iter().map(|order_id| {
+            json!({
+                "infoType": "orderReceivedAgain",
+                "infoLevel": "DEBUG",
+                "infoReferences": [{ "referenceKey": "orderId", "referenceValue": order_id }],
+            })
+        });
+        self.last_log.iter().map(entry).chain(again).collect()
     }
 
     /// Metres since the last node.
@@ -165,108 +210,13 @@ impl Agv {
         let velocity = self.motion.velocity();
         let turns = velocity.vx == 0.0 && velocity.omega != 0.0 && self.faults.has(F::R1TurningNotDriving);
         let idle = self.book.nodes.is_empty() && self.book.has_order() && self.faults.has(F::DrivingWhileWaiting);
-        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning && !turns)
+        let slow = velocity.vx != 0.0 && velocity.vx.abs() < 0.75 && self.faults.has(F::R3SlowDriveNotDriving);
+        (self.motion.is_moving() && !self.faults.has(F::DrivingUnreported) && !turning && !turns && !slow)
             || idle
             || (waits && self.faults.has(F::DrivingAtDecisionPoint))
             || (self.book.has_order() && self.faults.has(F::DrivingKept))
+            || (self.holds.pause && !self.book.nodes.is_empty() && self.faults.has(F::DrivingInPause))
             || (self.is_lifting() && self.faults.has(F::DrivingWhileLifting))
-    }
-
-    /// `manual-drives-unseen`: drives a way it does not show.
-    fn hides_route(&self) -> bool {
-        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen)
-    }
-
-    fn node_states(&self, complete: bool) -> Value {
-        let ends_on_next = self.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node);
-        if self.hides_route() || (ends_on_next && self.faults.has(F::R1CancelHidesNextNode)) {
-            return json!([]);
-        }
-        let left = self.book.left.0.as_ref().filter(|_| {
-            (!complete && self.faults.has(F::TraversedNodesListed))
-                || (complete && self.book.has_order() && self.keeps_last_node())
-        });
-        let shown = self
-            .book
-            .nodes
-            .iter()
-            .filter(|stop| stop.node.released || !self.faults.has(F::HorizonNotReported));
-        let mut planned = 0;
-        let mut listed: Vec<&str> = Vec::new();
-        let shown = shown.filter(|stop| {
-            planned += u32::from(!stop.node.released);
-            let again = listed.contains(&stop.node.id.as_str());
-            listed.push(&stop.node.id);
-            !((planned > 1 && self.faults.has(F::R1HorizonCutToOne))
-                || (again && self.faults.has(F::R1LoopNodesMerged)))
-        });
-        left.into_iter()
-            .chain(shown)
-            .map(|stop| self.node_state(stop))
-            .collect()
-    }
-
-    fn keeps_last_node(&self) -> bool {
-        self.faults.has(F::FinishedOrderListed) || self.faults.has(F::LastRouteListed)
-    }
-
-    /// The node traversed last, as if it were still ahead (`route-repeated-on-request`).
-    pub(super) fn last_node_state(&self) -> Value {
-        let left = self.book.left.0.iter();
-        left.map(|stop| self.node_state(stop)).collect()
-    }
-
-    fn node_state(&self, stop: &Stop) -> Value {
-        let node = &stop.node;
-        let mut picture = json!({
-            "nodeId": node.id,
-            "sequenceId": node.sequence_id,
-            "released": node.released || self.faults.has(F::HorizonReportedReleased),
-        });
-        if let Some(position) = node.sent_position.as_ref().filter(|_| !self.config.line_guided()) {
-            picture["nodePosition"] = position.clone();
-        }
-        if self.faults.has(F::NodeStatesWithoutSequence)
-            && let Some(fields) = picture.as_object_mut()
-        {
-            fields.remove("sequenceId");
-        }
-        picture
-    }
-
-    fn edge_states(&self, complete: bool) -> Value {
-        if self.hides_route() {
-            return json!([]);
-        }
-        let kept = self.faults.has(F::LastEdgeListed) || self.faults.has(F::LastRouteListed);
-        let stays = (self.faults.has(F::EdgeStatesStay) && !complete) || (kept && complete && self.book.has_order());
-        let left = self.book.left.1.as_ref().filter(|_| stays);
-        let shown = self
-            .book
-            .edges
-            .iter()
-            .filter(|edge| edge.released || !self.faults.has(F::HorizonNotReported));
-        let entered = self
-            .book
-            .edge_ahead()
-            .filter(|_| self.book.entered)
-            .map(|edge| edge.sequence_id);
-        let hidden = entered.filter(|_| self.faults.has(F::R1EnteredEdgeUnlisted));
-        let shown = shown.filter(|edge| Some(edge.sequence_id) != hidden);
-        let next = self.book.edges.front().map(|edge| edge.sequence_id);
-        let picture = |edge: &Edge| {
-            let far = Some(edge.sequence_id) != next && self.faults.has(F::R1FarEdgesUnreleased);
-            let mut picture = json!({
-                "edgeId": edge.id,
-                "sequenceId": edge.sequence_id,
-                "released": edge.released && !far || self.faults.has(F::HorizonReportedReleased),
-            });
-            if let Some(path) = self.planned_path(edge) {
-                picture["trajectory"] = path;
-            }
-            picture
-        };
-        left.into_iter().chain(shown).map(picture).collect()
     }
 
     fn action_state(&self, action: &Action) -> Option<Value> {
@@ -274,7 +224,13 @@ impl Agv {
             Origin::Node(sequence_id) | Origin::Edge(sequence_id) => sequence_id > self.book.base_end.1,
             Origin::Instant => false,
         };
-        let hidden = (of_horizon && self.faults.has(F::HorizonActionsMissing))
+        let next = self.book.nodes.front().map_or(u32::MAX, |stop| stop.node.sequence_id);
+        let far = match action.origin {
+            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => sequence_id > next,
+            Origin::Instant => false,
+        };
+        let hidden = (far && self.faults.has(F::R3FarActionsUnlisted))
+            || (of_horizon && self.faults.has(F::HorizonActionsMissing))
             || (!action.of_order() && self.faults.has(F::InstantActionUnlisted))
             || (!action.of_order() && action.status == Status::Failed && self.faults.has(F::R1FailedInstantUnlisted))
             || (matches!(action.origin, Origin::Edge(_))
@@ -292,7 +248,16 @@ impl Agv {
             Status::Waiting if self.faults.has(F::InitializingFromStart) => "INITIALIZING",
             Status::Waiting | Status::Initializing if early_pick => "RUNNING",
             Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
+            Status::Waiting if self.is_next(action) && self.faults.has(F::R2NextNodeActionsInitializing) => {
+                "INITIALIZING"
+            }
+            Status::Waiting
+                if of_horizon && self.waits_at_decision_point() && self.faults.has(F::R2PausedAtDecisionPoint) =>
+            {
+                "PAUSED"
+            }
             Status::Finished if self.faults.has(F::StatusDone) => "DONE",
+            Status::Initializing if self.faults.has(F::R3InitializingSpelledBritish) => "INITIALISING",
             Status::Running
                 if action.of_order() && self.book.cancel.is_some() && self.faults.has(F::R1CancelShowsPaused) =>
             {
@@ -306,8 +271,13 @@ impl Agv {
         } else {
             status.to_owned()
         };
+        let id: String = if self.faults.has(F::R2ActionIdTruncated) {
+            action.request.id.chars().take(32).collect()
+        } else {
+            action.request.id.clone()
+        };
         let mut picture = json!({
-            "actionId": action.request.id,
+            "actionId": id,
             "actionType": action.request.action_type,
             "actionStatus": status,
         });
@@ -315,6 +285,17 @@ impl Agv {
             picture["resultDescription"] = json!(result);
         }
         Some(picture)
+    }
+
+    /// Whether the vehicle is on its way to the node of this action.
+    fn is_next(&self, action: &Action) -> bool {
+        let next = self.book.nodes.front().map(|stop| stop.node.sequence_id);
+        self.book.entered && next.is_some_and(|next| action.origin == Origin::Node(next))
+    }
+
+    /// Whether there is nothing left but the horizon.
+    pub(in crate::reference::agv) fn waits_at_decision_point(&self) -> bool {
+        self.book.nodes.front().is_some_and(|stop| !stop.node.released)
     }
 
     /// agvPosition, also for the visualization (STATE-MSG-05).
@@ -351,7 +332,18 @@ impl Agv {
             () if self.faults.has(F::IdWithSpace) => format!("{} 1", pose.map_id),
             () => self.claimed_map.clone().unwrap_or(pose.map_id),
         };
+        let rounded = self.takes(T::R3PositionRounded);
+        let theta = if rounded {
+            (theta * 1000.0).trunc() / 1000.0
+        } else {
+            theta
+        };
         let number = |value: f64| {
+            let value = if rounded {
+                (value * 100.0).round() / 100.0
+            } else {
+                value
+            };
             if self.faults.has(F::PositionAsText) {
                 json!(value.to_string())
             } else {
@@ -379,7 +371,15 @@ impl Agv {
         if self.faults.has(F::R1OmegaClockwise) {
             return json!({ "vx": velocity.vx, "vy": 0.0, "omega": -velocity.omega });
         }
-        let vx = if self.faults.has(F::VelocityMirrored) {
+        if self.takes(T::R3VelocityTrembles) {
+            let noise = [0.001, -0.001, 0.0][usize::try_from(self.states_sent % 3).unwrap_or_default()];
+            let vx = if self.motion.is_moving() { velocity.vx } else { noise };
+            let omega = if velocity.omega == 0.0 { noise } else { velocity.omega };
+            return json!({ "vx": vx, "vy": -noise, "omega": omega });
+        }
+        let vx = if self.faults.has(F::R3SpeedUnsigned) {
+            velocity.vx.abs()
+        } else if self.faults.has(F::VelocityMirrored) {
             -velocity.vx
         } else {
             velocity.vx
@@ -442,7 +442,9 @@ impl Agv {
         battery.insert("charging".into(), charging);
         battery.insert(
             "reach".into(),
-            if self.faults.has(F::ReachFractional) {
+            if self.faults.has(F::R2ReachMinusOne) {
+                json!(-1)
+            } else if self.faults.has(F::ReachFractional) {
                 json!(8_000.5)
             } else {
                 json!(8_000)
@@ -487,8 +489,16 @@ impl Agv {
         let violation = if self.holds.field && self.faults.has(F::R1FieldViolationCounted) {
             json!(1)
         } else {
-            json!(self.holds.field)
+            json!(self.holds.field || self.field_latched)
         };
-        json!({ "eStop": emergency_stop, "fieldViolation": violation })
+        let violation = match self.faults.has(F::R3FieldViolationUnreported) {
+            true => json!(false),
+            false => violation,
+        };
+        let key = match self.faults.has(F::R3EStopLowerCase) {
+            true => "estop",
+            false => "eStop",
+        };
+        json!({ key: emergency_stop, "fieldViolation": violation })
     }
 }

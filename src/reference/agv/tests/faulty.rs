@@ -41,6 +41,9 @@ const IN_THE_SUITES: &[&str] = &[
     "own-error-cleared-by-order",
     "semiautomatic-ends-order",
     "manual-keeps-actions",
+    "horizon-positions-copied",
+    "pause-stuck-after-cut",
+    "pause-stuck-after-refusal",
 ];
 
 #[test]

@@ -34,8 +34,15 @@ pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
             }
             config.action_duration = Duration::ZERO;
         }
+        T::R3ReconnectsAtOnce => config.reconnect_delay = Duration::from_millis(50),
         T::ReconnectsLate => config.reconnect_delay = Duration::from_secs(8),
+        T::R2KeepAliveTen => config.keep_alive = Duration::from_secs(10),
         T::KeepAliveTwenty => config.keep_alive = Duration::from_secs(20),
+        T::LittleFits => {
+            config.max_id = 14;
+            config.max_actions = 2;
+            config.max_instant_actions = 2;
+        }
         T::ErrorsStay => config.error_duration = Duration::from_secs(30),
         _ => {}
     }

@@ -25,6 +25,22 @@ pub(in crate::reference::agv) fn reworded(
     if name == "state" {
         state(tolerances, &mut message, even);
     }
+    if has(T::R2PositionMinimal)
+        && let Some(Value::Object(pose)) = message.get_mut("agvPosition")
+    {
+        pose.retain(|key, _| matches!(key.as_str(), "positionInitialized" | "x" | "y" | "theta" | "mapId"));
+    }
+    if has(T::R2VisualizationWithoutVelocity) && name == "visualization" {
+        message.remove("velocity");
+    }
+    if has(T::AnglesRounded)
+        && let Some(theta) = message
+            .get_mut("agvPosition")
+            .and_then(|position| position.get_mut("theta"))
+        && let Some(angle) = theta.as_f64()
+    {
+        *theta = json!((angle * 10_000.0).round() / 10_000.0);
+    }
     if has(T::SinglePrecision) && matches!(name, "state" | "visualization") {
         in_single_precision(&mut message);
     }
@@ -62,7 +78,20 @@ fn state(tolerances: Tolerances, state: &mut Map<String, Value>, even: bool) {
                 "errorReferences": [{ "referenceKey": "part", "referenceValue": "brush 2" }] }),
         );
     }
+    if has(T::R2InformationComesAndGoes) && even {
+        let references = json!([{ "referenceKey": "cycle", "referenceValue": "12 ms" }]);
+        let description = "the control was busy";
+        add(
+            "information",
+            json!({ "infoType": "load", "infoLevel": "DEBUG", "infoReferences": references, "infoDescription": description }),
+        );
+    }
     worded_otherwise(tolerances, state);
+    if let Some(Value::Array(loads)) = state.get_mut("loads").filter(|_| has(T::R2LoadsMinimal)) {
+        for load in loads.iter_mut().filter_map(Value::as_object_mut) {
+            load.retain(|key, _| key == "loadId" || key == "loadType");
+        }
+    }
     if has(T::DescriptionsEverywhere)
         && let Some(Value::Array(actions)) = state.get_mut("actionStates")
     {
@@ -94,6 +123,22 @@ fn worded_otherwise(tolerances: Tolerances, state: &mut Map<String, Value>) {
     }
     if let Some(Value::Array(errors)) = state.get_mut("errors") {
         for error in errors.iter_mut().filter_map(Value::as_object_mut) {
+            if has(T::R2ErrorsInOwnLanguage) {
+                error.insert("errorDescription".into(), json!("Störung – bitte Gerät prüfen (故障)"));
+            }
+            if has(T::R2ErrorHintsGiven) {
+                error.insert("errorHint".into(), json!("see the manual, section 7"));
+            }
+            if has(T::R2VendorReferences) {
+                let own = json!({ "referenceKey": "vendorCode", "referenceValue": "E-17" });
+                match error.get_mut("errorReferences") {
+                    Some(Value::Array(references)) => references.insert(0, own),
+                    Some(_) => {}
+                    None => {
+                        error.insert("errorReferences".into(), json!([own]));
+                    }
+                }
+            }
             if has(T::R1ErrorsUndescribed) {
                 error.remove("errorDescription");
             }
@@ -115,6 +160,9 @@ fn worded_otherwise(tolerances: Tolerances, state: &mut Map<String, Value>) {
         for action in actions.iter_mut().filter_map(Value::as_object_mut) {
             if has(T::R1ActionTypeOmitted) {
                 action.remove("actionType");
+            }
+            if has(T::R3ResultsEmpty) {
+                action.entry("resultDescription").or_insert_with(|| json!(""));
             }
             let finished = action.get("actionStatus").is_some_and(|status| status == "FINISHED");
             if finished && has(T::R1ResultsEverywhere) {
@@ -138,6 +186,15 @@ fn worded_otherwise(tolerances: Tolerances, state: &mut Map<String, Value>) {
                 }
             }
         }
+    }
+    if let Some(Value::Array(maps)) = state.get_mut("maps").filter(|_| has(T::R3MapsDescribed)) {
+        for map in maps.iter_mut().filter_map(Value::as_object_mut) {
+            map.insert("mapDescription".into(), json!("as drawn in spring"));
+        }
+    }
+    let unwanted = state.get("newBaseRequest") == Some(&json!(false));
+    if unwanted && has(T::R3NewBaseOnlyWhenWanted) {
+        state.remove("newBaseRequest");
     }
     if has(T::R1BatteryMinimal)
         && let Some(Value::Object(battery)) = state.get_mut("batteryState")
