@@ -18,7 +18,7 @@ pub(super) const BLAME: Check = Check {
     name: "errors/blame",
     decides: &["BP-03"],
     doc: "An error that is new in the state that first shows an action FAILED, and references a listed action, references \
-          one that has FAILED. Not judged when something was sent since the state before, which the error may answer.",
+          one that has FAILED, unless another new error names the failed one. Not judged when something was sent since the state before, which the error may answer.",
     arguments: &[],
     start: |_| Box::new(Blame::default()),
 };
@@ -72,10 +72,17 @@ impl Running for Blame {
                 .map(|reference| text(reference, "referenceValue").to_owned())
                 .collect()
         };
+        let fresh: Vec<Vec<String>> = errors
+            .iter()
+            .filter(|error| !before.contains(&key(error)))
+            .map(|error| named(error))
+            .collect();
+        // Where the action has its error, another one may announce what has not FAILED yet.
+        if fresh.iter().any(|named| named.contains(one)) {
+            return true;
+        }
         let mut judged = false;
-        for error in errors.iter().filter(|error| !before.contains(&key(error))) {
-            let named = named(error);
-            judged |= named.contains(one);
+        for named in &fresh {
             let others = named
                 .iter()
                 .all(|id| statuses.contains_key(id.as_str()) && !has_failed(id));
@@ -105,7 +112,7 @@ mod tests {
 
     use super::super::trace::Trace;
 
-    fn judge(blamed: &str, sent: bool) -> Vec<String> {
+    fn judge(blamed: &[&str], sent: bool) -> Vec<String> {
         let mut trace = Trace::subscriber();
         let actions = |status: &str| {
             json!([
@@ -117,17 +124,21 @@ mod tests {
         if sent {
             trace.instant("stateRequest", "x", &json!([]));
         }
-        let error = json!({ "errorType": "pickError", "errorLevel": "WARNING",
-            "errorReferences": [{ "referenceKey": "actionId", "referenceValue": blamed }] });
-        trace.state(&json!({ "actionStates": actions("FAILED"), "errors": [error] }));
+        let error = |blamed: &&str| {
+            json!({ "errorType": "pickError", "errorLevel": "WARNING",
+                "errorReferences": [{ "referenceKey": "actionId", "referenceValue": blamed }] })
+        };
+        let errors: Vec<_> = blamed.iter().map(error).collect();
+        trace.state(&json!({ "actionStates": actions("FAILED"), "errors": errors }));
         trace.judge("errors/blame").summary()
     }
 
     #[test]
     fn the_error_names_the_action_that_failed() {
-        assert!(judge("b", false).is_empty());
-        assert!(judge("z", false).is_empty(), "something else has gone wrong");
-        assert!(judge("a", true).is_empty(), "it may answer what was sent");
-        assert_eq!(judge("a", false), ["BP-03"]);
+        assert!(judge(&["b"], false).is_empty());
+        assert!(judge(&["z"], false).is_empty(), "something else has gone wrong");
+        assert!(judge(&["a"], true).is_empty(), "it may answer what was sent");
+        assert!(judge(&["a", "b"], false).is_empty(), "the other one may fail next");
+        assert_eq!(judge(&["a"], false), ["BP-03"]);
     }
 }

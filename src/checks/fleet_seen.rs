@@ -9,6 +9,7 @@ use super::traffic::{device_publish, elements};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
+use crate::pattern::whole;
 
 /// How many orders are remembered.
 const ORDERS: usize = 4096;
@@ -48,7 +49,7 @@ impl FleetSeen {
         self.tap |= published;
         let delivered = matches!(entry.event(), Event::Message { retain: false, .. });
         if published || (delivered && !self.tap) {
-            let id = entry.json().and_then(|value| value.get("headerId")?.as_u64());
+            let id = entry.json().and_then(|value| whole(value.get("headerId")?));
             if let Some(id) = id.and_then(|id| u32::try_from(id).ok()) {
                 let before = self.ids.insert(name.to_owned(), (entry.seq(), id));
                 self.before = before.map(|(_, before)| (entry.seq(), before));

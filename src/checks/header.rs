@@ -13,6 +13,7 @@ use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::pack::Role;
+use crate::pattern::whole;
 
 /// How far the clock of a device may be off before it is remarked on.
 const CLOCK_TOLERANCE: Duration = Duration::from_secs(300);
@@ -143,7 +144,7 @@ impl Running for Timestamp {
         if will {
             return true;
         }
-        let id = value.get("headerId").and_then(serde_json::Value::as_u64);
+        let id = value.get("headerId").and_then(whole);
         if self.stands_still(message.name, written, id, entry.at().moment) {
             let text = format!("timestamp {} stands still on {}", quote(written), message.name);
             findings.push(broken("HDR-03", entry.seq(), text));

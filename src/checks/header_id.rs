@@ -257,5 +257,7 @@ mod tests {
         };
         assert!(judged([0, 0, 1, 1]).is_empty());
         assert_eq!(judged([0, 1, 3, 4]), ["HDR-02"]);
+        // Counted over all vehicles: not wrong in itself, but no count of the topic.
+        assert_eq!(judged([0, 1, 2, 3]), ["HDR-02 warning"]);
     }
 }

@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::CheckContext;
 use super::traffic::{elements, is_to_vehicle, text, to_vehicle};
 use crate::journal::Entry;
+use crate::pattern::whole;
 
 /// How many order messages are kept, and how many elements each may have.
 const MESSAGES: usize = 64;
@@ -28,20 +29,10 @@ impl Element {
         let number = value.get("sequenceId")?;
         Some(Self {
             id: id.chars().take(512).collect(),
-            sequence: number.as_u64().or_else(|| whole(number.as_f64()?))?,
+            sequence: whole(number)?,
             released: value.get("released")?.as_bool()?,
         })
     }
-}
-
-/// A number written as `2.0` is the same number.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "range and fraction are checked"
-)]
-fn whole(number: f64) -> Option<u64> {
-    (number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number)).then_some(number as u64)
 }
 
 /// The elements of `list`; `None` when it is missing, too long, or one of them cannot be read.
@@ -55,8 +46,7 @@ pub(super) fn read_elements(message: &Value, list: &str, id: &str) -> Option<Vec
 
 /// A whole number member of a message.
 pub(super) fn number(message: &Value, name: &str) -> Option<u64> {
-    let value = message.get(name)?;
-    value.as_u64().or_else(|| whole(value.as_f64()?))
+    whole(message.get(name)?)
 }
 
 /// blockingType.

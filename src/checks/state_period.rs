@@ -12,6 +12,7 @@ use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
+use crate::pattern::whole;
 use crate::verdict::Verdict;
 
 /// What the transport may add to an interval of the device.
@@ -192,7 +193,7 @@ impl Running for OwnLimits {
             }
             "state" => {
                 for (name, limit) in &self.arrays {
-                    let limit = limit.as_u64().filter(|limit| *limit > 0);
+                    let limit = whole(limit).filter(|limit| *limit > 0);
                     let length = name
                         .split('.')
                         .skip(1)

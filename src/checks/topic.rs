@@ -14,6 +14,7 @@ use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
 use crate::pack::Role;
+use crate::pattern::whole;
 
 /// How many different topics are remembered; a device that invents more is judged on the first ones.
 const TOPICS: usize = 64;
@@ -90,7 +91,7 @@ impl Sent {
     fn read(message: &Value) -> Option<Self> {
         let short = |value: &Value| -> Option<String> { Some(value.as_str()?.chars().take(256).collect()) };
         if message.get("nodes").is_some_and(Value::is_array) {
-            let update = message.get("orderUpdateId").and_then(Value::as_u64)?;
+            let update = message.get("orderUpdateId").and_then(whole)?;
             return Some(Self::Order(short(message.get("orderId")?)?, update));
         }
         let action = message.get("actions")?.as_array()?.first()?;

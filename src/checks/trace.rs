@@ -123,6 +123,22 @@ impl Trace {
         format!("{}/{name}", self.prefix)
     }
 
+    /// The vehicle an entry belongs to, by its place in the fleet, and the name of its topic.
+    fn place(&self, entry: &Entry) -> Option<(usize, String)> {
+        let topic = match entry.event() {
+            Event::Packet {
+                packet: Packet::Publish { topic, .. },
+                ..
+            }
+            | Event::Message { topic, .. }
+            | Event::Sent { topic, .. } => topic,
+            _ => return None,
+        };
+        let mut levels = topic.rsplit('/');
+        let name = levels.next()?.to_owned();
+        Some((usize::from(levels.next()? != self.serial), name))
+    }
+
     /// Lets time pass.
     pub fn wait(&mut self, seconds: f64) -> &mut Self {
         self.at = self.at.after(Duration::from_secs_f64(seconds));
@@ -345,7 +361,10 @@ impl Trace {
         let mut judged = 0;
         for entry in self.journal.entries() {
             let entry: &Arc<Entry> = entry;
-            shared.fleet.borrow_mut().link(entry);
+            match self.place(entry) {
+                Some((vehicle, name)) => shared.fleet.borrow_mut().note(entry, vehicle, &name),
+                None => shared.fleet.borrow_mut().link(entry),
+            }
             judged += usize::from(running.observe(entry, &context, &mut findings));
         }
         running.finish(self.at.moment, &context, &mut findings);

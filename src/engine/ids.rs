@@ -5,6 +5,8 @@
 
 use serde_json::Value;
 
+use crate::pattern::whole;
+
 /// A vehicle that takes ids of this length takes the readable ones.
 const READABLE: u64 = 64;
 /// Digits of an id: six for the run, four for the test, two for the name.
@@ -25,7 +27,7 @@ impl IdForm {
     #[must_use]
     pub fn of(lengths: Option<&Value>) -> Self {
         let member = |name: &str| lengths.and_then(|lengths| lengths.get(name));
-        let longest = member("idLen").and_then(Value::as_u64).filter(|longest| *longest > 0);
+        let longest = member("idLen").and_then(whole).filter(|longest| *longest > 0);
         let numerical = member("idNumericalOnly").and_then(Value::as_bool) == Some(true);
         match longest.filter(|longest| *longest < READABLE) {
             Some(longest) => Self::Digits(usize::try_from(longest).unwrap_or(DIGITS).min(DIGITS)),
@@ -94,8 +96,9 @@ mod tests {
             json!({ "idLen": 36 }),
             json!({ "idNumericalOnly": true }),
             json!({ "idLen": 8, "idNumericalOnly": true }),
+            json!({ "idLen": 8.0 }),
         ];
-        for (lengths, length) in forms.iter().zip([12, 12, 8]) {
+        for (lengths, length) in forms.iter().zip([12, 12, 8, 8]) {
             let form = IdForm::of(Some(lengths));
             let ids = [
                 form.of_name("seed3", 7, "order", 0),

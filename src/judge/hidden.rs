@@ -1,9 +1,9 @@
 //! What a broken report hides.
 //!
 //! A state that forgets the name of its order, or leaves out actions that are done, cannot show what most tests wait
-//! for, nor can an instantActions message without its list. The vehicle is guilty of that, once; whether it did what it was told could not be observed. A monitor names
-//! the members it speaks for under `hides:`, and what was missed there is inconclusive in the tests it found something
-//! in. Which monitors do so is data.
+//! for, nor can an instantActions message without its list. The device is guilty of that, once; whether it did what it
+//! was told could not be observed. A monitor names the members it speaks for under `hides:`, and what was missed there
+//! is inconclusive in the tests it found something in. Which monitors do so is data.
 
 use crate::report::result::Waited;
 

@@ -14,6 +14,7 @@ use super::window::Scene;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Payload, Reading, Waiver};
 use crate::pack::RequirementId;
+use crate::pattern::whole;
 
 /// The topic that is mended.
 const TOPIC: &str = "state";
@@ -163,9 +164,9 @@ fn mend(meant: &mut Value, state: &Value, seq: u64, timeline: &Timeline, waiver:
     let member = waiver.member.as_str();
     match &waiver.reading {
         Reading::Passed => {
-            let last = state.get("lastNodeSequenceId")?.as_u64()?;
+            let last = whole(state.get("lastNodeSequenceId")?)?;
             drop_elements(meant, member, |element| {
-                let at = element.get("sequenceId").and_then(Value::as_u64);
+                let at = element.get("sequenceId").and_then(whole);
                 at.is_some_and(|at| at <= last)
             })
         }

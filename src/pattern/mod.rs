@@ -17,4 +17,4 @@ pub use ast::{Compare, Comparison, Element, Elements, Pattern, PatternKind, Piec
 pub use bindings::{Bindings, Unbound};
 pub use bound::{Bound, whole_text};
 pub use examine::{Examination, Miss};
-pub use number::{compare_numbers, same_value};
+pub use number::{compare_numbers, same_value, whole};

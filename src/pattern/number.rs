@@ -16,6 +16,20 @@ pub fn compare_numbers(left: &Number, right: &Number) -> Option<Ordering> {
     }
 }
 
+/// A number without fraction that is not negative, whatever it is written like: `14` and `14.0` are the same (JSON-09).
+/// `None` for other values, and for those beyond 53 bits that are written as a float.
+#[must_use]
+pub fn whole(value: &Value) -> Option<u64> {
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "range and fraction are checked"
+    )]
+    let whole = |float: f64| (float.fract() == 0.0 && (0.0..=EXACT).contains(&float)).then_some(float as u64);
+    value.as_u64().or_else(|| whole(value.as_f64()?))
+}
+
 fn integer(number: &Number) -> Option<i128> {
     number
         .as_i64()

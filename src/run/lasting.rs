@@ -12,6 +12,7 @@ use super::rest::{Obstacle, is_over};
 use crate::clock::Moment;
 use crate::journal::event::{Event, Reading, Waiver};
 use crate::judge::RunJudge;
+use crate::pattern::whole;
 
 /// Two states of a vehicle that stands are at least so far apart.
 const APART: Duration = Duration::from_secs(1);
@@ -200,10 +201,10 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
 
 /// Nodes or edges that are listed after they were left; of an order that is over, those that were still to come.
 fn passed(state: &Value, answered: bool, member: &str, about: &[&str]) -> Vec<Waiver> {
-    let last = state.get("lastNodeSequenceId").and_then(Value::as_u64);
+    let last = state.get("lastNodeSequenceId").and_then(whole);
     let elements = state.get(member).and_then(Value::as_array).into_iter().flatten();
     let (behind, ahead): (Vec<&Value>, Vec<&Value>) = elements.partition(|element| {
-        let at = element.get("sequenceId").and_then(Value::as_u64);
+        let at = element.get("sequenceId").and_then(whole);
         at.zip(last).is_some_and(|(at, last)| at <= last)
     });
     let mut all = Vec::new();

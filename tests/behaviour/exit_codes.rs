@@ -97,6 +97,24 @@ fn a_wrong_profile_is_2_and_shows_the_place() {
 }
 
 #[test]
+fn a_certificate_for_a_vehicle_that_may_not_drive_is_2_and_says_why() {
+    let bench = Bench::new();
+    let write = |motion: &str| {
+        let text = format!("[device]\nmanufacturer = \"ACME\"\nserial-number = \"0001\"\n{motion}");
+        fs::write(bench.path().join("device.toml"), text).unwrap();
+    };
+    for motion in ["", "[motion]\nallowed = false\n"] {
+        write(motion);
+        bench
+            .run(&["certify", "--profile", "device.toml"])
+            .code(2)
+            .says("the profile does not allow motion")
+            .says("allowed = true");
+    }
+    assert!(!bench.path().join("reports").exists(), "nothing was tried");
+}
+
+#[test]
 fn a_wrong_suite_is_2_and_shows_the_place() {
     let bench = Bench::new();
     let own = bench.path().join("own");

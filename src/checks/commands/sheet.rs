@@ -15,6 +15,7 @@ use crate::checks::traffic::{elements, text};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, LinkFault};
+use crate::pattern::whole;
 
 /// What a factsheet says about an action.
 #[derive(Clone, Debug, Default)]
@@ -56,7 +57,7 @@ fn texts(value: Option<&Value>) -> Option<Vec<String>> {
 fn limits(value: Option<&Value>) -> BTreeMap<String, u64> {
     let members = value.and_then(Value::as_object).into_iter().flatten().take(ELEMENTS);
     let all = members.filter_map(|(name, limit)| {
-        let limit = limit.as_u64().filter(|limit| *limit > 0)?;
+        let limit = whole(limit).filter(|limit| *limit > 0)?;
         Some((name.clone(), limit))
     });
     all.collect()
