@@ -39,6 +39,14 @@ impl MasterControl {
         match name {
             "connection" => self.site.connection_heard(vehicle, &header, &message),
             "state" => {
+                let number = message.get("headerId").and_then(Value::as_u64);
+                let low = number
+                    .zip(vehicle.r4_state_header)
+                    .is_some_and(|(new, last)| new <= last);
+                if low && self.site.faults.has(F::R4DropsStatesWithLowHeaderId) {
+                    return;
+                }
+                vehicle.r4_state_header = number.or(vehicle.r4_state_header);
                 vehicle.r2_state_time.clone_from(&header.timestamp);
                 if let Ok(state) = serde_json::from_value::<State>(message) {
                     self.site.state_heard(vehicle, state);
@@ -55,7 +63,8 @@ impl MasterControl {
                         retain: true,
                     }));
                 }
-                vehicle.factsheet = Some(Factsheet::read(&message));
+                let sheet = self.site.r4_judged_by(index, Factsheet::read(&message));
+                vehicle.factsheet = Some(sheet);
                 vehicle.missed = None;
             }
             _ if self.site.faults.has(F::R2TemporaryStartFromVisualization) => {
@@ -156,6 +165,7 @@ impl Site {
         }
         if presence == Presence::Online && vehicle.presence == Presence::Away {
             vehicle.r2_stale = true;
+            vehicle.r4_returned = vehicle.running.is_some();
             if let Some(running) = &mut vehicle.running
                 && self.faults.has(F::R2UpdateIdsRestartWithVehicle)
             {
@@ -169,6 +179,12 @@ impl Site {
             vehicle.give_time(self.now.moment);
             vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
             self.forget_on_return(vehicle);
+            if self.takes(T::R4RequestsStateAndFactsheetWhenOnline) {
+                self.instant(vehicle, "stateRequest", &Value::Null);
+                if self.config.has("factsheetRequest") {
+                    self.instant(vehicle, "factsheetRequest", &Value::Null);
+                }
+            }
         }
         vehicle.presence = presence;
         if presence == Presence::Away {
@@ -185,6 +201,21 @@ impl Site {
             .filter(|_| self.faults.has(F::R1OnlineClearsErrors))
         {
             state.errors.clear();
+        }
+    }
+
+    /// The factsheet a vehicle is judged by: its own, or that of the vehicle that came first
+    /// (`r4-optional-fields-by-the-first-factsheet`).
+    fn r4_judged_by(&mut self, index: usize, sheet: Factsheet) -> Factsheet {
+        if !self.faults.has(F::R4OptionalFieldsByTheFirstFactsheet) {
+            return sheet;
+        }
+        match &self.r4_first_sheet {
+            Some((first, known)) if *first != index => known.clone(),
+            _ => {
+                self.r4_first_sheet = Some((index, sheet.clone()));
+                sheet
+            }
         }
     }
 

@@ -18,6 +18,8 @@ const REACH: f64 = 0.3;
 const EXACT: f64 = 0.05;
 /// A vehicle this near to an edge is on it.
 const BESIDE: f64 = 0.5;
+/// How `r4-letters-in-the-temporary-node` begins the id of a temporary node.
+const TEMPORARY: &str = "tmp-";
 
 impl Site {
     /// The first node of a new order, and from which node of the layout the way goes on (ORD-03).
@@ -59,6 +61,13 @@ impl Site {
         let ended = vehicle.last_order.as_ref().and_then(|order| order.stops.last());
         if self.faults.has(F::R3GoalTakenForReached)
             && let Some(node) = ended.and_then(|stop| self.config.node(&stop.id))
+        {
+            return alone(node);
+        }
+        let called_off = vehicle.last_order.as_ref().filter(|_| vehicle.r1_cancelled);
+        let ahead = called_off.and_then(|order| order.stops.get(order.reached(Some(&state)) + 1));
+        if self.faults.has(F::R4StartAtTheNodeAheadAfterCancel)
+            && let Some(node) = ahead.and_then(|stop| self.config.node(&stop.id))
         {
             return alone(node);
         }
@@ -186,6 +195,9 @@ impl Site {
             "temporary".to_owned()
         } else if self.faults.has(F::R3TemporaryIdWithCoordinates) {
             format!("({:.2}, {:.2})", position.x, position.y)
+        } else if self.faults.has(F::R4LettersInTheTemporaryNode) {
+            self.ids += 1;
+            format!("{TEMPORARY}{}", self.ids)
         } else {
             self.next_id(vehicle, "place")
         };
@@ -364,8 +376,11 @@ impl Site {
             .filter(|_| !self.faults.has(F::IdLimitIgnored))
             .unwrap_or(usize::MAX);
         let digits = sheet.ids_numerical && !self.faults.has(F::NumericalIdsIgnored);
-        let fits =
-            |id: &str| id.chars().count() <= longest && (!digits || id.chars().all(|letter| letter.is_ascii_digit()));
+        let heedless = |id: &str| self.faults.has(F::R4LettersInTheTemporaryNode) && id.starts_with(TEMPORARY);
+        let digits = |id: &str| digits && !heedless(id);
+        let fits = |id: &str| {
+            id.chars().count() <= longest && (!digits(id) || id.chars().all(|letter| letter.is_ascii_digit()))
+        };
         let nodes = way.stops.iter().map(|stop| stop.id.as_str());
         nodes.chain(way.legs.iter().map(|leg| leg.id.as_str())).all(fits)
     }
