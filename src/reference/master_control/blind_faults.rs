@@ -8,6 +8,11 @@ macro_rules! with_blind_faults {
     ($registry:ident! $($own:tt)*) => {
         $registry! {
             blind {
+R4StartFromVisualization "r4-start-from-visualization" ["VIS-03", "ORD-03"] "It chooses the start of a new order by the position in the newest visualization message rather than by the state.";
+R4InformationBlocksDispatch "r4-information-blocks-dispatch" ["INFO-02"] "It dispatches no order to a vehicle that reports an information entry of level INFO.";
+R4OldWillIgnored "r4-old-will-ignored" ["CONN-13", "CONN-12"] "It ignores a connection message whose headerId is lower than that of the one before.";
+R4ClearsTheWill "r4-clears-the-will" ["TOPIC-15"] "It removes the retained CONNECTIONBROKEN of a vehicle by publishing an empty retained message on the connection topic of the vehicle.";
+R4HardAlthoughNotListed "r4-hard-although-not-listed" ["FACT-15"] "It sends actions at stations with blocking type HARD, though the factsheet lists other blocking types only for them.";
 R4InstantActionTimeWithoutZ "r4-instant-action-time-without-z" ["HDR-03"] "It writes the timestamp of instantActions messages without the Z at the end.";
 R4InstantActionVersionTwoNumbers "r4-instant-action-version-two-numbers" ["HDR-04"] "It gives the version in instantActions messages as 2.1.";
 R4FleetNameInInstantActionHeader "r4-fleet-name-in-instant-action-header" ["HDR-05", "TOPIC-04"] "It writes its own name as manufacturer into the header of instantActions messages.";

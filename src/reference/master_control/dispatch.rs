@@ -249,6 +249,10 @@ impl Site {
         if unsure && self.faults.has(F::R4LowScoreBlocksDispatch) {
             return false;
         }
+        let mut told = state.information.iter().flatten();
+        if told.any(|entry| entry["infoLevel"] == "INFO") && self.faults.has(F::R4InformationBlocksDispatch) {
+            return false;
+        }
         if vehicle.r1_moving || (state.informs() && self.faults.has(F::R1InformationHoldsDispatch)) {
             return false;
         }

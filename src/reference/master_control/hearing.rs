@@ -72,6 +72,12 @@ impl MasterControl {
                 vehicle.r2_seen_at = position.and_then(|position| serde_json::from_value(position).ok());
                 return;
             }
+            _ if self.site.faults.has(F::R4StartFromVisualization) => {
+                let position = message.get("agvPosition").cloned();
+                let position = position.and_then(|position| serde_json::from_value(position).ok());
+                vehicle.r4_shown_at = position.or(vehicle.r4_shown_at.take());
+                return;
+            }
             _ if self.site.faults.has(F::R3VisualizationAsideMeansPause) => self.site.r3_aside(vehicle, &message),
             _ if self.site.faults.has(F::R1VisualizationHoldsDispatch) => {
                 let speed = |key: &str| message.pointer(key).and_then(Value::as_f64).unwrap_or(0.0).abs();
@@ -119,6 +125,14 @@ impl Site {
             return;
         }
         vehicle.heard.clone_from(&header.timestamp);
+        let count = message.get("headerId").and_then(Value::as_u64);
+        let low = count
+            .zip(vehicle.r4_connection_header)
+            .is_some_and(|(new, last)| new < last);
+        if low && self.faults.has(F::R4OldWillIgnored) {
+            return;
+        }
+        vehicle.r4_connection_header = count.or(vehicle.r4_connection_header);
         let dying = message["connectionState"] == "CONNECTIONBROKEN";
         let older = !vehicle.r2_state_time.is_empty() && header.timestamp < vehicle.r2_state_time;
         if dying && older && self.faults.has(F::R2WillOlderThanStateIgnored) {
@@ -152,6 +166,9 @@ impl Site {
         }
         if broken && self.faults.has(F::PublishesConnection) {
             self.declare_offline(vehicle);
+        }
+        if broken && self.faults.has(F::R4ClearsTheWill) {
+            self.r2_clear_connection(vehicle);
         }
         if broken {
             vehicle.r2_broken += 1;

@@ -379,7 +379,7 @@ impl Site {
         }
     }
 
-    /// `r2-connection-topic-cleared`: removes the retained message of a vehicle that is gone.
+    /// `r2-connection-topic-cleared` and `r4-clears-the-will`: removes the retained message of a vehicle that is gone.
     pub(super) fn r2_clear_connection(&mut self, vehicle: &Vehicle) {
         if let Some(topic) = vehicle.topic("connection").map(str::to_owned) {
             self.pending.push(Output::Publish(Publication {

@@ -317,6 +317,10 @@ pub(super) struct Vehicle {
     pub(super) r4_returned: bool,
     /// When its order is to be called off (`r4-cancels-after-two-seconds`).
     pub(super) r4_cancel_at: Option<Moment>,
+    /// Where its newest visualization shows it (`r4-start-from-visualization`).
+    pub(super) r4_shown_at: Option<Position>,
+    /// headerId of its last connection message (`r4-old-will-ignored`).
+    pub(super) r4_connection_header: Option<u64>,
 }
 
 impl Vehicle {

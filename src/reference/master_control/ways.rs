@@ -44,6 +44,12 @@ impl Site {
             state.last_node_id.clone_from(node);
             state.agv_position.clone_from(position);
         }
+        if let Some(shown) = &vehicle.r4_shown_at
+            && let Some((node, _)) = self.config.nearest(shown.x, shown.y, &shown.map_id)
+        {
+            state.last_node_id.clone_from(&node.id);
+            state.agv_position = Some(shown.clone());
+        }
         let last = self.config.node(&state.last_node_id);
         let alone = |node: &SiteNode| {
             let way = Way {
@@ -341,7 +347,7 @@ impl Site {
             let rather = on_edge && self.takes(T::R1ActionsOnEdges) && room("edge.actions", leg.actions.len());
             led || rather
         }) {
-            leg.actions.push(self.action(vehicle, kind, given));
+            leg.actions.push(self.r4_hard(vehicle, kind, given));
             return;
         }
         if let Some(stop) = way
@@ -349,7 +355,7 @@ impl Site {
             .last_mut()
             .filter(|stop| on_node && room("node.actions", stop.actions.len()))
         {
-            let mut action = self.action(vehicle, kind, given);
+            let mut action = self.r4_hard(vehicle, kind, given);
             let listed = sheet.and_then(|sheet| sheet.actions.as_ref()?.get(kind)?.blocking_types.as_ref());
             let nothing = listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE"));
             if nothing && !is_predefined(kind) && self.takes(T::R3VendorActionsBlockNothing) {
@@ -364,8 +370,17 @@ impl Site {
             .last_mut()
             .filter(|leg| on_edge && room("edge.actions", leg.actions.len()))
         {
-            leg.actions.push(self.action(vehicle, kind, given));
+            leg.actions.push(self.r4_hard(vehicle, kind, given));
         }
+    }
+
+    /// An action for an order; HARD whatever the vehicle lists (`r4-hard-although-not-listed`).
+    fn r4_hard(&mut self, vehicle: &Vehicle, kind: &str, given: &Value) -> Value {
+        let mut action = self.action(vehicle, kind, given);
+        if self.faults.has(F::R4HardAlthoughNotListed) {
+            action["blockingType"] = json!("HARD");
+        }
+        action
     }
 
     /// Whether the vehicle takes the ids of a way (FACT-12).
