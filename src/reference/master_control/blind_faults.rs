@@ -8,6 +8,44 @@ macro_rules! with_blind_faults {
     ($registry:ident! $($own:tt)*) => {
         $registry! {
             blind {
+R4StartFromVisualization "r4-start-from-visualization" ["VIS-03", "ORD-03"] "It chooses the start of a new order by the position in the newest visualization message rather than by the state.";
+R4InformationBlocksDispatch "r4-information-blocks-dispatch" ["INFO-02"] "It dispatches no order to a vehicle that reports an information entry of level INFO.";
+R4OldWillIgnored "r4-old-will-ignored" ["CONN-13", "CONN-12"] "It ignores a connection message whose headerId is lower than that of the one before.";
+R4ClearsTheWill "r4-clears-the-will" ["TOPIC-15"] "It removes the retained CONNECTIONBROKEN of a vehicle by publishing an empty retained message on the connection topic of the vehicle.";
+R4HardAlthoughNotListed "r4-hard-although-not-listed" ["FACT-15"] "It sends actions at stations with blocking type HARD, though the factsheet lists other blocking types only for them.";
+R4InstantActionTimeWithoutZ "r4-instant-action-time-without-z" ["HDR-03"] "It writes the timestamp of instantActions messages without the Z at the end.";
+R4InstantActionVersionTwoNumbers "r4-instant-action-version-two-numbers" ["HDR-04"] "It gives the version in instantActions messages as 2.1.";
+R4FleetNameInInstantActionHeader "r4-fleet-name-in-instant-action-header" ["HDR-05", "TOPIC-04"] "It writes its own name as manufacturer into the header of instantActions messages.";
+R4HeaderOfTheOtherVehicleInUpdates "r4-header-of-the-other-vehicle-in-updates" ["HDR-05", "TOPIC-04"] "It puts into an order update the serial number of the vehicle that it has addressed before, so that with two vehicles at work the header names the wrong one.";
+R4DropsStatesWithLowHeaderId "r4-drops-states-with-low-header-id" ["MQTT-10", "ORD-UPD-02"] "It drops every state whose headerId is not higher than the last one, also after the vehicle has started anew and counts from the beginning.";
+R4MapVersionAsNumber "r4-map-version-as-number" ["ACT-31", "JSON-06", "BP-05"] "It sends the mapVersion in map actions as a JSON number when the version looks like a number.";
+R4MapParametersAsObject "r4-map-parameters-as-object" ["BP-04", "ORD-MSG-15"] "It sends the action parameters of downloadMap as one object with the keys as members, instead of an array of key and value.";
+R4NullForUnknownLoadId "r4-null-for-unknown-load-id" ["BP-05"] "It sends the parameter loadId with the value null in a pick, when the load is not known.";
+R4InstantActionsWithoutBlockingType "r4-instant-actions-without-blocking-type" ["ORD-MSG-15", "IACT-01"] "It leaves blockingType out of the instant actions startPause and stopPause.";
+R4ReleasesTheReservedStation "r4-releases-the-reserved-station" ["ORD-09"] "It marks the destination node of the horizon as released, because the station is reserved for the vehicle.";
+R4NoActionListInTheHorizon "r4-no-action-list-in-the-horizon" ["ORD-MSG-05", "ORD-MSG-06", "JSON-10"] "It leaves the actions array out on horizon nodes that have no action.";
+R4OneNodeOrderWithoutEdges "r4-one-node-order-without-edges" ["ORD-MSG-06", "ORD-MSG-01"] "It leaves the edges array out of an order that consists of one node only.";
+R4NegativeDeviationForNoLimit "r4-negative-deviation-for-no-limit" ["ORD-MSG-09"] "It sends allowedDeviationXY -1 on nodes through which the vehicle only passes.";
+R4EmptyZoneSet "r4-empty-zone-set" ["ORD-MSG-03"] "It sends zoneSetId as an empty string in order updates, though no zones are used.";
+R4CorridorShiftsAtTheNode "r4-corridor-shifts-at-the-node" ["CORR-04"] "It sends, for consecutive edges, a corridor to the left only and then one to the right only, so that the vehicle may be outside the new corridor when it passes the node.";
+R4CutLeavesADanglingEdge "r4-cut-leaves-a-dangling-edge" ["ORD-02"] "It cuts an order that is too long for the vehicle behind the edge, so that the message has as many edges as nodes.";
+R4CountsUpdatesFromTheReportedState "r4-counts-updates-from-the-reported-state" ["ORD-UPD-04"] "It takes as next orderUpdateId the reported one plus one, so that two updates in quick succession carry the same id with different content.";
+R4WholeOrderAfterReconnect "r4-whole-order-after-reconnect" ["ORD-UPD-05", "ORD-UPD-03"] "It puts the whole order from its first node into the first update after the vehicle has come back online.";
+R4ActionAddedToTheStitchingNode "r4-action-added-to-the-stitching-node" ["ORD-UPD-06", "ORD-UPD-03"] "It adds the drop to the stitching node, when the destination is changed to the node where the base ends.";
+R4TakesTheBaseBackInPause "r4-takes-the-base-back-in-pause" ["ORD-UPD-03"] "It sends an update that takes released nodes ahead of the vehicle back into the horizon, while the vehicle is paused.";
+R4NoBaseAfterPause "r4-no-base-after-pause" ["STATE-17", "ORD-UPD-02"] "It sends no further base for the order after the vehicle was paused and has been resumed.";
+R4OrderIdsFromTheStartAfterReconnect "r4-order-ids-from-the-start-after-reconnect" ["ORD-MSG-02"] "It counts its order numbers from the start after its own connection to the broker was lost, so that an orderId returns for another order.";
+R4StartAtTheNodeAheadAfterCancel "r4-start-at-the-node-ahead-after-cancel" ["ORD-CANCEL-14", "ORD-CANCEL-17", "ORD-03"] "It begins the order after a cancellation at the next node of the old order, towards which the vehicle was driving.";
+R4NewOrderWithoutCancelInPause "r4-new-order-without-cancel-in-pause" ["ORD-CANCEL-01", "ORD-UPD-03"] "It sends a new order without cancelOrder when the destination is changed while the vehicle is paused in the middle of its order.";
+R4ChecksTheFirstMapOnly "r4-checks-the-first-map-only" ["MAP-09"] "It checks only the map of the first node before an order that leads over two maps.";
+R4OrderAfterFailedEnableMap "r4-order-after-failed-enable-map" ["MAP-09"] "It sends the order although enableMap was reported FAILED.";
+R4DownloadAfterFailedDelete "r4-download-after-failed-delete" ["MAP-28"] "It repeats a rejected download although the deletion of the duplicate was reported FAILED.";
+R4NoLhdInUpdates "r4-no-lhd-in-updates" ["ACT-32", "FACT-15"] "It names the load handling device for a pick in a new order, but not for a pick that comes with an update.";
+R4OptionalFieldsByTheFirstFactsheet "r4-optional-fields-by-the-first-factsheet" ["OPT-03", "FACT-15", "OPT-05"] "It judges all vehicles by the factsheet of the vehicle that came first.";
+R4LettersInTheTemporaryNode "r4-letters-in-the-temporary-node" ["FACT-12"] "It names the temporary node after a cancellation with letters, though the vehicle takes numerical ids only.";
+R4CopiesInManual "r4-copies-in-manual" ["MODE-04"] "It sends an order again, which the vehicle has not taken over, though the vehicle has meanwhile changed to MANUAL.";
+R4UpdatesToALostVehicle "r4-updates-to-a-lost-vehicle" ["CONN-12"] "It keeps new orders back from a vehicle with CONNECTIONBROKEN, but goes on to send updates of the running one.";
+R4LowScoreBlocksDispatch "r4-low-score-blocks-dispatch" ["INFO-03"] "It dispatches no order to a vehicle whose localizationScore is below one half.";
 R3LongMessageCut "r3-long-message-cut" ["MQTT-02", "JSON-10"] "It cuts every order message off after 768 bytes, the size of its send buffer.";
 R3UpdatesQosOne "r3-updates-qos-one" ["MQTT-06"] "It publishes updates of orders with QoS 1, and new orders with QoS 0.";
 R3BaseHeldAfterReconnect "r3-base-held-after-reconnect" ["MQTT-10", "ORD-UPD-02"] "It never extends the base of an order again during which its own connection to the broker was lost.";

@@ -84,9 +84,17 @@ impl Site {
                     self.reroute(vehicle, &to);
                 }
             }
+            "cancel" if vehicle.running.is_some() && self.takes(T::R4CancelsAfterTwoSeconds) => {
+                let due = self.now.moment + std::time::Duration::from_secs(2);
+                vehicle.r4_cancel_at.get_or_insert(due);
+            }
             "cancel" => self.call_off(vehicle),
             "pause" => {
                 self.instant(vehicle, "startPause", &Value::Null);
+                if self.takes(T::R4PauseSentTwice) {
+                    self.send_instants(vehicle);
+                    self.instant(vehicle, "startPause", &Value::Null);
+                }
             }
             "resume" => {
                 self.instant(vehicle, "stopPause", &Value::Null);
@@ -214,6 +222,20 @@ impl Site {
             if foreign || (now && self.takes(T::R3CancelSentToIdle)) {
                 self.instant(vehicle, "cancelOrder", &Value::Null);
             }
+        }
+    }
+
+    /// `r4-cancels-after-two-seconds`: calls off what was to be called off a while ago.
+    pub(super) fn r4_call_off(&mut self, vehicle: &mut Vehicle) {
+        match vehicle.r4_cancel_at {
+            Some(due) if due > self.now.moment => vehicle.at(due),
+            Some(_) => {
+                vehicle.r4_cancel_at = None;
+                if vehicle.running.is_some() {
+                    self.call_off(vehicle);
+                }
+            }
+            None => {}
         }
     }
 

@@ -173,6 +173,7 @@ impl MasterControl {
         }
         if returning {
             self.site.r1_actions = 0;
+            self.site.r4_orders = 0;
         }
     }
 

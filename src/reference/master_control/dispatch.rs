@@ -63,6 +63,10 @@ impl Site {
         let Some(transport) = vehicle.queue.front().cloned() else {
             return;
         };
+        if let Some(due) = transport.r4_due.filter(|due| *due > self.now.moment) {
+            vehicle.at(due);
+            return;
+        }
         let Some(way) = self.planned(vehicle, &transport) else {
             // There is no way, or the vehicle cannot be told it.
             vehicle.queue.pop_front();
@@ -108,8 +112,11 @@ impl Site {
                 first.actions.push(action);
             }
         }
+        if self.takes(T::R4SecondLegAsUpdateOfTheCompletedOrder) {
+            running.r4_halt = first_leg(&running);
+        }
         let end = self.free_until(vehicle, &running, 0);
-        let released = if self.takes(T::R2WholeWayReleased) {
+        let released = if self.takes(T::R2WholeWayReleased) || running.r4_halt.is_some() {
             end
         } else {
             end.min(self.config.base_length.max(1).saturating_add(1))
@@ -121,7 +128,14 @@ impl Site {
             .iter()
             .map(|stop| stop.map_id.clone())
             .collect();
-        if !self.maps_ready(vehicle, maps.iter().map(String::as_str)) {
+        let first = maps
+            .first()
+            .filter(|_| self.faults.has(F::R4ChecksTheFirstMapOnly))
+            .cloned();
+        let checked = maps
+            .iter()
+            .filter(|map_id| first.as_ref().is_none_or(|first| first == *map_id));
+        if !self.maps_ready(vehicle, checked.map(String::as_str)) {
             return;
         }
         let window = Window {
@@ -152,6 +166,7 @@ impl Site {
         running.released = window.released;
         vehicle.r1_sequence += 2 * running.stops.len();
         vehicle.r1_stale = false;
+        vehicle.r4_returned = false;
         vehicle.r1_hasty = false;
         vehicle.r1_cancelled = false;
         vehicle.r1_kept = None;
@@ -227,6 +242,17 @@ impl Site {
         if state.operating_mode == "SEMIAUTOMATIC" && self.takes(T::R3NoNewOrdersInSemiautomatic) {
             return false;
         }
+        let position = state.agv_position.as_ref();
+        let unsure = position
+            .and_then(|position| position.localization_score)
+            .is_some_and(|score| score < 0.5);
+        if unsure && self.faults.has(F::R4LowScoreBlocksDispatch) {
+            return false;
+        }
+        let mut told = state.information.iter().flatten();
+        if told.any(|entry| entry["infoLevel"] == "INFO") && self.faults.has(F::R4InformationBlocksDispatch) {
+            return false;
+        }
         if vehicle.r1_moving || (state.informs() && self.faults.has(F::R1InformationHoldsDispatch)) {
             return false;
         }
@@ -269,7 +295,8 @@ impl Site {
             let used = used || (base > 0 && self.faults.has(F::R2BlockCheckedAtPlanningOnly));
             vehicle.blocked.contains(&(leg.from.clone(), leg.to.clone())) && !used
         });
-        blocked.map_or(running.stops.len(), |(index, _)| index + 1)
+        let free = blocked.map_or(running.stops.len(), |(index, _)| index + 1);
+        free.min(running.r4_halt.unwrap_or(usize::MAX))
     }
 
     /// The whole way of a transport; `None` if there is none the vehicle can be told.
@@ -299,6 +326,13 @@ impl Site {
         }
         (self.names_fit(vehicle, &way) && self.actions_fit(vehicle, &way)).then_some(way)
     }
+}
+
+/// `r4-second-leg-as-update-of-the-completed-order`: number of nodes up to the pick, where the way goes on behind it.
+fn first_leg(running: &Running) -> Option<usize> {
+    let picks = |stop: &Stop| stop.actions.iter().any(|action| action["actionType"] == "pick");
+    let nodes = running.stops.iter().position(picks)? + 1;
+    (running.transport.from.is_some() && nodes > 1 && nodes < running.stops.len()).then_some(nodes)
 }
 
 /// `r3-action-ids-kept-after-cancel`: gives actions the ids of those of the same type in the order called off.

@@ -9,7 +9,7 @@ use super::faults::FaultName as F;
 use super::order::Window;
 use super::seen::State;
 use super::tolerances::ToleranceName as T;
-use super::vehicle::{Running, Transport, Vehicle};
+use super::vehicle::{Presence, Running, Transport, Vehicle};
 
 /// How often a faulty master control repeats a refused order.
 const FLOOD: u32 = 20;
@@ -46,6 +46,8 @@ impl Site {
             .is_some_and(|state| state.operating_mode == "MANUAL");
         let stubborn = self.faults.has(F::UpdatesInService) || (manual && self.faults.has(F::R1UpdatesInManual));
         let stubborn = stubborn && self.reachable(vehicle);
+        let lost = vehicle.presence == Presence::Away && vehicle.state.as_ref().is_some_and(State::takes_orders);
+        let stubborn = stubborn || (lost && self.faults.has(F::R4UpdatesToALostVehicle));
         if vehicle.cancel.is_some() || !(self.commandable(vehicle) || stubborn) {
             return;
         }
@@ -75,7 +77,8 @@ impl Site {
         }
         match fate {
             Fate::Runs => {
-                if running.confirmed && !running.refused {
+                let hurried = running.changed && self.faults.has(F::R4CountsUpdatesFromTheReportedState);
+                if (running.confirmed || hurried) && !running.refused {
                     self.extend_base(vehicle, &mut running);
                 }
                 vehicle.running = Some(running);
@@ -272,17 +275,22 @@ impl Site {
         }
     }
 
-    /// `r1-resend-in-service`: repeats a lost order although the vehicle is in service.
+    /// `r1-resend-in-service` and `r4-copies-in-manual`: repeats a lost order although the vehicle is in service, or
+    /// driven by hand.
     fn r1_resent_in_service(&mut self, vehicle: &mut Vehicle) -> bool {
-        let service = vehicle
-            .state
-            .as_ref()
-            .is_some_and(|state| state.operating_mode == "SERVICE");
+        let deaf = vehicle.state.as_ref().is_some_and(|state| {
+            let copied = match state.operating_mode.as_str() {
+                "SERVICE" => F::R1ResendInService,
+                "MANUAL" => F::R4CopiesInManual,
+                _ => return false,
+            };
+            self.faults.has(copied)
+        });
         let open = vehicle
             .running
             .as_ref()
             .is_some_and(|running| !running.confirmed && !running.refused);
-        if !(service && open && self.reachable(vehicle) && self.faults.has(F::R1ResendInService)) {
+        if !(deaf && open && self.reachable(vehicle)) {
             return false;
         }
         if let Some(mut running) = vehicle.running.take() {
@@ -346,7 +354,17 @@ impl Site {
             return;
         }
         let stopped = !matches!(state.safety_state.e_stop.as_str(), "NONE" | "");
-        let withdraws = stopped && self.faults.has(F::R2EStopWithdrawsBase);
+        let withdraws = (stopped && self.faults.has(F::R2EStopWithdrawsBase))
+            || (state.is_paused() && self.faults.has(F::R4TakesTheBaseBackInPause));
+        if let Some(halt) = running.r4_halt {
+            let ids = running.actions().filter_map(|action| action["actionId"].as_str());
+            let pending = |id: &str| state.action(id).is_some_and(|action| !action.is_terminal());
+            let done = !ids.into_iter().any(pending);
+            let there = state.order_id == running.id && state.route_empty() && reached + 1 >= halt;
+            if there && done {
+                running.r4_halt = None;
+            }
+        }
         if withdraws && running.released > reached + 1 && !running.r2_withdrawn {
             running.r2_withdrawn = true;
             running.released = reached + 1;
@@ -369,7 +387,8 @@ impl Site {
             return;
         }
         let held = (vehicle.r1_stale && self.faults.has(F::R1VehicleReturnStopsUpdates))
-            || (state.informs() && self.faults.has(F::R1InformationHoldsBase));
+            || (state.informs() && self.faults.has(F::R1InformationHoldsBase))
+            || (running.r3_paused && self.faults.has(F::R4NoBaseAfterPause));
         let first = self.config.vehicles.first() == Some(&vehicle.config);
         if held || (!first && self.faults.has(F::FirstVehicleExtended)) {
             return;
@@ -385,7 +404,7 @@ impl Site {
         } else {
             1
         };
-        let wanted = if withdraws || showing {
+        let wanted = if withdraws || showing || running.r4_drops_horizon {
             false
         } else if self.faults.has(F::BaseExtendedLate) {
             ahead == 0 && !state.driving
@@ -415,7 +434,10 @@ impl Site {
             return;
         }
         let fresh = running.released.min(target)..target;
-        let maps: Vec<String> = running.stops[fresh].iter().map(|stop| stop.map_id.clone()).collect();
+        let mut maps: Vec<String> = running.stops[fresh].iter().map(|stop| stop.map_id.clone()).collect();
+        if self.faults.has(F::R4ChecksTheFirstMapOnly) {
+            maps.retain(|map_id| Some(map_id) == running.stops.first().map(|first| &first.map_id));
+        }
         let blindly = self.faults.has(F::R1MapNotCheckedInUpdates);
         if !blindly && !self.maps_ready(vehicle, maps.iter().map(String::as_str)) {
             return;
@@ -423,6 +445,7 @@ impl Site {
         let window = Window {
             first: if self.faults.has(F::BaseSentAgain)
                 || (running.r3_paused && self.faults.has(F::R3BaseSentAgainAfterPause))
+                || (vehicle.r4_returned && self.faults.has(F::R4WholeOrderAfterReconnect))
             {
                 0
             } else if self.faults.has(F::R1UpdateFromVehicle) {
@@ -448,16 +471,31 @@ impl Site {
         } else {
             window
         };
+        let window = if running.r4_drops_horizon {
+            Window {
+                end: window.released,
+                ..window
+            }
+        } else {
+            window
+        };
         let stuck = (running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats))
             || (running.changed && self.faults.has(F::R1UpdateIdKeptOnReroute));
         let stuck = stuck || (running.resends > 0 && self.faults.has(F::R3UpdateIdKeptAfterResend));
         let before = running.update_id;
         running.update_id += u32::from(!stuck);
+        if self.faults.has(F::R4CountsUpdatesFromTheReportedState) {
+            let state = vehicle.state.as_ref().filter(|state| state.order_id == running.id);
+            running.update_id = state.map_or(0, |state| state.order_update_id).saturating_add(1);
+        }
         match self.order_message(vehicle, running, window) {
             Some((message, window)) if window.released > running.released || running.changed => {
                 running.released = window.released;
                 vehicle.r1_answered |= asked;
                 self.send_order(vehicle, running, message);
+                vehicle.r4_returned = false;
+                // The horizon is gone; the new one is still to be sent.
+                running.changed = std::mem::take(&mut running.r4_drops_horizon);
             }
             _ => running.update_id = before,
         }

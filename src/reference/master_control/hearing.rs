@@ -39,6 +39,14 @@ impl MasterControl {
         match name {
             "connection" => self.site.connection_heard(vehicle, &header, &message),
             "state" => {
+                let number = message.get("headerId").and_then(Value::as_u64);
+                let low = number
+                    .zip(vehicle.r4_state_header)
+                    .is_some_and(|(new, last)| new <= last);
+                if low && self.site.faults.has(F::R4DropsStatesWithLowHeaderId) {
+                    return;
+                }
+                vehicle.r4_state_header = number.or(vehicle.r4_state_header);
                 vehicle.r2_state_time.clone_from(&header.timestamp);
                 if let Ok(state) = serde_json::from_value::<State>(message) {
                     self.site.state_heard(vehicle, state);
@@ -55,12 +63,19 @@ impl MasterControl {
                         retain: true,
                     }));
                 }
-                vehicle.factsheet = Some(Factsheet::read(&message));
+                let sheet = self.site.r4_judged_by(index, Factsheet::read(&message));
+                vehicle.factsheet = Some(sheet);
                 vehicle.missed = None;
             }
             _ if self.site.faults.has(F::R2TemporaryStartFromVisualization) => {
                 let position = message.get("agvPosition").cloned();
                 vehicle.r2_seen_at = position.and_then(|position| serde_json::from_value(position).ok());
+                return;
+            }
+            _ if self.site.faults.has(F::R4StartFromVisualization) => {
+                let position = message.get("agvPosition").cloned();
+                let position = position.and_then(|position| serde_json::from_value(position).ok());
+                vehicle.r4_shown_at = position.or(vehicle.r4_shown_at.take());
                 return;
             }
             _ if self.site.faults.has(F::R3VisualizationAsideMeansPause) => self.site.r3_aside(vehicle, &message),
@@ -110,6 +125,14 @@ impl Site {
             return;
         }
         vehicle.heard.clone_from(&header.timestamp);
+        let count = message.get("headerId").and_then(Value::as_u64);
+        let low = count
+            .zip(vehicle.r4_connection_header)
+            .is_some_and(|(new, last)| new < last);
+        if low && self.faults.has(F::R4OldWillIgnored) {
+            return;
+        }
+        vehicle.r4_connection_header = count.or(vehicle.r4_connection_header);
         let dying = message["connectionState"] == "CONNECTIONBROKEN";
         let older = !vehicle.r2_state_time.is_empty() && header.timestamp < vehicle.r2_state_time;
         if dying && older && self.faults.has(F::R2WillOlderThanStateIgnored) {
@@ -144,6 +167,9 @@ impl Site {
         if broken && self.faults.has(F::PublishesConnection) {
             self.declare_offline(vehicle);
         }
+        if broken && self.faults.has(F::R4ClearsTheWill) {
+            self.r2_clear_connection(vehicle);
+        }
         if broken {
             vehicle.r2_broken += 1;
             vehicle.shunned |= vehicle.r2_broken > 1 && self.faults.has(F::R2TwiceBrokenIsDefective);
@@ -156,6 +182,7 @@ impl Site {
         }
         if presence == Presence::Online && vehicle.presence == Presence::Away {
             vehicle.r2_stale = true;
+            vehicle.r4_returned = vehicle.running.is_some();
             if let Some(running) = &mut vehicle.running
                 && self.faults.has(F::R2UpdateIdsRestartWithVehicle)
             {
@@ -169,6 +196,12 @@ impl Site {
             vehicle.give_time(self.now.moment);
             vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
             self.forget_on_return(vehicle);
+            if self.takes(T::R4RequestsStateAndFactsheetWhenOnline) {
+                self.instant(vehicle, "stateRequest", &Value::Null);
+                if self.config.has("factsheetRequest") {
+                    self.instant(vehicle, "factsheetRequest", &Value::Null);
+                }
+            }
         }
         vehicle.presence = presence;
         if presence == Presence::Away {
@@ -185,6 +218,21 @@ impl Site {
             .filter(|_| self.faults.has(F::R1OnlineClearsErrors))
         {
             state.errors.clear();
+        }
+    }
+
+    /// The factsheet a vehicle is judged by: its own, or that of the vehicle that came first
+    /// (`r4-optional-fields-by-the-first-factsheet`).
+    fn r4_judged_by(&mut self, index: usize, sheet: Factsheet) -> Factsheet {
+        if !self.faults.has(F::R4OptionalFieldsByTheFirstFactsheet) {
+            return sheet;
+        }
+        match &self.r4_first_sheet {
+            Some((first, known)) if *first != index => known.clone(),
+            _ => {
+                self.r4_first_sheet = Some((index, sheet.clone()));
+                sheet
+            }
         }
     }
 

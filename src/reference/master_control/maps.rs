@@ -113,7 +113,7 @@ impl Site {
                         self.map_action(vehicle, "deleteMap", &job.map.map_id, &version)
                     }
                 }
-                (Stage::Delete, true) => {
+                (Stage::Delete, deleted) if deleted || self.faults.has(F::R4DownloadAfterFailedDelete) => {
                     job.stage = Stage::DownloadAgain;
                     let id = self.send_download(vehicle, &job.map);
                     let again = vehicle
@@ -150,7 +150,12 @@ impl Site {
             }
             // Not asked again on its own, even if the vehicle says it is done and shows no map.
             if let Some(finished) = ended(vehicle, &action_id) {
-                if finished && self.faults.has(F::R1EnableMapTakenForDone) {
+                let usable = if finished {
+                    F::R1EnableMapTakenForDone
+                } else {
+                    F::R4OrderAfterFailedEnableMap
+                };
+                if self.faults.has(usable) {
                     vehicle.r1_enabled.insert(map_id.clone());
                 }
                 vehicle.enabling.insert(map_id, String::new());

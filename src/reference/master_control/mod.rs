@@ -83,6 +83,14 @@ struct Site {
     r1_losses: u32,
     /// The order topic of the vehicle that was given an order last (`r3-update-to-vehicle-served-last`).
     r3_last_topic: Option<String>,
+    /// The serial number of the vehicle addressed last (`r4-header-of-the-other-vehicle-in-updates`).
+    r4_addressed: Option<String>,
+    /// Counts orders since the last connection (`r4-order-ids-from-the-start-after-reconnect`).
+    r4_orders: u64,
+    /// The vehicle whose factsheet came first, and that factsheet (`r4-optional-fields-by-the-first-factsheet`).
+    r4_first_sheet: Option<(usize, seen::Factsheet)>,
+    /// When the next heartbeat is due (`r4-heartbeat-outside-the-protocol`).
+    r4_beat_at: Option<Moment>,
 }
 
 impl Site {
@@ -109,6 +117,10 @@ impl Site {
         if self.faults.has(FaultName::R1ActionIdsRestartOnReconnect) && what == "action" {
             self.r1_actions += 1;
             count = self.r1_actions;
+        }
+        if self.faults.has(FaultName::R4OrderIdsFromTheStartAfterReconnect) && what == "order" {
+            self.r4_orders += 1;
+            count = self.r4_orders;
         }
         let number = format!("{}{count:05}", self.session);
         let sheet = vehicle.factsheet.as_ref();
@@ -209,6 +221,10 @@ impl MasterControl {
                 r1_actions: 0,
                 r1_losses: 0,
                 r3_last_topic: None,
+                r4_addressed: None,
+                r4_orders: 0,
+                r4_first_sheet: None,
+                r4_beat_at: None,
             },
             fleet,
             by_topic,
@@ -252,6 +268,8 @@ impl Site {
         if !self.online {
             return;
         }
+        self.r4_beat(vehicle);
+        self.r4_call_off(vehicle);
         self.miss_factsheet(vehicle);
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);

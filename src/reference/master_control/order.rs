@@ -31,6 +31,7 @@ impl Site {
     ) -> Option<(Value, Window)> {
         let sheet = vehicle.factsheet.as_ref();
         let mut window = window;
+        let asked = window.end;
         let later = window.first > 0 && self.faults.has(F::R1ArrayLimitIgnoredInUpdates);
         if let Some(sheet) = sheet.filter(|_| !self.faults.has(F::ArrayLimitIgnored) && !later) {
             let nodes = sheet.limit(&["order.nodes", "nodes"]);
@@ -52,7 +53,7 @@ impl Site {
             .filter(|_| window.first == 0 || !self.faults.has(F::R3MessageLimitIgnoredInUpdates))
             .unwrap_or(usize::MAX);
         loop {
-            let message = self.message(vehicle, running, window);
+            let message = self.message(vehicle, running, window, window.end < asked);
             // The header comes on top.
             let length = super::wording::written(self.faults, self.config.tolerances, &message).len() + 300;
             if window.released <= window.first {
@@ -69,7 +70,8 @@ impl Site {
         }
     }
 
-    fn message(&self, vehicle: &Vehicle, running: &Running, window: Window) -> Value {
+    /// `cut` tells whether the way is longer than the vehicle takes in one message.
+    fn message(&self, vehicle: &Vehicle, running: &Running, window: Window, cut: bool) -> Value {
         let sheet = vehicle.factsheet.as_ref();
         let lax = sheet.map(lax);
         let hurried = self.faults.has(F::R1RequiredNotInHorizon);
@@ -81,7 +83,15 @@ impl Site {
                 let stop = running.stops.get(index)?;
                 let without = hurried && index >= window.released || forgetful && index > window.first;
                 let sheet = if without { lax.as_ref() } else { sheet };
-                let mut node = self.node(sheet, stop, index, index < window.released);
+                let goal = index + 1 == running.stops.len();
+                let passed = index > 0 && !goal && stop.actions.is_empty();
+                let unlimited = (passed && self.faults.has(F::R4NegativeDeviationForNoLimit)).then(|| Stop {
+                    deviation_xy: Some(-1.0),
+                    ..stop.clone()
+                });
+                let reserved = goal && self.faults.has(F::R4ReleasesTheReservedStation);
+                let released = index < window.released || reserved;
+                let mut node = self.node(sheet, unlimited.as_ref().unwrap_or(stop), index, released);
                 node["sequenceId"] = json!(running.r1_number(2 * index));
                 if index == 0
                     && let Some(deviation) = stop.deviation_xy
@@ -97,7 +107,8 @@ impl Site {
         if self.faults.has(F::R2LoopReleasedById) {
             released_by_id(&mut nodes);
         }
-        let dangling = window.end < running.stops.len() && self.faults.has(F::R2DanglingEdge);
+        let dangling = self.faults.has(F::R2DanglingEdge) || (cut && self.faults.has(F::R4CutLeavesADanglingEdge));
+        let dangling = window.end < running.stops.len() && dangling;
         let last = window.end.saturating_sub(usize::from(!dangling));
         let incoming = window.first > 0 && self.faults.has(F::R3UpdateKeepsIncomingEdge);
         let edges: Vec<Value> = (window.first.saturating_sub(usize::from(incoming))..last)
@@ -283,6 +294,7 @@ impl Site {
         }
         let mut position = json!({ "x": stop.x, "y": stop.y });
         let theta = match stop.theta {
+            _ if self.takes(T::R4NoThetaOnNodes) => None,
             _ if self.takes(T::R1ThetaAtTheBound) => Some(json!(-std::f64::consts::PI)),
             theta if self.faults.has(F::R1ThetaUpToTwoPi) => {
                 let theta = theta.unwrap_or(-std::f64::consts::FRAC_PI_2);
@@ -337,6 +349,12 @@ impl Site {
         let length = distance((from.x, from.y), (to.x, to.y));
         let number = |value: Option<f64>| value.map(|value| json!(value));
         let corridor = leg.corridor.filter(|(left, right)| *left > 0.0 || *right > 0.0);
+        // To the left of one edge, and to the right of the next.
+        let shifted = |(left, right): (f64, f64)| match index % 2 {
+            _ if !self.faults.has(F::R4CorridorShiftsAtTheNode) => (left, right),
+            0 => (left + right, 0.0),
+            _ => (0.0, left + right),
+        };
         let curved = corridor.is_some() || self.faults.has(F::TrajectoryUnasked);
         let speed = leg.max_speed.filter(|_| !self.takes(T::R3SupportedSpeedLeftOut));
         let stated = self.takes(T::R3RotationAndLengthStated);
@@ -370,8 +388,8 @@ impl Site {
             ),
             (
                 "corridor",
-                corridor.map(|widths| self.corridor(widths)),
-                self.corridor((0.5, 0.5)),
+                corridor.map(|widths| self.corridor(shifted(widths))),
+                self.corridor(shifted((0.5, 0.5))),
             ),
         ];
         for (name, value, default) in fields {

@@ -105,6 +105,13 @@ impl Site {
             *next = next.wrapping_add(1);
         }
         let mut message = self.header(vehicle, name);
+        let other = self.r4_addressed.replace(vehicle.config.serial_number.clone());
+        if updates(name, body)
+            && self.faults.has(F::R4HeaderOfTheOtherVehicleInUpdates)
+            && let Some(other) = other
+        {
+            message.insert("serialNumber".into(), json!(other));
+        }
         if name == "order" && self.faults.has(F::R3HeaderIdIsUpdateId) {
             message.insert("headerId".into(), body["orderUpdateId"].clone());
         }
@@ -285,12 +292,22 @@ impl Site {
             },
         );
         if !(name == "instantActions" && sends(F::TimestampMissing)) {
-            header.insert("timestamp".into(), self.timestamp());
+            let mut time = self.timestamp();
+            if name == "instantActions"
+                && sends(F::R4InstantActionTimeWithoutZ)
+                && let Some(text) = time.as_str()
+            {
+                time = json!(text.trim_end_matches('Z'));
+            }
+            header.insert("timestamp".into(), time);
         }
         let version = &self.config.version;
         let version = version
             .rsplit_once('.')
-            .filter(|_| sends(F::VersionShort))
+            .filter(|_| {
+                let instant = name == "instantActions" && sends(F::R4InstantActionVersionTwoNumbers);
+                sends(F::VersionShort) || instant
+            })
             .map_or(version.as_str(), |(short, _)| short);
         if !(name == "order" && sends(F::VersionMissing)) {
             let letter = if name == "order" && sends(F::R1VersionWithLetter) {
@@ -316,6 +333,11 @@ impl Site {
             () if !sends(F::R3ManufacturerInOtherCase) => manufacturer,
             () if manufacturer.chars().any(char::is_lowercase) => manufacturer.to_uppercase(),
             () => manufacturer.to_lowercase(),
+        };
+        let manufacturer = if name == "instantActions" && sends(F::R4FleetNameInInstantActionHeader) {
+            self.config.name.clone()
+        } else {
+            manufacturer
         };
         header.insert("manufacturer".into(), json!(manufacturer));
         header.insert("serialNumber".into(), json!(serial));
@@ -357,7 +379,7 @@ impl Site {
         }
     }
 
-    /// `r2-connection-topic-cleared`: removes the retained message of a vehicle that is gone.
+    /// `r2-connection-topic-cleared` and `r4-clears-the-will`: removes the retained message of a vehicle that is gone.
     pub(super) fn r2_clear_connection(&mut self, vehicle: &Vehicle) {
         if let Some(topic) = vehicle.topic("connection").map(str::to_owned) {
             self.pending.push(Output::Publish(Publication {
@@ -394,6 +416,30 @@ impl Site {
                 retain: false,
             }));
         }
+    }
+
+    /// `r4-heartbeat-outside-the-protocol`: says every ten seconds that it is there, on a topic of its own.
+    pub(super) fn r4_beat(&mut self, vehicle: &mut Vehicle) {
+        if !self.takes(T::R4HeartbeatOutsideTheProtocol) {
+            return;
+        }
+        let now = self.now.moment;
+        let due = *self.r4_beat_at.get_or_insert(now);
+        if due > now {
+            vehicle.at(due);
+            return;
+        }
+        let next = now + Duration::from_secs(10);
+        self.r4_beat_at = Some(next);
+        vehicle.at(next);
+        self.pending.push(Output::Publish(Publication {
+            topic: format!("{}/alive", self.config.name),
+            payload: json!({ "alive": true, "at": self.timestamp() })
+                .to_string()
+                .into_bytes(),
+            qos: 0,
+            retain: false,
+        }));
     }
 
     /// `publishes-connection`: says for a vehicle that it is gone.

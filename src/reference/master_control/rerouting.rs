@@ -31,6 +31,15 @@ impl Site {
         }
         let mut transport = again(&running, vehicle.state.as_ref());
         to.clone_into(&mut transport.to);
+        let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
+        let midway = running.accepted && vehicle.cancel.is_none();
+        if paused && midway && self.faults.has(F::R4NewOrderWithoutCancelInPause) {
+            vehicle.last_order = Some(running);
+            vehicle.r1_hasty = true;
+            vehicle.queue.push_front(transport);
+            vehicle.at(self.now.moment);
+            return;
+        }
         vehicle.r1_blind = self.faults.has(F::R1RerouteOverBlockedEdge);
         if !running.is_whole() && self.faults.has(F::R1RerouteCutsBase) {
             let next = running.reached(vehicle.state.as_ref()) + 2;
@@ -75,6 +84,24 @@ impl Site {
             legs: Vec::new(),
         };
         let led = self.config.node(&here).is_some() && self.lead(vehicle, &mut way, &here, &transport).is_some();
+        if led && way.stops.len() == 1 && self.faults.has(F::R4ActionAddedToTheStitchingNode) {
+            let added = std::mem::take(&mut way.stops[0].actions);
+            if added.is_empty() {
+                return false;
+            }
+            running.stops.truncate(base);
+            running.legs.truncate(base.saturating_sub(1));
+            if let Some(end) = running.stops.last_mut() {
+                end.actions.extend(added);
+            }
+            running.transport = Transport {
+                begun: running.transport.begun,
+                loaded: running.transport.loaded,
+                ..transport
+            };
+            running.changed = true;
+            return true;
+        }
         // What is done at the end of the base is fixed; more cannot be done there.
         if !led || way.stops.len() < 2 || !way.stops[0].actions.is_empty() || !self.names_fit(vehicle, &way) {
             return false;
@@ -83,6 +110,8 @@ impl Site {
             running.r1_gap = Some((base, 2 * running.stops.len().saturating_sub(base)));
         }
         running.r1_rerouted = true;
+        running.r4_drops_horizon = self.takes(T::R4HorizonDeletedFirst);
+        running.r4_halt = None;
         running.stops.truncate(base);
         running.legs.truncate(base.saturating_sub(1));
         running.stops.extend(way.stops.into_iter().skip(1));
@@ -135,6 +164,8 @@ impl Site {
             let state = vehicle.state.as_ref();
             transport.r2_asked_at = state.map(|state| (state.last_node_id.clone(), state.agv_position.clone()));
         }
+        let later = self.takes(T::R4DispatchesAfterTwoSeconds);
+        transport.r4_due = later.then(|| self.now.moment + std::time::Duration::from_secs(2));
         if vehicle.queue.len() < MAX_QUEUE {
             vehicle.queue.push_back(transport);
             vehicle.at(self.now.moment);

@@ -32,6 +32,15 @@ macro_rules! tolerances {
 tolerances! {
     // Of blind rounds: the suites may still accuse or miss something with them.
     blind {
+R4NumbersWithExponent "r4-numbers-with-exponent" ["JSON-06", "JSON-09"] "It writes coordinates with an exponent, such as 1.05e1.";
+R4NoThetaOnNodes "r4-no-theta-on-nodes" ["ORD-MSG-09", "MAP-02"] "It sends no theta and leaves the orientation to the vehicle.";
+R4RequestsStateAndFactsheetWhenOnline "r4-requests-state-and-factsheet-when-online" ["IACT-01", "TOPIC-13"] "It sends stateRequest and factsheetRequest in one message each time a vehicle reports ONLINE.";
+R4DispatchesAfterTwoSeconds "r4-dispatches-after-two-seconds" ["TOPIC-13"] "It sends an order two seconds after the operator asked for it.";
+R4CancelsAfterTwoSeconds "r4-cancels-after-two-seconds" ["ORD-CANCEL-01", "TOPIC-13"] "It sends cancelOrder two seconds after the operator asked for it.";
+R4HorizonDeletedFirst "r4-horizon-deleted-first" ["ORD-UPD-03", "ORD-UPD-04"] "It deletes the horizon by one update and sends the new one by a second, when the destination is changed.";
+R4PauseSentTwice "r4-pause-sent-twice" ["ORD-MSG-17", "IACT-01"] "It sends startPause a second time, with its own actionId, while the first is not reported finished.";
+R4SecondLegAsUpdateOfTheCompletedOrder "r4-second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"] "It sends the way to the first station as an order without horizon and, when that is completed, the rest as an update that begins at the last node.";
+R4HeartbeatOutsideTheProtocol "r4-heartbeat-outside-the-protocol" ["TOPIC-01", "TOPIC-15"] "It publishes a heartbeat of its own on a topic outside the tree of the protocol.";
 R3VisualizationNotSubscribed "r3-visualization-not-subscribed" ["VIS-03", "TOPIC-14"] "It does not subscribe to visualization at all.";
 R3SubscribesTwice "r3-subscribes-twice" ["TOPIC-14"] "It subscribes to each topic both exactly and with wildcards, so that messages may come to it twice.";
 R3WholeSecondTimestamps "r3-whole-second-timestamps" ["HDR-03"] "Its clock has a resolution of a second: the two digits of the fraction are always zero.";

@@ -42,6 +42,8 @@ pub(super) struct Transport {
     pub(super) r1_follows: bool,
     /// Where the vehicle was when it was asked for (`r2-start-planned-too-early`).
     pub(super) r2_asked_at: Option<(String, Option<Position>)>,
+    /// It is not begun before (`r4-dispatches-after-two-seconds`).
+    pub(super) r4_due: Option<Moment>,
 }
 
 /// A node of the way that is driven.
@@ -121,6 +123,11 @@ pub(super) struct Running {
     pub(super) r3_answered: bool,
     /// The vehicle was paused with it.
     pub(super) r3_paused: bool,
+    /// Its horizon is to be deleted before the new one is sent (`r4-horizon-deleted-first`).
+    pub(super) r4_drops_horizon: bool,
+    /// Number of nodes the vehicle has to complete before more are sent
+    /// (`r4-second-leg-as-update-of-the-completed-order`).
+    pub(super) r4_halt: Option<usize>,
 }
 
 impl Running {
@@ -304,6 +311,16 @@ pub(super) struct Vehicle {
     pub(super) r3_charged: bool,
     /// The visualization shows it elsewhere than its state.
     pub(super) r3_aside: bool,
+    /// headerId of its last state (`r4-drops-states-with-low-header-id`).
+    pub(super) r4_state_header: Option<u64>,
+    /// It came back during the running order (`r4-whole-order-after-reconnect`).
+    pub(super) r4_returned: bool,
+    /// When its order is to be called off (`r4-cancels-after-two-seconds`).
+    pub(super) r4_cancel_at: Option<Moment>,
+    /// Where its newest visualization shows it (`r4-start-from-visualization`).
+    pub(super) r4_shown_at: Option<Position>,
+    /// headerId of its last connection message (`r4-old-will-ignored`).
+    pub(super) r4_connection_header: Option<u64>,
 }
 
 impl Vehicle {

@@ -18,6 +18,8 @@ const REACH: f64 = 0.3;
 const EXACT: f64 = 0.05;
 /// A vehicle this near to an edge is on it.
 const BESIDE: f64 = 0.5;
+/// How `r4-letters-in-the-temporary-node` begins the id of a temporary node.
+const TEMPORARY: &str = "tmp-";
 
 impl Site {
     /// The first node of a new order, and from which node of the layout the way goes on (ORD-03).
@@ -42,6 +44,12 @@ impl Site {
             state.last_node_id.clone_from(node);
             state.agv_position.clone_from(position);
         }
+        if let Some(shown) = &vehicle.r4_shown_at
+            && let Some((node, _)) = self.config.nearest(shown.x, shown.y, &shown.map_id)
+        {
+            state.last_node_id.clone_from(&node.id);
+            state.agv_position = Some(shown.clone());
+        }
         let last = self.config.node(&state.last_node_id);
         let alone = |node: &SiteNode| {
             let way = Way {
@@ -59,6 +67,13 @@ impl Site {
         let ended = vehicle.last_order.as_ref().and_then(|order| order.stops.last());
         if self.faults.has(F::R3GoalTakenForReached)
             && let Some(node) = ended.and_then(|stop| self.config.node(&stop.id))
+        {
+            return alone(node);
+        }
+        let called_off = vehicle.last_order.as_ref().filter(|_| vehicle.r1_cancelled);
+        let ahead = called_off.and_then(|order| order.stops.get(order.reached(Some(&state)) + 1));
+        if self.faults.has(F::R4StartAtTheNodeAheadAfterCancel)
+            && let Some(node) = ahead.and_then(|stop| self.config.node(&stop.id))
         {
             return alone(node);
         }
@@ -186,6 +201,9 @@ impl Site {
             "temporary".to_owned()
         } else if self.faults.has(F::R3TemporaryIdWithCoordinates) {
             format!("({:.2}, {:.2})", position.x, position.y)
+        } else if self.faults.has(F::R4LettersInTheTemporaryNode) {
+            self.ids += 1;
+            format!("{TEMPORARY}{}", self.ids)
         } else {
             self.next_id(vehicle, "place")
         };
@@ -329,7 +347,7 @@ impl Site {
             let rather = on_edge && self.takes(T::R1ActionsOnEdges) && room("edge.actions", leg.actions.len());
             led || rather
         }) {
-            leg.actions.push(self.action(vehicle, kind, given));
+            leg.actions.push(self.r4_hard(vehicle, kind, given));
             return;
         }
         if let Some(stop) = way
@@ -337,7 +355,7 @@ impl Site {
             .last_mut()
             .filter(|stop| on_node && room("node.actions", stop.actions.len()))
         {
-            let mut action = self.action(vehicle, kind, given);
+            let mut action = self.r4_hard(vehicle, kind, given);
             let listed = sheet.and_then(|sheet| sheet.actions.as_ref()?.get(kind)?.blocking_types.as_ref());
             let nothing = listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE"));
             if nothing && !is_predefined(kind) && self.takes(T::R3VendorActionsBlockNothing) {
@@ -352,8 +370,17 @@ impl Site {
             .last_mut()
             .filter(|leg| on_edge && room("edge.actions", leg.actions.len()))
         {
-            leg.actions.push(self.action(vehicle, kind, given));
+            leg.actions.push(self.r4_hard(vehicle, kind, given));
         }
+    }
+
+    /// An action for an order; HARD whatever the vehicle lists (`r4-hard-although-not-listed`).
+    fn r4_hard(&mut self, vehicle: &Vehicle, kind: &str, given: &Value) -> Value {
+        let mut action = self.action(vehicle, kind, given);
+        if self.faults.has(F::R4HardAlthoughNotListed) {
+            action["blockingType"] = json!("HARD");
+        }
+        action
     }
 
     /// Whether the vehicle takes the ids of a way (FACT-12).
@@ -364,8 +391,11 @@ impl Site {
             .filter(|_| !self.faults.has(F::IdLimitIgnored))
             .unwrap_or(usize::MAX);
         let digits = sheet.ids_numerical && !self.faults.has(F::NumericalIdsIgnored);
-        let fits =
-            |id: &str| id.chars().count() <= longest && (!digits || id.chars().all(|letter| letter.is_ascii_digit()));
+        let heedless = |id: &str| self.faults.has(F::R4LettersInTheTemporaryNode) && id.starts_with(TEMPORARY);
+        let digits = |id: &str| digits && !heedless(id);
+        let fits = |id: &str| {
+            id.chars().count() <= longest && (!digits(id) || id.chars().all(|letter| letter.is_ascii_digit()))
+        };
         let nodes = way.stops.iter().map(|stop| stop.id.as_str());
         nodes.chain(way.legs.iter().map(|leg| leg.id.as_str())).all(fits)
     }

@@ -12,6 +12,9 @@ const NAN: &str = "@NaN@";
 /// Stands for a number beyond all numbers.
 const INFINITE: &str = "@Infinite@";
 
+/// Stands around a number that is written with an exponent.
+const EXPONENT: &str = "@Exponent@";
+
 /// Applies what changes the content of a message.
 pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, message: &mut Value) {
     if name == "order" {
@@ -68,6 +71,9 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
     {
         message = Value::Object(members.iter().rev().map(|(k, v)| (k.clone(), v.clone())).collect());
     }
+    if tolerances.has(T::R4NumbersWithExponent) {
+        mark_coordinates(&mut message);
+    }
     let mut text = if tolerances.has(T::PrettyPrinted) {
         serde_json::to_vec_pretty(&message).unwrap_or_default()
     } else {
@@ -78,6 +84,13 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
     }
     if tolerances.has(T::R1BlankLinesAround) {
         text = [b"\r\n ".as_slice(), &text, b"\r\n"].concat();
+    }
+    if tolerances.has(T::R4NumbersWithExponent) {
+        let plain = String::from_utf8_lossy(&text);
+        text = plain
+            .replace(&format!("\"{EXPONENT}"), "")
+            .replace(&format!("{EXPONENT}\""), "")
+            .into_bytes();
     }
     if faults.has(F::R1HorizonSpeedInfinite) {
         let token = format!("\"{INFINITE}\"");
@@ -99,6 +112,22 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
         text = [b"\xef\xbb\xbf".as_slice(), &text].concat();
     }
     text
+}
+
+/// `r4-numbers-with-exponent`: marks x and y, so that they are written with an exponent.
+fn mark_coordinates(value: &mut Value) {
+    match value {
+        Value::Object(members) => {
+            for (key, member) in members.iter_mut() {
+                match member.as_f64().filter(|_| matches!(key.as_str(), "x" | "y")) {
+                    Some(number) => *member = json!(format!("{EXPONENT}{number:e}{EXPONENT}")),
+                    None => mark_coordinates(member),
+                }
+            }
+        }
+        Value::Array(elements) => elements.iter_mut().for_each(mark_coordinates),
+        _ => {}
+    }
 }
 
 /// The members of all objects in the opposite order.
@@ -161,6 +190,12 @@ fn order(faults: Faults, message: &mut Value) {
         self::edge(faults, edge);
     }
     let alone = message["edges"].as_array().is_some_and(Vec::is_empty);
+    if alone && faults.has(F::R4OneNodeOrderWithoutEdges) {
+        remove(message, "edges");
+    }
+    if update && faults.has(F::R4NoLhdInUpdates) {
+        without_devices(message);
+    }
     if alone && faults.has(F::R2EdgesNullInStay) {
         message["edges"] = Value::Null;
     }
@@ -182,6 +217,20 @@ fn order(faults: Faults, message: &mut Value) {
             }
         }
         without_empty(message);
+    }
+}
+
+/// `r4-no-lhd-in-updates`: no device for what is picked behind the stitching node.
+fn without_devices(message: &mut Value) {
+    for key in ["nodes", "edges"] {
+        for element in elements(message, key).skip(usize::from(key == "nodes")) {
+            let picks = elements(element, "actions").filter(|action| action["actionType"] == "pick");
+            for pick in picks {
+                if let Some(parameters) = pick.get_mut("actionParameters").and_then(Value::as_array_mut) {
+                    parameters.retain(|parameter| parameter["key"] != "lhd");
+                }
+            }
+        }
     }
 }
 
@@ -223,7 +272,7 @@ fn identity(faults: Faults, update: bool, message: &mut Value) {
     if faults.has(F::R3ZoneSetNamedNone) && message.get("zoneSetId").is_none() {
         message["zoneSetId"] = json!("none");
     }
-    if faults.has(F::ZoneSetEmpty) {
+    if faults.has(F::ZoneSetEmpty) || (update && faults.has(F::R4EmptyZoneSet)) {
         message["zoneSetId"] = json!("");
     }
 }
@@ -350,6 +399,9 @@ fn node(faults: Faults, node: &mut Value) {
     let stops = !node["actions"].as_array().is_none_or(Vec::is_empty);
     if planned && stops && faults.has(F::R1StationsAlwaysReleased) {
         node["released"] = json!(true);
+    }
+    if planned && !stops && faults.has(F::R4NoActionListInTheHorizon) {
+        remove(node, "actions");
     }
     if planned && faults.has(F::R1HorizonWithoutPosition) {
         remove(node, "nodePosition");

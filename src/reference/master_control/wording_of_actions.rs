@@ -26,6 +26,12 @@ pub(super) fn action(faults: Faults, name: &str, action: &mut Value) {
     if name == "instantActions" && faults.has(F::R1InstantWithoutBlockingType) {
         remove(action, "blockingType");
     }
+    if matches!(kind.as_str(), "startPause" | "stopPause")
+        && name == "instantActions"
+        && faults.has(F::R4InstantActionsWithoutBlockingType)
+    {
+        remove(action, "blockingType");
+    }
     if name == "order"
         && faults.has(F::R1ActionIdKeyUpperCase)
         && let Some(id) = remove(action, "actionId")
@@ -52,6 +58,10 @@ pub(super) fn action(faults: Faults, name: &str, action: &mut Value) {
                 parameters.retain(|parameter| parameter["key"] != json!(key));
             }
         }
+        let known = parameters.iter().any(|parameter| parameter["key"] == "loadId");
+        if kind == "pick" && !known && faults.has(F::R4NullForUnknownLoadId) {
+            parameters.push(json!({ "key": "loadId", "value": null }));
+        }
         for parameter in parameters.iter_mut() {
             self::parameter(faults, &kind, parameter);
         }
@@ -64,7 +74,8 @@ pub(super) fn action(faults: Faults, name: &str, action: &mut Value) {
                 *parameter = Value::Object(Map::from_iter([(key, parameter["value"].clone())]));
             }
         }
-        if faults.has(F::ParametersAsObject) {
+        let one = kind == "downloadMap" && faults.has(F::R4MapParametersAsObject);
+        if one || faults.has(F::ParametersAsObject) {
             let members = parameters.iter().filter_map(|parameter| {
                 let key = parameter["key"].as_str()?;
                 Some((key.to_owned(), parameter["value"].clone()))
@@ -165,6 +176,14 @@ pub(super) fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
         && let Some(number) = parameter["value"].as_f64()
     {
         parameter["value"] = json!(number.to_string());
+    }
+    if key == "mapVersion"
+        && faults.has(F::R4MapVersionAsNumber)
+        && let Some(number) = parameter["value"]
+            .as_str()
+            .and_then(|text| text.parse::<serde_json::Number>().ok())
+    {
+        parameter["value"] = json!(number);
     }
     if faults.has(F::DeviceUnknown) && key == "lhd" {
         parameter["value"] = json!("1");
