@@ -16,7 +16,8 @@ pub(in crate::checks) const CORRIDORS: Check = Check {
     doc: "A corridor has a left and a right width of at least 0, not both 0, and a reference point the protocol knows. It \
           comes with a trajectory, unless the vehicle is bound to lines or reports trajectories of its own. Where two \
           corridors meet, the end of the first way lies inside the second corridor; a node that allows a wider \
-          deviation than the second corridor, or than both sides of it together, is a warning.",
+          deviation than the second corridor, or than both sides of it together, is a warning, and so are two corridors \
+          of which one lies to the left only and the other to the right only.",
     arguments: &[],
     start: |_| Box::new(Corridors::default()),
 };
@@ -140,6 +141,14 @@ fn meeting(pair: &[&Value], around: &[&Value], found: &mut Found<'_>) {
             beside.distance - room
         );
         found.broken("CORR-04", text);
+        return;
+    }
+    // Beside each other, with nothing but the line in common.
+    let apart = (before_left > ROUNDING && before_right <= 0.0 && left <= 0.0 && right > ROUNDING)
+        || (before_right > ROUNDING && before_left <= 0.0 && right <= 0.0 && left > ROUNDING);
+    if apart {
+        let text = format!("at node {id} one corridor lies to the left only, and the other to the right only");
+        found.remark("CORR-04", text);
         return;
     }
     let allowed = node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64);

@@ -94,6 +94,8 @@ struct Follow {
     vehicle: Vehicle,
     /// Oldest first; the one sent last is at the end.
     orders: VecDeque<Order>,
+    /// The order the vehicle had when it went away; it counts again when a state shows it unchanged.
+    parked: Option<Order>,
     /// Numbers and contents of what was sent before the link was disturbed, by orderId.
     numbers: BTreeMap<String, Vec<(u64, u64)>>,
 }
@@ -164,7 +166,20 @@ impl Follow {
             traffic: Traffic::default(),
             vehicle: Vehicle::default(),
             orders: VecDeque::new(),
+            parked: None,
             numbers: BTreeMap::new(),
+        }
+    }
+
+    /// The vehicle is back, and says that it has the order it had: so where an update begins is known.
+    fn taken_up_again(&mut self) {
+        let Some(seen) = self.vehicle.last() else { return };
+        let Some(parked) = self.parked.take_if(|_| self.orders.is_empty()) else {
+            self.parked = None;
+            return;
+        };
+        if !seen.is_idle() && seen.order == parked.id && Some(seen.update) == parked.newest() {
+            self.orders.push_back(Order { done: false, ..parked });
         }
     }
 
@@ -489,10 +504,19 @@ impl Running for Follow {
                     if link {
                         self.interrupted();
                     }
+                    match entry.event() {
+                        Event::Vehicle { what, .. } if matches!(what.as_str(), "break-off" | "shutdown" | "start") => {
+                            self.parked = self.orders.pop_back().or(self.parked.take());
+                        }
+                        _ => self.parked = None,
+                    }
                     self.orders.clear();
                 }
             }
             Outside::Deviates | Outside::No => {}
+        }
+        if self.parked.is_some() && super::said("state", entry, context).is_some() {
+            self.taken_up_again();
         }
         if let Some(seen) = self
             .vehicle

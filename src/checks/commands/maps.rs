@@ -36,7 +36,7 @@ pub(in crate::checks) const ON_BOARD: Check = Check {
 pub(in crate::checks) const DOWNLOADS: Check = Check {
     name: "commands/map-download",
     decides: &["MAP-16"],
-    doc: "downloadMap names mapId and mapDownloadLink; without mapVersion it is a warning.",
+    doc: "downloadMap names mapId and mapDownloadLink; without mapVersion it is a warning, and so is a link without a host.",
     arguments: &[],
     start: |_| Each::start(download),
 };
@@ -73,11 +73,27 @@ fn download(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -
                 found.broken("MAP-16", format!("{key} of downloadMap is {shown}"));
             }
         }
+        if let Some(link) = parameter(action, "mapDownloadLink").and_then(Value::as_str)
+            && !link.is_empty()
+            && !is_remote(link)
+        {
+            let text = format!("mapDownloadLink {} names no host the vehicle could ask", show(&link.into()));
+            found.remark("MAP-16", text);
+        }
         if parameter(action, "mapVersion").is_none() {
             found.remark("MAP-16", "mapVersion of downloadMap is missing");
         }
     }
     judged
+}
+
+/// Whether a link leads to another machine: a scheme other than that of files, and a host.
+fn is_remote(link: &str) -> bool {
+    let Some((scheme, rest)) = link.split_once("://") else {
+        return false;
+    };
+    let is_scheme = scheme.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+-.".contains(&byte));
+    !scheme.is_empty() && is_scheme && !scheme.eq_ignore_ascii_case("file") && !rest.starts_with('/') && !rest.is_empty()
 }
 
 /// mapId and mapVersion of an action on maps.

@@ -162,6 +162,7 @@ impl Agv {
             self.pending.push(Output::Drop);
         }
         self.connection.dropped(moment + self.config.reconnect_delay);
+        self.connection.count_anew();
     }
 
     /// The button that waitForTrigger waits for; it serves all of them unless one is named.

@@ -74,6 +74,11 @@ impl Connection {
         self.attempt_at = None;
     }
 
+    /// Nobody remembers the headerIds: it was switched off.
+    pub(super) fn count_anew(&mut self) {
+        self.header_ids.clear();
+    }
+
     /// `r3-header-id-counts-orders`: counts a message that is not sent.
     pub(super) fn skip_header_id(&mut self) {
         if let Some(next) = self.header_ids.get_mut("state") {

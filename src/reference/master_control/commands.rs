@@ -86,7 +86,8 @@ impl Site {
             }
             "cancel" if vehicle.running.is_some() && self.takes(T::R4CancelsAfterTwoSeconds) => {
                 let due = self.now.moment + std::time::Duration::from_secs(2);
-                vehicle.r4_cancel_at.get_or_insert(due);
+                let order = vehicle.running.as_ref().map(|running| running.id.clone());
+                vehicle.r4_cancel_at = order.map(|order| (due, order));
             }
             "cancel" => self.call_off(vehicle),
             "pause" => {
@@ -227,11 +228,13 @@ impl Site {
 
     /// `r4-cancels-after-two-seconds`: calls off what was to be called off a while ago.
     pub(super) fn r4_call_off(&mut self, vehicle: &mut Vehicle) {
-        match vehicle.r4_cancel_at {
-            Some(due) if due > self.now.moment => vehicle.at(due),
-            Some(_) => {
-                vehicle.r4_cancel_at = None;
-                if vehicle.running.is_some() {
+        match vehicle.r4_cancel_at.take() {
+            Some((due, order)) if due > self.now.moment => {
+                vehicle.at(due);
+                vehicle.r4_cancel_at = Some((due, order));
+            }
+            Some((_, order)) => {
+                if vehicle.running.as_ref().is_some_and(|running| running.id == order) {
                     self.call_off(vehicle);
                 }
             }

@@ -315,8 +315,8 @@ pub(super) struct Vehicle {
     pub(super) r4_state_header: Option<u64>,
     /// It came back during the running order (`r4-whole-order-after-reconnect`).
     pub(super) r4_returned: bool,
-    /// When its order is to be called off (`r4-cancels-after-two-seconds`).
-    pub(super) r4_cancel_at: Option<Moment>,
+    /// When an order is to be called off, and which (`r4-cancels-after-two-seconds`).
+    pub(super) r4_cancel_at: Option<(Moment, String)>,
     /// Where its newest visualization shows it (`r4-start-from-visualization`).
     pub(super) r4_shown_at: Option<Position>,
     /// headerId of its last connection message (`r4-old-will-ignored`).
