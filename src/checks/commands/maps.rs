@@ -45,8 +45,8 @@ pub(in crate::checks) const DOWNLOADS: Check = Check {
 pub(in crate::checks) const DUPLICATES: Check = Check {
     name: "commands/map-duplicate",
     decides: &["MAP-28"],
-    doc: "When a downloadMap has failed for a map version the vehicle already lists, deleteMap for it comes before the \
-          next downloadMap for it. With `settled`, a download that follows the refusal at once is judged as well.",
+    doc: "When a downloadMap has failed for a map version the vehicle already lists, deleteMap for it has to come, and not \
+          to fail, before the next downloadMap for it. With `settled`, a download that follows the refusal at once is judged as well.",
     arguments: &["settled"],
     start: |context| {
         Box::new(Duplicates {
@@ -249,6 +249,8 @@ struct Duplicates {
     sent: BTreeSet<String>,
     /// Pairs that were refused as duplicates, since when, and not deleted since.
     refused: BTreeMap<(String, String), Moment>,
+    /// Deletions of such pairs by actionId: when one fails, the pair is as it was.
+    deleted: BTreeMap<String, (String, String)>,
 }
 
 impl Duplicates {
@@ -262,8 +264,9 @@ impl Duplicates {
             if text(action, "actionStatus") != "FAILED" {
                 continue;
             }
-            // Each download is looked at once.
-            if let Some(pair) = self.asked.remove(text(action, "actionId"))
+            // Each action is looked at once.
+            let id = text(action, "actionId");
+            if let Some(pair) = self.asked.remove(id).or_else(|| self.deleted.remove(id))
                 && has(&pair)
             {
                 self.refused.insert(pair, at);
@@ -278,6 +281,7 @@ impl Running for Duplicates {
         if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
             self.asked.clear();
             self.refused.clear();
+            self.deleted.clear();
         }
         if let Some(state) = said("state", entry, context) {
             self.note_state(state, entry.at().moment);
@@ -290,7 +294,13 @@ impl Running for Duplicates {
         for (_, action) in command.actions() {
             let Some(pair) = pair(action) else { continue };
             match text(action, "actionType") {
-                "deleteMap" => judged |= self.refused.remove(&pair).is_some(),
+                "deleteMap" => {
+                    judged |= self.refused.remove(&pair).is_some();
+                    if self.deleted.len() < KEPT {
+                        let id = short(action, "actionId").unwrap_or_default();
+                        self.deleted.insert(id, pair);
+                    }
+                }
                 "downloadMap" => {
                     let id = short(action, "actionId").unwrap_or_default();
                     if self.sent.len() == KEPT {

@@ -231,7 +231,7 @@ impl Agv {
             {
                 return unable("the action is not possible here", &request.path);
             }
-            let found = action_kinds::refusal(kind, request, true)
+            let found = action_kinds::refusal(kind, request, &self.config, true)
                 .filter(|(_, reason)| !(reason.ends_with("missing") && self.faults.has(F::R1MissingParameterTaken)))
                 .filter(|_| !self.faults.has(F::ParametersUnchecked));
             if let Some((key, reason)) = found {

@@ -326,7 +326,12 @@ pub(super) fn find(config: &AgvConfig, name: &str) -> Option<&'static ActionKind
 }
 
 /// Why an action cannot be performed as asked; a path or key and a reason.
-pub(super) fn refusal(kind: &ActionKind, request: &ActionRequest, strict: bool) -> Option<(String, &'static str)> {
+pub(super) fn refusal(
+    kind: &ActionKind,
+    request: &ActionRequest,
+    config: &AgvConfig,
+    strict: bool,
+) -> Option<(String, &'static str)> {
     for parameter in kind.parameters {
         match request.parameter(parameter.key) {
             None if parameter.optional => {}
@@ -362,7 +367,7 @@ pub(super) fn refusal(kind: &ActionKind, request: &ActionRequest, strict: bool) 
         }
         if request
             .parameter("lhd")
-            .is_some_and(|lhd| !LOAD_POSITIONS.iter().any(|name| lhd == name))
+            .is_some_and(|lhd| !config.load_positions.iter().any(|name| lhd == name))
         {
             return Some(("lhd".to_owned(), "is no load handling device of the vehicle"));
         }

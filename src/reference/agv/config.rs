@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use super::action_kinds::LOAD_POSITIONS;
 use super::instant::MAX_INSTANT_ACTIONS;
 use super::read::MAX_STRING;
 use super::tolerances::Tolerances;
@@ -212,6 +213,8 @@ pub struct AgvConfig {
     pub max_instant_actions: usize,
     /// Most characters of an id.
     pub max_id: usize,
+    /// Names of its load handling devices (loadSpecification.loadPositions).
+    pub load_positions: Vec<String>,
     /// Largest message in bytes.
     pub max_message: usize,
     /// The liberties it takes; see [`AgvConfig::tolerate`].
@@ -293,6 +296,7 @@ impl Default for AgvConfig {
             max_actions: 20,
             max_instant_actions: MAX_INSTANT_ACTIONS,
             max_id: MAX_STRING,
+            load_positions: LOAD_POSITIONS.map(str::to_owned).to_vec(),
             max_message: 1 << 20,
             tolerances: Tolerances::default(),
         }

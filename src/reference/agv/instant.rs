@@ -138,7 +138,7 @@ impl Agv {
                 let nodeless = kind.deed == action_kinds::Deed::InitPosition
                     && request.parameter("lastNodeId").is_none()
                     && self.faults.has(F::R2InitPositionWithoutNodeTaken);
-                let found = action_kinds::refusal(kind, &request, false);
+                let found = action_kinds::refusal(kind, &request, &self.config, false);
                 let found = found.filter(|(key, _)| !(nodeless && key == "lastNodeId"));
                 found.map(|(key, reason)| format!("{key}: {reason}"))
             }

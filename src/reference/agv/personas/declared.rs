@@ -114,6 +114,10 @@ fn follow(config: &mut AgvConfig, patch: &Value, told: &Value) {
         let has = |name: &str| listed.iter().any(|one| one["parameter"] == name);
         config.trajectories |= has("order.edges.trajectory") || has("order.edges.corridor");
     }
+    if let Some(positions) = patch["loadSpecification"]["loadPositions"].as_array() {
+        let names = positions.iter().filter_map(Value::as_str).take(16);
+        config.load_positions = names.map(str::to_owned).collect();
+    }
     let body = &patch["physicalParameters"];
     let positive = |value: &Value| value.as_f64().filter(|number| *number > 0.0);
     config.speed = positive(&body["speedMax"]).unwrap_or(config.speed);
