@@ -81,6 +81,16 @@ impl Connection {
         }
     }
 
+    /// Whether it was online before.
+    pub(super) fn was_online(&self) -> bool {
+        self.returning
+    }
+
+    /// `r4-header-id-restarts-with-order`: counts its states from 0 again.
+    pub(super) fn restart_header_id(&mut self) {
+        self.header_ids.insert("state", 0);
+    }
+
     /// Somebody wants the vehicle connected.
     pub(super) fn wanted_at(&mut self, moment: Moment) {
         if !self.online {
@@ -144,6 +154,8 @@ impl Agv {
         };
         let wanted: &[&str] = if self.connection.returning && self.faults.has(F::NotSubscribedAgain) {
             &[]
+        } else if self.connection.returning && self.faults.has(F::R4ReconnectWithoutOrders) {
+            &["instantActions"]
         } else if self.faults.has(F::InstantActionsNotSubscribed)
             || (self.connection.returning && self.faults.has(F::R1InstantActionsNotSubscribedAgain))
         {
@@ -233,6 +245,14 @@ impl Agv {
         if !on_request && !before && !after {
             self.publish_factsheet();
         }
+        for (timestamp, mut body) in std::mem::take(&mut self.fourth.buffered) {
+            // What the body says goes before the header.
+            body.insert("timestamp".into(), json!(timestamp));
+            self.publish("state", body, &[]);
+        }
+        if !first && self.faults.has(F::R4ReconnectRelistsTraversedNodes) {
+            self.relist_nodes();
+        }
         self.start_reporting(first);
         if !on_request && after {
             self.flush();
@@ -264,6 +284,7 @@ impl Agv {
             self.actions.retain(|action| !action.status.is_terminal());
         }
         self.book.cut = true;
+        self.fourth.before_cut = self.book.nodes.clone();
         if self.faults.has(F::R3RunningActionsFailWithLink) {
             let of_order = self.actions.iter_mut().filter(|action| action.of_order());
             of_order
@@ -547,6 +568,12 @@ impl Agv {
             () if self.takes(T::SecondsWhole) => format!("{utc:.0}"),
             () if self.takes(T::SecondsFine) => format!("{utc:.6}"),
             () => format!("{utc:.2}"),
+        };
+        let text = match text.strip_suffix('Z') {
+            Some(digits) if text.contains('.') && self.faults.has(F::R4TimestampTrailingZerosTrimmed) => {
+                format!("{}Z", digits.trim_end_matches('0').trim_end_matches('.'))
+            }
+            _ => text,
         };
         match () {
             () if self.faults.has(F::TimestampLocal) => {

@@ -175,6 +175,9 @@ impl Agv {
     pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
         let stuck = self.faults.has(F::InstantActionStuck);
         let requests_stay = self.faults.has(F::StateRequestStuck);
+        let of_node = |action: &Action| matches!(action.origin, Origin::Node(_));
+        let ended = self.holds.pause && self.actions.get(id).is_some_and(of_node);
+        self.book.heedless |= ended && self.faults.has(F::R4PauseForgottenAfterNodeAction);
         let late = self.takes(T::R3DrivesOnLate) && !self.book.nodes.is_empty();
         let stops = |action: &Action| action.of_order() && action.request.blocking != Blocking::None;
         if late && self.actions.get(id).is_some_and(stops) {
@@ -277,6 +280,10 @@ impl Agv {
                 if self.maps.is_enabled(id, version) && self.faults.has(F::R3EnableTwiceFails) {
                     return Outcome::Failed(Problem::map(action, "the map is enabled already"));
                 }
+                if busy && known && self.faults.has(F::R4MapEnabledDuringDriveChangesNothingUntilIdle) {
+                    self.fourth.enables = Some((id.to_owned(), version.to_owned()));
+                    return Outcome::Done(None);
+                }
                 if busy && self.maps.has_version(id, version) && self.faults.has(F::R2EnableIgnoredMidOrder) {
                     return Outcome::Done(None);
                 }
@@ -347,7 +354,9 @@ impl Agv {
 
     /// Whether the name of a log is in the information instead of the result of its action.
     pub(super) fn tells_logs(&self) -> bool {
-        self.takes(T::R2LogNameInInformation) && !self.takes(T::R1InformationOmitted)
+        self.takes(T::R2LogNameInInformation)
+            && !self.takes(T::R1InformationOmitted)
+            && !self.takes(T::R4OptionalStateFieldsLeftOut)
     }
 
     /// Whether a switch forbids what a message asks for (ACT-16).
@@ -356,11 +365,16 @@ impl Agv {
     }
 
     fn start_pause(&mut self, action: &Action) -> Outcome {
+        self.end_braking();
         if self.is_pause_blocked() {
             if self.faults.has(F::BlockedPauseTaken) {
                 self.set_holds(|holds| holds.pause = true);
             }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
+        }
+        let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
+        if idle && self.faults.has(F::R4PauseFailsWithoutOrder) {
+            return Outcome::Failed(Problem::unable(action, "there is no order to pause"));
         }
         self.pauses += u32::from(self.faults.has(F::PausesCounted));
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
@@ -473,6 +487,10 @@ impl Agv {
             self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
         }
         self.third.charging_at = None;
+        if self.charging && self.faults.has(F::R4StopChargingFlagLate) {
+            self.fourth.uncharged_at = Some(self.moment() + Duration::from_secs(3));
+            return Ok(());
+        }
         let toggled = !self.charging && self.faults.has(F::ChargingEndToggled);
         if action.of_order() && self.faults.has(F::R1NodeStopChargingUnreported) {
             return Ok(());
@@ -527,7 +545,9 @@ impl Agv {
         }
         self.lost = self.faults.has(F::InitPositionUninitialized);
         self.persona.lost = false;
-        self.maps.enable_any(map_id);
+        if !self.faults.has(F::R4InitPositionOntoDisabledMap) {
+            self.maps.enable_any(map_id);
+        }
         if self.faults.has(F::R1InitPositionEnablesAll) {
             self.maps.enable_all(map_id);
         }
@@ -575,7 +595,9 @@ impl Agv {
         let ahead = !self.faults.has(F::R1MapOfOrderDeleted);
         let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
         let free = idle && self.faults.has(F::R2CurrentMapDeletedWhenIdle);
-        let used = |map_id: &str| here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
+        let kept = self.takes(T::R4EnabledUnusedMapNotDeleted);
+        let used =
+            |map_id: &str| kept || here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
         let result = self
             .maps
             .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);
