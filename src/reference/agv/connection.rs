@@ -245,14 +245,8 @@ impl Agv {
         if !on_request && !before && !after {
             self.publish_factsheet();
         }
-        for (timestamp, mut body) in std::mem::take(&mut self.fourth.buffered) {
-            // What the body says goes before the header.
-            body.insert("timestamp".into(), json!(timestamp));
-            self.publish("state", body, &[]);
-        }
-        if !first && self.faults.has(F::R4ReconnectRelistsTraversedNodes) {
-            self.relist_nodes();
-        }
+        self.replay_buffer();
+        self.relist_nodes(first);
         self.start_reporting(first);
         if !on_request && after {
             self.flush();
@@ -569,12 +563,7 @@ impl Agv {
             () if self.takes(T::SecondsFine) => format!("{utc:.6}"),
             () => format!("{utc:.2}"),
         };
-        let text = match text.strip_suffix('Z') {
-            Some(digits) if text.contains('.') && self.faults.has(F::R4TimestampTrailingZerosTrimmed) => {
-                format!("{}Z", digits.trim_end_matches('0').trim_end_matches('.'))
-            }
-            _ => text,
-        };
+        let text = self.without_zeros(text);
         match () {
             () if self.faults.has(F::TimestampLocal) => {
                 let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);

@@ -175,9 +175,7 @@ impl Agv {
     pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
         let stuck = self.faults.has(F::InstantActionStuck);
         let requests_stay = self.faults.has(F::StateRequestStuck);
-        let of_node = |action: &Action| matches!(action.origin, Origin::Node(_));
-        let ended = self.holds.pause && self.actions.get(id).is_some_and(of_node);
-        self.book.heedless |= ended && self.faults.has(F::R4PauseForgottenAfterNodeAction);
+        self.forget_pause_after(id);
         let late = self.takes(T::R3DrivesOnLate) && !self.book.nodes.is_empty();
         let stops = |action: &Action| action.of_order() && action.request.blocking != Blocking::None;
         if late && self.actions.get(id).is_some_and(stops) {
@@ -280,8 +278,7 @@ impl Agv {
                 if self.maps.is_enabled(id, version) && self.faults.has(F::R3EnableTwiceFails) {
                     return Outcome::Failed(Problem::map(action, "the map is enabled already"));
                 }
-                if busy && known && self.faults.has(F::R4MapEnabledDuringDriveChangesNothingUntilIdle) {
-                    self.fourth.enables = Some((id.to_owned(), version.to_owned()));
+                if busy && known && self.enables_later(id, version) {
                     return Outcome::Done(None);
                 }
                 if busy && self.maps.has_version(id, version) && self.faults.has(F::R2EnableIgnoredMidOrder) {
@@ -372,8 +369,7 @@ impl Agv {
             }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
         }
-        let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
-        if idle && self.faults.has(F::R4PauseFailsWithoutOrder) {
+        if self.has_nothing_to_pause() {
             return Outcome::Failed(Problem::unable(action, "there is no order to pause"));
         }
         self.pauses += u32::from(self.faults.has(F::PausesCounted));
@@ -471,54 +467,6 @@ impl Agv {
             (true, false) => self.actions.resume(moment, self.faults),
             _ => {}
         }
-    }
-
-    /// What does not charge has nothing to end (ACT-11); what cannot be ended has failed (ACT-20).
-    fn stop_charging(&mut self, action: &Action) -> Result<(), Problem> {
-        if self.charging && self.charger_locked {
-            if self.faults.has(F::ChargingEndFailureFinished) {
-                return Ok(());
-            }
-            self.charging = !self.faults.has(F::ChargingEndShownAnyway);
-            let problem = Problem::new(Area::Charging, action, "the vehicle cannot leave the charger");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
-        }
-        if self.charging && self.faults.has(F::ChargingEndsEarly) {
-            self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
-        }
-        self.third.charging_at = None;
-        if self.charging && self.faults.has(F::R4StopChargingFlagLate) {
-            self.fourth.uncharged_at = Some(self.moment() + Duration::from_secs(3));
-            return Ok(());
-        }
-        let toggled = !self.charging && self.faults.has(F::ChargingEndToggled);
-        if action.of_order() && self.faults.has(F::R1NodeStopChargingUnreported) {
-            return Ok(());
-        }
-        self.charging = toggled || self.charging && self.faults.has(F::ChargingEndUnreported);
-        Ok(())
-    }
-
-    /// The charger is at a node: there is none where the vehicle drives (ACT-20).
-    fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
-        if self.motion.is_moving() || !self.config.chargers.contains(&self.book.last_node) {
-            if self.faults.has(F::ChargingFailureFinished) {
-                return Ok(());
-            }
-            self.charging |= self.faults.has(F::ChargingShownAnyway);
-            let problem = Problem::new(Area::Charging, action, "the vehicle is not at a charger");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
-        }
-        if self.charging && self.faults.has(F::ChargingTwiceFails) {
-            return Err(Problem::new(Area::Charging, action, "the vehicle charges already"));
-        }
-        if !self.charging && self.faults.has(F::R3ChargingReportedLate) {
-            self.third.charging_at = Some(self.moment() + Duration::from_secs(2));
-            return Ok(());
-        }
-        let toggled = self.charging && self.faults.has(F::ChargingToggled);
-        self.charging = !toggled && !self.faults.has(F::ChargingUnreported);
-        Ok(())
     }
 
     fn init_position(&mut self, action: &Action) -> Result<(), Problem> {

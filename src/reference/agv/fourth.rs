@@ -40,7 +40,7 @@ pub(super) struct Fourth {
     /// When it shows that it does not charge any more.
     pub(super) uncharged_at: Option<Moment>,
     /// mapId and mapVersion of a map that is enabled when the order has ended.
-    pub(super) enables: Option<(String, String)>,
+    enables: Option<(String, String)>,
     /// States that could not be sent, and the timestamp of each.
     pub(super) buffered: Vec<(String, Map<String, Value>)>,
     /// What was still to be traversed when the link broke.
@@ -216,6 +216,56 @@ impl Agv {
         }
     }
 
+    /// Whether a map is only enabled when the order has ended.
+    pub(super) fn enables_later(&mut self, map_id: &str, version: &str) -> bool {
+        let later = self.faults.has(F::R4MapEnabledDuringDriveChangesNothingUntilIdle);
+        if later {
+            self.fourth.enables = Some((map_id.to_owned(), version.to_owned()));
+        }
+        later
+    }
+
+    /// Whether it does not pause because it has no order.
+    pub(super) fn has_nothing_to_pause(&self) -> bool {
+        let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
+        idle && self.faults.has(F::R4PauseFailsWithoutOrder)
+    }
+
+    /// An action ends during a pause: it drives on as if it had stood for the action only.
+    pub(super) fn forget_pause_after(&mut self, id: &str) {
+        let of_node = |action: &Action| matches!(action.origin, Origin::Node(_));
+        let ended = self.holds.pause && self.actions.get(id).is_some_and(of_node);
+        self.book.heedless |= ended && self.faults.has(F::R4PauseForgottenAfterNodeAction);
+    }
+
+    /// Whether it shows for some seconds that it charges although it does not any more.
+    pub(super) fn shows_charging_longer(&mut self) -> bool {
+        let longer = self.charging && self.faults.has(F::R4StopChargingFlagLate);
+        if longer {
+            self.fourth.uncharged_at = Some(self.moment() + Duration::from_secs(3));
+        }
+        longer
+    }
+
+    /// The link is back: sends what could not be sent.
+    pub(super) fn replay_buffer(&mut self) {
+        for (timestamp, mut body) in std::mem::take(&mut self.fourth.buffered) {
+            // What the body says goes before the header.
+            body.insert("timestamp".into(), Value::from(timestamp));
+            self.publish("state", body, &[]);
+        }
+    }
+
+    /// A timestamp without the zeros at the end of its fraction.
+    pub(super) fn without_zeros(&self, timestamp: String) -> String {
+        match timestamp.strip_suffix('Z') {
+            Some(digits) if digits.contains('.') && self.faults.has(F::R4TimestampTrailingZerosTrimmed) => {
+                format!("{}Z", digits.trim_end_matches('0').trim_end_matches('.'))
+            }
+            _ => timestamp,
+        }
+    }
+
     /// Enables a map that was asked for during the order.
     pub(super) fn enable_what_waited(&mut self) {
         if self.is_busy() {
@@ -228,7 +278,10 @@ impl Agv {
     }
 
     /// The link is back: what was traversed without it is listed again.
-    pub(super) fn relist_nodes(&mut self) {
+    pub(super) fn relist_nodes(&mut self, first: bool) {
+        if first || !self.faults.has(F::R4ReconnectRelistsTraversedNodes) {
+            return;
+        }
         let ahead = |stop: &Stop| {
             let mut nodes = self.book.nodes.iter();
             nodes.any(|other| other.node.sequence_id == stop.node.sequence_id)

@@ -459,10 +459,8 @@ impl Agv {
             if !self.overlooks_order() {
                 self.order_received(payload);
             }
-        } else if self.config.topic("instantActions") == Some(topic) {
-            if !self.receive_buffer_is_full() {
-                self.instant_actions_received(payload);
-            }
+        } else if self.config.topic("instantActions") == Some(topic) && !self.receive_buffer_is_full() {
+            self.instant_actions_received(payload);
         }
     }
 
