@@ -71,7 +71,8 @@ impl Agv {
                 let refusal = Refusal::at_field(Rule::Unable, "the vehicle does not know where the node is", &path);
                 return Err(refusal.naming("nodeId", &node.id));
             };
-            if index == 0 || !self.faults.has(F::R3OnlyFirstMapChecked) {
+            let skipped = known > 0 && self.faults.has(F::R4MapCheckSkippedInUpdate);
+            if !skipped && (index == 0 || !self.faults.has(F::R3OnlyFirstMapChecked)) {
                 self.check_map(node, &place)?;
             }
         }
@@ -189,6 +190,9 @@ impl Agv {
     }
 
     fn check_actions(&self, order: &Order, known: usize) -> Result<(), Refusal> {
+        if known > 0 && self.faults.has(F::R4UpdateActionsNotChecked) {
+            return Ok(());
+        }
         let all = !self.faults.has(F::R2HorizonActionsUnchecked);
         let nodes = order.nodes.iter().skip(known).filter(|node| node.released || all);
         let nodes = nodes.flat_map(|node| &node.actions);
@@ -226,8 +230,9 @@ impl Agv {
                         | action_kinds::Deed::FactsheetRequest
                         | action_kinds::Deed::LogReport
                 );
+            let of_edge = scope == Scope::Edge && self.faults.has(F::R4EdgeScopeNotChecked);
             if listed_refused
-                || (!request_taken && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked))
+                || (!request_taken && !of_edge && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked))
             {
                 return unable("the action is not possible here", &request.path);
             }

@@ -95,6 +95,9 @@ impl Agv {
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
         let taken = super::leniency::taken(message, self.faults);
         let mended = self.mended(&taken);
+        if let Some(defect) = self.unreadable_for_faulty(&taken) {
+            return Err(defect.into());
+        }
         let mut order = Order::read(mended.as_ref().unwrap_or(&taken))?;
         if order.nodes.is_empty() && self.faults.has(F::R3EmptyOrderDropped) {
             return Ok(());
@@ -120,6 +123,9 @@ impl Agv {
             unchecked
                 || (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
                 || (self.faults.has(F::R1SplitBaseTaken) && defect.reason == "is true behind the horizon's begin")
+                || (self.faults.has(F::R4CountsCheckedInBaseOnly)
+                    && defect.reason.ends_with("one less than the nodes")
+                    && super::fourth::base_counts(&order))
         };
         if let Some(defect) = order.graph_defect().filter(|defect| !tolerated(defect)) {
             return Err(defect.into());
@@ -221,7 +227,9 @@ impl Agv {
     fn decide(&self, order: &mut Order) -> Result<Decision, Refusal> {
         let new = order.id != self.book.order_id;
         if !new && order.update_id == self.book.update_id {
-            if self.faults.has(F::DuplicateReported) {
+            let done =
+                !self.is_busy() && !self.book.cancelled && self.faults.has(F::R4ResendAfterCompletionRaisesError);
+            if done || self.faults.has(F::DuplicateReported) {
                 return Err(Refusal::new(Rule::Duplicate, "the order was received before"));
             }
             let again = self.faults.has(F::DuplicateExecuted) && !self.is_busy();
@@ -287,6 +295,10 @@ impl Agv {
                 &path,
             ));
         }
+        if order.update_id != 0 && self.takes(T::R4NonzeroFirstUpdateIdRefused) {
+            let reason = "a new order begins with orderUpdateId 0";
+            return Err(Refusal::at_field(Rule::Unable, reason, "orderUpdateId"));
+        }
         let demanded = self.faults.has(F::HorizonDemanded) && order.nodes.iter().all(|node| node.released);
         if demanded || (self.faults.has(F::SingleNodeRefused) && order.nodes.len() == 1) {
             return Err(Refusal::new(Rule::Unable, "the order is too short"));
@@ -345,7 +357,11 @@ impl Agv {
         } else {
             allowed
         };
+        if self.faults.has(F::R4ThetaDifferenceNotWrapped) && self.turned_by_plain_difference(node, pose.theta) {
+            return false;
+        }
         let lenient = self.faults.has(F::UnknownMapAccepted) || self.faults.has(F::DisabledMapUsed);
+        let lenient = lenient || self.faults.has(F::R4StartCheckIgnoresMap);
         (pose.map_id == place.map_id || lenient)
             && pose.distance(place.x, place.y) <= allowed.max(self.config.tolerance)
     }
@@ -393,6 +409,7 @@ impl Agv {
         self.book = super::book::Book::empty(last.0);
         let in_pause = (self.holds.pause || self.holds.button) && self.faults.has(F::R2OrderInPauseNeverStarts);
         self.book.stunned = after_cancel || in_pause;
+        self.book.heedless = self.holds.pause && self.faults.has(F::R4PausedVehicleStartsNewOrder);
         self.book.last_sequence = last.1;
         self.book.order_id.clone_from(&order.id);
         let carried = last_update.filter(|_| self.faults.has(F::UpdateIdCarriedOver));
@@ -404,6 +421,10 @@ impl Agv {
         self.book.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
         self.book.first_end = self.book.nodes.back().map_or(0, |stop| stop.node.sequence_id);
+        self.fourth.new_order(self.book.base_end.1);
+        if self.faults.has(F::R4HeaderIdRestartsWithOrder) {
+            self.connection.restart_header_id();
+        }
         let pose = self.motion.pose(self.moment());
         self.book.begun_at = Some((pose.x, pose.y));
         if self.faults.has(F::LoadForgottenWithOrder) {

@@ -283,6 +283,12 @@ impl Actions {
         Vec::new()
     }
 
+    /// `r4-node-with-none-only-stops-following-soft`: the last action of a list is taken for all of them.
+    fn ends_with_none(&self, origin: Origin) -> bool {
+        let last = self.all.iter().rev().find(|action| action.origin == origin);
+        last.is_some_and(|action| action.request.blocking == Blocking::None)
+    }
+
     fn blocking(&self, id: &str) -> Option<Blocking> {
         self.get(id).map(|action| action.request.blocking)
     }
@@ -293,6 +299,11 @@ impl Actions {
             _ if action.status == Status::Initializing && faults.has(F::R1PreparesWhileDriving) => false,
             Blocking::None => false,
             Blocking::Soft if matches!(action.origin, Origin::Edge(_)) && faults.has(F::R3SoftEdgeActionDrives) => {
+                false
+            }
+            Blocking::Soft
+                if faults.has(F::R4NodeWithNoneOnlyStopsFollowingSoft) && self.ends_with_none(action.origin) =>
+            {
                 false
             }
             Blocking::Soft => !faults.has(F::SoftDrives),

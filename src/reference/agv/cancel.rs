@@ -31,6 +31,10 @@ impl Agv {
             }
             return;
         }
+        if self.book.cancel.is_some() && self.takes(T::R4SecondCancelEndsWithTheFirst) {
+            self.cancels_together(action_id);
+            return;
+        }
         let active = !self.book.nodes.is_empty() || self.actions.order_unfinished();
         let acts = self
             .actions
@@ -45,6 +49,9 @@ impl Agv {
             return;
         }
         let to_node = !self.config.stops_between_nodes && (self.book.entered || self.motion.reached);
+        let next = self.book.nodes.front().is_some_and(|stop| stop.node.released);
+        let leaves = acts && next && !self.book.entered && !self.motion.is_moving();
+        let to_node = to_node || leaves && self.faults.has(F::R4CancelInNodeActionDrivesToNextNode);
         if self.holds.pause && self.faults.has(F::PausedOrderSurvivesCancel) {
             self.remembered = Some(self.book.clone());
         }
@@ -110,10 +117,11 @@ impl Agv {
                 .into_iter()
                 .collect(),
             description: "there is no order to cancel".into(),
-            life: Life::Until(match self.takes(T::R1IdleCancelErrorBrief) {
-                true => self.moment() + self.brief(),
-                false => self.moment() + self.config.error_duration,
-            }),
+            life: match () {
+                () if self.takes(T::R1IdleCancelErrorBrief) => Life::Until(self.moment() + self.brief()),
+                () if self.takes(T::R4NoOrderWarningUntilNextOrder) => Life::UntilNewOrder,
+                () => Life::Until(self.moment() + self.config.error_duration),
+            },
         };
         self.errors.refused(refusal, self.now.moment, self.faults);
     }
@@ -200,6 +208,7 @@ impl Agv {
         }
         self.book.cancel = None;
         self.book.cancelled = true;
+        self.end_further_cancels();
         if self.faults.has(F::LastNodeAheadWhenCancelled)
             && let Some(ahead) = self.book.nodes.front().filter(|_| self.book.entered)
         {
@@ -275,6 +284,7 @@ impl Agv {
         {
             action.end(Status::Finished);
         }
+        self.end_further_cancels();
         self.book.cancelled = self.book.has_order();
     }
 }
@@ -283,9 +293,12 @@ impl Agv {
 fn survives(action: &Action, faults: super::Faults) -> bool {
     match action.status {
         Status::Waiting => matches!(action.origin, Origin::Edge(_)) && faults.has(F::CancelMissesEdgeActions),
-        Status::Initializing => faults.has(F::PreparedActionsSurviveCancel),
-        Status::Paused => faults.has(F::PausedActionsSurviveCancel),
-        _ => false,
+        Status::Initializing if faults.has(F::PreparedActionsSurviveCancel) => true,
+        Status::Paused if faults.has(F::PausedActionsSurviveCancel) => true,
+        status => {
+            let of_edge = matches!(action.origin, Origin::Edge(_));
+            status.is_active() && of_edge && faults.has(F::R4CancelLeavesEdgeActionRunning)
+        }
     }
 }
 

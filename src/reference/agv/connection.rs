@@ -86,6 +86,16 @@ impl Connection {
         }
     }
 
+    /// Whether it was online before.
+    pub(super) fn was_online(&self) -> bool {
+        self.returning
+    }
+
+    /// `r4-header-id-restarts-with-order`: counts its states from 0 again.
+    pub(super) fn restart_header_id(&mut self) {
+        self.header_ids.insert("state", 0);
+    }
+
     /// Somebody wants the vehicle connected.
     pub(super) fn wanted_at(&mut self, moment: Moment) {
         if !self.online {
@@ -149,6 +159,8 @@ impl Agv {
         };
         let wanted: &[&str] = if self.connection.returning && self.faults.has(F::NotSubscribedAgain) {
             &[]
+        } else if self.connection.returning && self.faults.has(F::R4ReconnectWithoutOrders) {
+            &["instantActions"]
         } else if self.faults.has(F::InstantActionsNotSubscribed)
             || (self.connection.returning && self.faults.has(F::R1InstantActionsNotSubscribedAgain))
         {
@@ -238,6 +250,8 @@ impl Agv {
         if !on_request && !before && !after {
             self.publish_factsheet();
         }
+        self.replay_buffer();
+        self.relist_nodes(first);
         self.start_reporting(first);
         if !on_request && after {
             self.flush();
@@ -269,6 +283,7 @@ impl Agv {
             self.actions.retain(|action| !action.status.is_terminal());
         }
         self.book.cut = true;
+        self.fourth.before_cut = self.book.nodes.clone();
         if self.faults.has(F::R3RunningActionsFailWithLink) {
             let of_order = self.actions.iter_mut().filter(|action| action.of_order());
             of_order
@@ -553,6 +568,7 @@ impl Agv {
             () if self.takes(T::SecondsFine) => format!("{utc:.6}"),
             () => format!("{utc:.2}"),
         };
+        let text = self.without_zeros(text);
         match () {
             () if self.faults.has(F::TimestampLocal) => {
                 let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);

@@ -175,6 +175,7 @@ impl Agv {
     pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
         let stuck = self.faults.has(F::InstantActionStuck);
         let requests_stay = self.faults.has(F::StateRequestStuck);
+        self.forget_pause_after(id);
         let late = self.takes(T::R3DrivesOnLate) && !self.book.nodes.is_empty();
         let stops = |action: &Action| action.of_order() && action.request.blocking != Blocking::None;
         if late && self.actions.get(id).is_some_and(stops) {
@@ -277,6 +278,9 @@ impl Agv {
                 if self.maps.is_enabled(id, version) && self.faults.has(F::R3EnableTwiceFails) {
                     return Outcome::Failed(Problem::map(action, "the map is enabled already"));
                 }
+                if busy && known && self.enables_later(id, version) {
+                    return Outcome::Done(None);
+                }
                 if busy && self.maps.has_version(id, version) && self.faults.has(F::R2EnableIgnoredMidOrder) {
                     return Outcome::Done(None);
                 }
@@ -347,7 +351,9 @@ impl Agv {
 
     /// Whether the name of a log is in the information instead of the result of its action.
     pub(super) fn tells_logs(&self) -> bool {
-        self.takes(T::R2LogNameInInformation) && !self.takes(T::R1InformationOmitted)
+        self.takes(T::R2LogNameInInformation)
+            && !self.takes(T::R1InformationOmitted)
+            && !self.takes(T::R4OptionalStateFieldsLeftOut)
     }
 
     /// Whether a switch forbids what a message asks for (ACT-16).
@@ -356,11 +362,15 @@ impl Agv {
     }
 
     fn start_pause(&mut self, action: &Action) -> Outcome {
+        self.end_braking();
         if self.is_pause_blocked() {
             if self.faults.has(F::BlockedPauseTaken) {
                 self.set_holds(|holds| holds.pause = true);
             }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
+        }
+        if self.has_nothing_to_pause() {
+            return Outcome::Failed(Problem::unable(action, "there is no order to pause"));
         }
         self.pauses += u32::from(self.faults.has(F::PausesCounted));
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
@@ -459,50 +469,6 @@ impl Agv {
         }
     }
 
-    /// What does not charge has nothing to end (ACT-11); what cannot be ended has failed (ACT-20).
-    fn stop_charging(&mut self, action: &Action) -> Result<(), Problem> {
-        if self.charging && self.charger_locked {
-            if self.faults.has(F::ChargingEndFailureFinished) {
-                return Ok(());
-            }
-            self.charging = !self.faults.has(F::ChargingEndShownAnyway);
-            let problem = Problem::new(Area::Charging, action, "the vehicle cannot leave the charger");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
-        }
-        if self.charging && self.faults.has(F::ChargingEndsEarly) {
-            self.undocking = Some(self.moment() + std::time::Duration::from_secs(40));
-        }
-        self.third.charging_at = None;
-        let toggled = !self.charging && self.faults.has(F::ChargingEndToggled);
-        if action.of_order() && self.faults.has(F::R1NodeStopChargingUnreported) {
-            return Ok(());
-        }
-        self.charging = toggled || self.charging && self.faults.has(F::ChargingEndUnreported);
-        Ok(())
-    }
-
-    /// The charger is at a node: there is none where the vehicle drives (ACT-20).
-    fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
-        if self.motion.is_moving() || !self.config.chargers.contains(&self.book.last_node) {
-            if self.faults.has(F::ChargingFailureFinished) {
-                return Ok(());
-            }
-            self.charging |= self.faults.has(F::ChargingShownAnyway);
-            let problem = Problem::new(Area::Charging, action, "the vehicle is not at a charger");
-            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
-        }
-        if self.charging && self.faults.has(F::ChargingTwiceFails) {
-            return Err(Problem::new(Area::Charging, action, "the vehicle charges already"));
-        }
-        if !self.charging && self.faults.has(F::R3ChargingReportedLate) {
-            self.third.charging_at = Some(self.moment() + Duration::from_secs(2));
-            return Ok(());
-        }
-        let toggled = self.charging && self.faults.has(F::ChargingToggled);
-        self.charging = !toggled && !self.faults.has(F::ChargingUnreported);
-        Ok(())
-    }
-
     fn init_position(&mut self, action: &Action) -> Result<(), Problem> {
         let invalid = |reason: &str| Err(Problem::new(Area::Localization, action, reason));
         let number = |key: &str| action.number(key).filter(|number| number.is_finite());
@@ -527,7 +493,9 @@ impl Agv {
         }
         self.lost = self.faults.has(F::InitPositionUninitialized);
         self.persona.lost = false;
-        self.maps.enable_any(map_id);
+        if !self.faults.has(F::R4InitPositionOntoDisabledMap) {
+            self.maps.enable_any(map_id);
+        }
         if self.faults.has(F::R1InitPositionEnablesAll) {
             self.maps.enable_all(map_id);
         }
@@ -575,7 +543,9 @@ impl Agv {
         let ahead = !self.faults.has(F::R1MapOfOrderDeleted);
         let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
         let free = idle && self.faults.has(F::R2CurrentMapDeletedWhenIdle);
-        let used = |map_id: &str| here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
+        let kept = self.takes(T::R4EnabledUnusedMapNotDeleted);
+        let used =
+            |map_id: &str| kept || here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
         let result = self
             .maps
             .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);

@@ -94,6 +94,15 @@ impl Errors {
         self.active.retain(|error| error.life != Life::UntilNewOrder);
     }
 
+    /// `r4-new-rejection-replaces-old-warning`: forgets the orders that were refused.
+    pub(super) fn forget_refused_orders(&mut self) {
+        let of_order = |error: &ActiveError| {
+            let mut references = error.references.iter();
+            references.any(|(key, value)| key == "topic" && value == "order")
+        };
+        self.active.retain(|error| !of_order(error));
+    }
+
     /// Whether anything that was refused is still listed.
     pub(super) fn lists_refusals(&self) -> bool {
         self.active.iter().any(|error| error.life == Life::UntilNewOrder)

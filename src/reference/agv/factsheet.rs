@@ -177,6 +177,15 @@ impl Agv {
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },
         });
+        // What else it takes in little would not be true then.
+        if self.takes(T::R4LimitsOfZeroInFactsheet) && !self.takes(T::LittleFits) {
+            for list in ["maxStringLens", "maxArrayLens"] {
+                let members = limits[list].as_object_mut().into_iter().flat_map(Map::values_mut);
+                members
+                    .filter(|limit| limit.is_number())
+                    .for_each(|limit| *limit = json!(0));
+            }
+        }
         if self.faults.has(F::R1ActionStatesLimitExceeded) {
             limits["maxArrayLens"]["state.actionStates"] = json!(1);
         }

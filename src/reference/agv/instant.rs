@@ -82,6 +82,10 @@ impl Agv {
             if failed && self.faults.has(F::R1BatchEndsAtFailure) {
                 break;
             }
+            let unknown = self.actions.get(id).is_some_and(|action| action.kind.is_none());
+            if unknown && self.faults.has(F::R4UnknownActionEndsTheMessage) {
+                break;
+            }
         }
         if !elements.is_empty() && self.faults.has(F::R2AcknowledgesOnInstantActions) {
             self.acknowledge_instant_actions();
@@ -146,6 +150,8 @@ impl Agv {
         if defect.is_some() {
             self.malformed_side_effects();
         }
+        let warned = !self.errors.is_empty() && self.faults.has(F::R4WarningBlocksInstantActions);
+        let refusal = refusal.or_else(|| warned.then(|| "there are warnings".to_owned()));
         self.make_room();
         let action = Action::waiting(request, kind, Origin::Instant);
         self.actions.push(action.clone());
@@ -223,6 +229,7 @@ impl Agv {
             .and_then(|action| action.kind)
             .is_some_and(|kind| kind.lasting || self.takes_time(kind.deed));
         if lasting {
+            self.brake_if_slow(id);
             self.run_action(id);
         } else {
             self.complete(id);
@@ -233,6 +240,7 @@ impl Agv {
     fn takes_time(&self, deed: action_kinds::Deed) -> bool {
         use action_kinds::Deed;
         match deed {
+            Deed::StartPause if self.motion.is_moving() && self.takes(T::R4BrakesLongOnPause) => true,
             Deed::StartPause | Deed::StopPause => self.takes(T::R2PauseTakesTime),
             Deed::InitPosition => self.takes(T::R2InitPositionTakesTime),
             Deed::EnableMap | Deed::DeleteMap => self.takes(T::R2MapActionsTakeTime),

@@ -86,6 +86,13 @@ impl Maps {
 
     /// Enables a version, and disables the others of that mapId (MAP-24).
     pub(super) fn enable(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
+        let latest = self.all.iter().rev().find(|map| map.map_id == map_id);
+        let latest = latest.filter(|_| faults.has(F::R4EnableUnknownVersionTakesLatest));
+        let latest = latest.map(|map| map.map_version.clone());
+        let version = match latest.as_deref() {
+            Some(latest) if self.position(map_id, version).is_none() => latest,
+            _ => version,
+        };
         if self.position(map_id, version).is_none() {
             if faults.has(F::EnableUnknownDisables) {
                 self.all.iter_mut().for_each(|map| map.enabled = false);

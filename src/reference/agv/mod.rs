@@ -23,6 +23,7 @@ mod downloads;
 mod errors;
 mod factsheet;
 pub mod faults;
+mod fourth;
 mod instant;
 pub mod lapses;
 mod leniency;
@@ -59,6 +60,7 @@ use connection::Connection;
 use downloads::Downloads;
 use errors::{ActiveError, Errors, Life};
 use faults::Faults;
+use fourth::Fourth;
 use maps::Maps;
 use motion::{Motion, Pose};
 use personas::Persona;
@@ -149,6 +151,7 @@ struct Third {
 #[derive(Clone, Debug)]
 pub struct Agv {
     third: Third,
+    fourth: Fourth,
     config: AgvConfig,
     faults: Faults,
     /// The time of what is happening.
@@ -254,6 +257,7 @@ impl Agv {
         let maps = Maps::new(config.maps.clone(), config.map_capacity);
         Ok(Self {
             third: Third::default(),
+            fourth: Fourth::default(),
             faults,
             now: Stamp {
                 moment: Moment::START,
@@ -342,6 +346,7 @@ impl Agv {
             self.pause_hidden_until,
             self.third.braking,
             self.third.charging_at,
+            self.fourth.uncharged_at,
             self.persona.next_end(),
             self.next_report(),
         ];
@@ -387,11 +392,15 @@ impl Agv {
         if self.third.charging_at.take_if(|at| *at <= moment).is_some() {
             self.charging = true;
         }
+        if self.fourth.uncharged_at.take_if(|at| *at <= moment).is_some() {
+            self.charging = false;
+        }
         self.a_moment_later();
         self.resume_if_due();
         self.attempt_connection();
         self.settle();
         self.notice_end_of_order();
+        self.enable_what_waited();
         self.begin_queued();
         self.flush();
     }
@@ -446,10 +455,11 @@ impl Agv {
 
     fn message(&mut self, topic: &str, payload: &[u8]) {
         if self.config.topic("order") == Some(topic) {
+            self.fourth.order_at = Some(self.moment());
             if !self.overlooks_order() {
                 self.order_received(payload);
             }
-        } else if self.config.topic("instantActions") == Some(topic) {
+        } else if self.config.topic("instantActions") == Some(topic) && !self.receive_buffer_is_full() {
             self.instant_actions_received(payload);
         }
     }
@@ -474,6 +484,9 @@ impl Agv {
             .filter(|seconds| (0.0..=86_400.0).contains(seconds));
         if let Some(seconds) = asked {
             return Duration::from_secs_f64(seconds);
+        }
+        if self.brakes_long(action) {
+            return fourth::BRAKING;
         }
         let by_type = self.config.action_durations.get(&action.request.action_type);
         let duration = by_type.copied().unwrap_or(self.config.action_duration);

@@ -47,6 +47,7 @@ impl Agv {
             .filter(|_| !self.faults.has(F::TrajectoryCut))?;
         let path = match self.detour(edge) {
             Some(lateral) => beside(&trajectory.path, lateral),
+            None if self.faults.has(F::R4DrivesTheControlPolygon) => super::fourth::control_polygon(&trajectory.sent),
             None => trajectory.path.clone(),
         };
         let pose = self.motion.pose(self.moment());
@@ -101,6 +102,8 @@ impl Agv {
             return false;
         }
         let edge = self.book.edge_ahead();
+        let of_update = |edge: &&Edge| self.fourth.joints.is_some_and(|(first, _)| edge.sequence_id > first);
+        let edge = edge.filter(|edge| !(of_update(edge) && self.faults.has(F::R4CorridorOfUpdateNotWatched)));
         let Some((corridor, trajectory)) = edge.and_then(|edge| self.corridor(edge).zip(edge.trajectory.as_ref()))
         else {
             return false;

@@ -253,6 +253,7 @@ impl Agv {
             _ if self.book.slipped => self.config.speed * 4.0,
             _ => self.config.speed,
         };
+        let own = if self.fourth.braking { own / 20.0 } else { own };
         let share = if self.takes(T::R3KeepsBelowMaxSpeed) { 0.8 } else { 1.0 };
         let speed = permitted.map_or(own, |permitted| (permitted * share).min(own));
         let Some(curve) = curve else {
@@ -425,6 +426,8 @@ impl Agv {
             let Some(edge) = self.book.edges.pop_front() else { break };
             if self.faults.has(F::EdgeActionsLate) {
                 self.actions.trigger(Origin::Edge(edge.sequence_id), self.faults);
+            } else if self.lets_edge_actions_run_on(edge.sequence_id) {
+                // They end where it stops.
             } else if !self.faults.has(F::EdgeActionOutlivesEdge) {
                 let cut = if self.takes(T::R1CutEdgeActionsFail) {
                     super::actions::Status::Failed
@@ -439,6 +442,7 @@ impl Agv {
             }
             self.book.left.1 = Some(edge);
         }
+        self.end_edge_actions_where_it_stops();
         if self.maps.on_board(&stop.place.map_id) || !self.faults.has(F::R3OnlyFirstMapChecked) {
             self.motion.set_map(stop.place.map_id.clone());
         }
@@ -460,7 +464,9 @@ impl Agv {
                 sequence_id == 0 && !self.book.nodes.is_empty() && self.faults.has(F::R1FirstNodeActionsSkipped);
             let continuation = self.book.continued && self.faults.has(F::R1ContinuationActionsSkipped);
             let of_update = sequence_id > self.book.first_end && self.faults.has(F::UpdateActionsNotPerformed);
-            if !(first || continuation || of_update || skipped) {
+            let alone =
+                sequence_id == 0 && self.book.nodes.is_empty() && self.faults.has(F::R4OneNodeOrderActionsNotStarted);
+            if !(first || continuation || of_update || skipped || alone) {
                 self.actions.trigger(Origin::Node(sequence_id), self.faults);
             }
             let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == stop.node.id);
@@ -536,7 +542,7 @@ impl Agv {
                 .entry(stop.node.id.clone())
                 .or_insert(stop.node.sequence_id);
             self.book.last_sequence = *first;
-        } else if !self.faults.has(F::LastNodeStale) {
+        } else if !self.faults.has(F::LastNodeStale) && !self.keeps_sequence(stop) {
             self.book.last_sequence = stop.node.sequence_id;
         }
     }

@@ -126,6 +126,9 @@ impl Agv {
             (_, true) if refusal.rule == Rule::Outdated && self.takes(T::R1OutdatedErrorBrief) => {
                 Life::Until(self.moment() + self.brief())
             }
+            (_, true) if refusal.rule == Rule::Outdated && self.takes(T::R4OutdatedUpdateWarningUntilNextOrder) => {
+                Life::UntilNewOrder
+            }
             (_, true) => Life::Until(self.moment() + self.config.error_duration),
             _ => Life::UntilNewOrder,
         };
@@ -142,7 +145,8 @@ impl Agv {
         if !(refusal.rule == Rule::Unable && self.faults.has(F::R1CulpritUnnamed)) {
             references.extend(refusal.culprits);
         }
-        if self.faults.has(F::UpdateIdUnreferenced) {
+        let unjoined = refusal.rule == Rule::BrokenUpdate && self.faults.has(F::R4StitchRejectionWithoutUpdateId);
+        if unjoined || self.faults.has(F::UpdateIdUnreferenced) {
             references.retain(|(key, _)| key != "orderUpdateId");
         }
         for (key, value) in &mut references {
@@ -171,6 +175,9 @@ impl Agv {
             description: refusal.reason,
             life,
         };
+        if self.faults.has(F::R4NewRejectionReplacesOldWarning) {
+            self.errors.forget_refused_orders();
+        }
         if self.takes(T::R3RefusalInTwoErrors) {
             self.errors.raise(ActiveError {
                 error_type: "orderRejected".to_owned(),

@@ -216,6 +216,9 @@ impl Agv {
         if !self.connection.online {
             self.report.order_received = false;
             self.report.requested = false;
+            if self.faults.has(F::R4ReconnectReplaysBufferedStates) {
+                self.buffer_state();
+            }
             return;
         }
         self.flush_state();
@@ -226,6 +229,18 @@ impl Agv {
             let next = self.report.next_visualization.map_or(moment, |next| next + interval);
             self.report.next_visualization = Some(if next > moment { next } else { moment + interval });
             self.publish_visualization();
+        }
+    }
+
+    /// `r4-reconnect-replays-buffered-states`: keeps what it would have sent, with the time of now.
+    fn buffer_state(&mut self) {
+        let body = self.state_picture();
+        let buffered = &mut self.fourth.buffered;
+        let changed = buffered
+            .last()
+            .is_none_or(|(_, last)| Changes::between(last, &body).any());
+        if self.connection.was_online() && changed && buffered.len() < super::fourth::BUFFER {
+            buffered.push((format!("{:.2}", self.now.utc), body));
         }
     }
 
@@ -293,8 +308,12 @@ impl Agv {
             || event(changes.error, F::ErrorWithoutState)
             || event(changes.mode, F::ModeWithoutState)
             || event(changes.maps, F::MapsWithoutState);
+        let left = self.book.left.0.as_ref();
+        let plain = left.is_some_and(|stop| stop.node.actions.is_empty());
+        let passes = changes.node && plain && !changes.driving && !changes.actions;
         let swallowed = !changes.order
             && (event(changes.node, F::NodeWithoutState)
+                || event(passes, F::R4NoStateOnPlainNodes)
                 || event(changes.driving, F::DrivingWithoutState)
                 || event(changes.actions && !changes.node, F::ActionsWithoutState));
         if swallowed
@@ -307,7 +326,10 @@ impl Agv {
     }
 
     fn send_state(&mut self, mut body: Map<String, Value>, periodic: bool) {
-        let kept = body.clone();
+        let mut kept = body.clone();
+        if self.faults.has(F::R4ResultDescriptionOnlyInFirstState) {
+            self.note_results(&mut kept);
+        }
         let mut mangle: Vec<(&str, &[u8])> = Vec::new();
         if periodic && self.faults.has(F::LatinOneText) {
             let information = json!([{ "infoType": "place", "infoDescription": "Lagerpl@tz", "infoLevel": "INFO" }]);
@@ -375,6 +397,9 @@ impl Agv {
                     position[key] = json!(change(value));
                 }
             };
+            if self.faults.has(F::R4VisualizationThetaInDegrees) {
+                change("theta", f64::to_degrees);
+            }
             if self.faults.has(F::VisualizationBeside) {
                 change("x", |x| x + 2.0);
             }

@@ -1,4 +1,4 @@
-//! What is done at a station: picking, dropping, detecting, aligning. Charging is left to `deeds`.
+//! What is done at a station: picking, dropping, detecting, aligning, charging.
 
 use std::time::Duration;
 
@@ -131,6 +131,54 @@ impl Agv {
         if self.faults.has(F::DropReportedLate) {
             self.shadow = Some((self.moment() + Duration::from_secs(1), load));
         }
+        Ok(())
+    }
+
+    /// What does not charge has nothing to end (ACT-11); what cannot be ended has failed (ACT-20).
+    pub(super) fn stop_charging(&mut self, action: &Action) -> Result<(), Problem> {
+        if self.charging && self.charger_locked {
+            if self.faults.has(F::ChargingEndFailureFinished) {
+                return Ok(());
+            }
+            self.charging = !self.faults.has(F::ChargingEndShownAnyway);
+            let problem = Problem::new(Area::Charging, action, "the vehicle cannot leave the charger");
+            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+        }
+        if self.charging && self.faults.has(F::ChargingEndsEarly) {
+            self.undocking = Some(self.moment() + Duration::from_secs(40));
+        }
+        self.third.charging_at = None;
+        if self.shows_charging_longer() {
+            return Ok(());
+        }
+        let toggled = !self.charging && self.faults.has(F::ChargingEndToggled);
+        if action.of_order() && self.faults.has(F::R1NodeStopChargingUnreported) {
+            return Ok(());
+        }
+        self.charging = toggled || self.charging && self.faults.has(F::ChargingEndUnreported);
+        Ok(())
+    }
+
+    /// The charger is at a node: there is none where the vehicle drives (ACT-20).
+    pub(super) fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
+        self.fourth.uncharged_at = None;
+        if self.motion.is_moving() || !self.config.chargers.contains(&self.book.last_node) {
+            if self.faults.has(F::ChargingFailureFinished) {
+                return Ok(());
+            }
+            self.charging |= self.faults.has(F::ChargingShownAnyway);
+            let problem = Problem::new(Area::Charging, action, "the vehicle is not at a charger");
+            return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+        }
+        if self.charging && self.faults.has(F::ChargingTwiceFails) {
+            return Err(Problem::new(Area::Charging, action, "the vehicle charges already"));
+        }
+        if !self.charging && self.faults.has(F::R3ChargingReportedLate) {
+            self.third.charging_at = Some(self.moment() + Duration::from_secs(2));
+            return Ok(());
+        }
+        let toggled = self.charging && self.faults.has(F::ChargingToggled);
+        self.charging = !toggled && !self.faults.has(F::ChargingUnreported);
         Ok(())
     }
 }

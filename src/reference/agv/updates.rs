@@ -25,6 +25,12 @@ impl Agv {
         if self.faults.has(F::CompletedNotContinued) && !busy {
             return Err(Refusal::new(Rule::BrokenUpdate, "the order is complete"));
         }
+        if self.faults.has(F::R4SecondExtensionRefused) && self.waits_for_first_base() {
+            return Err(Refusal::new(
+                Rule::BrokenUpdate,
+                "the update does not continue the order",
+            ));
+        }
         let failed = |action: &Action| action.of_order() && action.status == Status::Failed;
         if !busy && self.actions.iter().any(failed) && self.faults.has(F::R3FailedOrderNotContinued) {
             return Err(Refusal::new(Rule::BrokenUpdate, "an action of the order has failed"));
@@ -81,6 +87,16 @@ impl Agv {
         }
         self.book.updated = true;
         self.report.update_received = true;
+        self.note_joint();
+        if self.faults.has(F::R4FirstStateAfterUpdateHasOldLists) {
+            let update_id = std::mem::replace(&mut self.book.update_id, order.update_id);
+            self.flush();
+            self.book.update_id = update_id;
+        }
+        let shortens = order.nodes.len() == 1 && self.faults.has(F::R4HorizonDeletionShortensBase);
+        if shortens && self.book.nodes.iter().any(|stop| !stop.node.released) {
+            self.shorten_base();
+        }
         let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);
         if plans_only && self.faults.has(F::R2HorizonChangeIgnored) {
             self.book.update_id = order.update_id;
@@ -196,6 +212,8 @@ impl Agv {
         if self.faults.has(F::R3UpdateInPauseNotDriven) {
             self.book.stuck_at = self.holds.pause.then_some(self.book.base_end.1);
         }
+        let stands = self.waits_at_decision_point() && !self.motion.is_moving();
+        self.book.stunned |= stands && self.faults.has(F::R4UpdateAtDecisionPointNotDriven);
         self.book.heedless |= self.holds.pause && self.faults.has(F::R1UpdateDrivesInPause);
         let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);
         self.book.unbound |= plans_only && self.faults.has(F::R1HorizonUpdateDriven);

@@ -36,6 +36,8 @@ impl Agv {
             } else {
                 ""
             };
+            let most = if has(F::R4OrderIdCutAt32) { 32 } else { usize::MAX };
+            let order_id: String = order_id.chars().take(most).collect();
             set("orderId", json!(format!("{prefix}{order_id}")));
         }
         let reset = complete && has(F::UpdateIdResetWhenDone);
@@ -248,6 +250,11 @@ impl Agv {
             Status::Waiting if self.faults.has(F::InitializingFromStart) => "INITIALIZING",
             Status::Waiting | Status::Initializing if early_pick => "RUNNING",
             Status::Waiting if waits_here && self.faults.has(F::PausedWithoutPause) => "PAUSED",
+            Status::Waiting
+                if action.of_order() && self.holds.pause && self.faults.has(F::R4PauseMarksWaitingActionsPaused) =>
+            {
+                "PAUSED"
+            }
             Status::Waiting if self.is_next(action) && self.faults.has(F::R2NextNodeActionsInitializing) => {
                 "INITIALIZING"
             }
@@ -281,7 +288,8 @@ impl Agv {
             "actionType": action.request.action_type,
             "actionStatus": status,
         });
-        if let Some(result) = &action.result {
+        let told = self.fourth.results_told.contains(&action.request.id);
+        if let Some(result) = action.result.as_ref().filter(|_| !told) {
             picture["resultDescription"] = json!(result);
         }
         Some(picture)

@@ -37,15 +37,22 @@ impl Agv {
             !((planned > 1 && self.faults.has(F::R1HorizonCutToOne))
                 || (again && self.faults.has(F::R1LoopNodesMerged)))
         });
-        left.into_iter()
-            .chain(shown)
-            .take(if self.faults.has(F::R2RouteListsCapped) {
-                3
-            } else {
-                usize::MAX
-            })
-            .map(|stop| self.node_state(stop))
-            .collect()
+        let most = match () {
+            () if self.faults.has(F::R2RouteListsCapped) => 3,
+            () if self.faults.has(F::R4NodeStatesShowTenAtMost) => 10,
+            () => usize::MAX,
+        };
+        let relisted = self.fourth.relisted.iter().filter(|_| !self.book.cancelled);
+        let mut listed: Vec<&Stop> = relisted.chain(left).chain(shown).take(most).collect();
+        if let Some((_, joint)) = self
+            .fourth
+            .joints
+            .filter(|_| self.faults.has(F::R4UpdatePutsNewNodesInFront))
+        {
+            // A stable sort: both parts keep their sequence.
+            listed.sort_by_key(|stop| stop.node.sequence_id <= joint);
+        }
+        listed.into_iter().map(|stop| self.node_state(stop)).collect()
     }
 
     pub(super) fn keeps_last_node(&self) -> bool {
@@ -115,7 +122,9 @@ impl Agv {
         let next = self.book.edges.front().map(|edge| edge.sequence_id);
         let picture = |edge: &Edge| {
             let far = Some(edge.sequence_id) != next && self.faults.has(F::R1FarEdgesUnreleased);
-            let released = edge.released && !far && !self.stays_planned(edge.sequence_id)
+            let stale =
+                self.book.planned.contains(&edge.sequence_id) && self.faults.has(F::R4ReleasedFlagStaleAfterUpdate);
+            let released = edge.released && !far && !stale && !self.stays_planned(edge.sequence_id)
                 || self.faults.has(F::HorizonReportedReleased);
             let id = if self.faults.has(F::R2EdgeIdMisspelled) {
                 "edgeID"

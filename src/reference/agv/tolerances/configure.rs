@@ -21,6 +21,12 @@ pub(super) fn configure(config: &mut AgvConfig, tolerance: T) {
             slower(config, 6.0);
         }
         T::StatesSeldom => config.state_interval = Duration::from_secs(28),
+        T::R4StateEverySecond => config.state_interval = config.state_interval.min(Duration::from_secs(1)),
+        T::R4LimitsOfZeroInFactsheet => {
+            config.max_nodes = config.max_nodes.max(10_000);
+            config.max_instant_actions = config.max_instant_actions.max(1_000);
+            config.max_actions = config.max_actions.max(1_000);
+        }
         T::StatesOften => config.state_interval = Duration::from_millis(100),
         T::VisualizationOff => config.visualization_interval = None,
         T::VisualizationOften => config.visualization_interval = Some(Duration::from_millis(50)),

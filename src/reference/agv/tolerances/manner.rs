@@ -86,6 +86,14 @@ fn state(tolerances: Tolerances, state: &mut Map<String, Value>, even: bool) {
             json!({ "infoType": "load", "infoLevel": "DEBUG", "infoReferences": references, "infoDescription": description }),
         );
     }
+    if has(T::R4InformationInEveryState) {
+        let count = state.get("headerId").cloned().unwrap_or_default();
+        if let Some(Value::Array(entries)) = state.get_mut("information") {
+            entries.push(
+                json!({ "infoType": "cycleCounter", "infoLevel": "DEBUG", "infoDescription": format!("cycle {count}") }),
+            );
+        }
+    }
     worded_otherwise(tolerances, state);
     if let Some(Value::Array(loads)) = state.get_mut("loads").filter(|_| has(T::R2LoadsMinimal)) {
         for load in loads.iter_mut().filter_map(Value::as_object_mut) {
@@ -195,6 +203,11 @@ fn worded_otherwise(tolerances: Tolerances, state: &mut Map<String, Value>) {
     let unwanted = state.get("newBaseRequest") == Some(&json!(false));
     if unwanted && has(T::R3NewBaseOnlyWhenWanted) {
         state.remove("newBaseRequest");
+    }
+    if has(T::R4OptionalStateFieldsLeftOut) {
+        for key in ["velocity", "loads", "information", "newBaseRequest"] {
+            state.remove(key);
+        }
     }
     if has(T::R1BatteryMinimal)
         && let Some(Value::Object(battery)) = state.get_mut("batteryState")

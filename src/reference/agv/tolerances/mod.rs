@@ -48,6 +48,16 @@ macro_rules! tolerances {
 tolerances! {
     // Of blind rounds: the suites may still accuse or miss something with them.
     blind {
+R4NoOrderWarningUntilNextOrder "r4-no-order-warning-until-next-order" ["ORD-CANCEL-19", "ERR-01", "ERR-03"] "It keeps noOrderToCancel in its errors until it accepts a new order.";
+R4OutdatedUpdateWarningUntilNextOrder "r4-outdated-update-warning-until-next-order" ["ORD-REJ-12", "ERR-01"] "It keeps orderUpdateError in its errors until it accepts a new order.";
+R4SecondCancelEndsWithTheFirst "r4-second-cancel-ends-with-the-first" ["ORD-CANCEL-18", "ASTATE-05"] "It answers a second cancelOrder that comes while the first is RUNNING with RUNNING and lets both finish together.";
+R4NonzeroFirstUpdateIdRefused "r4-nonzero-first-update-id-refused" ["ORD-FLOW-06"] "It rejects a new order whose orderUpdateId is not 0.";
+R4EnabledUnusedMapNotDeleted "r4-enabled-unused-map-not-deleted" ["MAP-29", "MAP-32"] "It refuses to delete a map that is enabled though neither its position nor its order needs it.";
+R4BrakesLongOnPause "r4-brakes-long-on-pause" ["ACT-12", "ACT-13"] "It needs two seconds to come to a stop after startPause and reports it RUNNING meanwhile.";
+R4OptionalStateFieldsLeftOut "r4-optional-state-fields-left-out" ["STATE-MSG-01", "STATE-MSG-06"] "It leaves out the optional fields velocity, loads, information and newBaseRequest in all states.";
+R4InformationInEveryState "r4-information-in-every-state" ["STATE-11", "INFO-01"] "It puts an information entry with changing values into every state.";
+R4LimitsOfZeroInFactsheet "r4-limits-of-zero-in-factsheet" ["FACT-05", "FACT-11"] "It states 0 for all array and string limits in the factsheet because it has none.";
+R4StateEverySecond "r4-state-every-second" ["STATE-02", "STATE-11"] "It sends a state every second even when nothing happens.";
 R3StatesRetained "r3-states-retained" ["MQTT-07", "STATE-01"] "It publishes its states with the retain flag.";
 R3HeaderIdWraps "r3-header-id-wraps" ["HDR-02"] "It starts its headerIds a little below 4294967295 and goes on with 0 behind it.";
 R3RefusalInTwoErrors "r3-refusal-in-two-errors" ["ORD-REJ-17", "ERR-01"] "It adds a warning orderRejected with the same references to every warning about a refused order.";
