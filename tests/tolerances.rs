@@ -295,6 +295,9 @@ fn same_verdicts(seeds: std::ops::Range<u64>) {
             these.iter().filter(|line| !those.contains(line)).cloned().collect()
         };
         let (gone, new) = (only(first, &verdicts), only(&verdicts, first));
-        assert!(gone.is_empty() && new.is_empty(), "seed {seed}: gone {gone:?}, new {new:?}");
+        assert!(
+            gone.is_empty() && new.is_empty(),
+            "seed {seed}: gone {gone:?}, new {new:?}"
+        );
     }
 }

@@ -125,14 +125,14 @@ impl Trace {
 
     /// The vehicle an entry belongs to, by its place in the fleet, and the name of its topic.
     fn place(&self, entry: &Entry) -> Option<(usize, String)> {
-        let topic = match entry.event() {
-            Event::Packet {
-                packet: Packet::Publish { topic, .. },
-                ..
-            }
-            | Event::Message { topic, .. }
-            | Event::Sent { topic, .. } => topic,
-            _ => return None,
+        let (Event::Packet {
+            packet: Packet::Publish { topic, .. },
+            ..
+        }
+        | Event::Message { topic, .. }
+        | Event::Sent { topic, .. }) = entry.event()
+        else {
+            return None;
         };
         let mut levels = topic.rsplit('/');
         let name = levels.next()?.to_owned();

@@ -77,7 +77,10 @@ fn download(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -
             && !link.is_empty()
             && !is_remote(link)
         {
-            let text = format!("mapDownloadLink {} names no host the vehicle could ask", show(&link.into()));
+            let text = format!(
+                "mapDownloadLink {} names no host the vehicle could ask",
+                show(&link.into())
+            );
             found.remark("MAP-16", text);
         }
         if parameter(action, "mapVersion").is_none() {
@@ -92,8 +95,14 @@ fn is_remote(link: &str) -> bool {
     let Some((scheme, rest)) = link.split_once("://") else {
         return false;
     };
-    let is_scheme = scheme.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+-.".contains(&byte));
-    !scheme.is_empty() && is_scheme && !scheme.eq_ignore_ascii_case("file") && !rest.starts_with('/') && !rest.is_empty()
+    let is_scheme = scheme
+        .bytes()
+        .all(|byte| byte.is_ascii_alphanumeric() || b"+-.".contains(&byte));
+    !scheme.is_empty()
+        && is_scheme
+        && !scheme.eq_ignore_ascii_case("file")
+        && !rest.starts_with('/')
+        && !rest.is_empty()
 }
 
 /// mapId and mapVersion of an action on maps.

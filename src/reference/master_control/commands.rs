@@ -233,12 +233,10 @@ impl Site {
                 vehicle.at(due);
                 vehicle.r4_cancel_at = Some((due, order));
             }
-            Some((_, order)) => {
-                if vehicle.running.as_ref().is_some_and(|running| running.id == order) {
-                    self.call_off(vehicle);
-                }
+            Some((_, order)) if vehicle.running.as_ref().is_some_and(|running| running.id == order) => {
+                self.call_off(vehicle);
             }
-            None => {}
+            _ => {}
         }
     }
 

@@ -124,7 +124,7 @@ fn without_an_order_there_is_nothing_to_cancel() {
     done.order(order("o1", 0, 0, "n1 n2"));
     done.wait(10.0);
     let cancelled = vehicle(true, true);
-    for mut bench in [never, done, cancelled] {
+    for mut bench in vec![never, done, cancelled] {
         bench.instant("cancelOrder", "x", json!({}));
         assert_eq!(bench.status("x"), "FAILED");
         assert_eq!(bench.error_types(), ["noOrderToCancel"]);
