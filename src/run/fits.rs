@@ -41,15 +41,21 @@ fn limit(limits: Option<&Value>, name: &str) -> Option<u64> {
 
 /// What is wrong with an id that a patch spells out, for a vehicle with such limits. All other ids take the form it wants.
 fn too_long(lengths: Option<&Value>, send: &Send) -> Option<String> {
-    let Some(Patch::Operations(operations)) = &send.patch else {
-        return None;
-    };
-    let TermKind::List(operations) = &operations.kind else {
-        return None;
+    let named = send.payload.iter().flat_map(|payload| match &payload.kind {
+        TermKind::Map(members) => members.as_slice(),
+        _ => &[],
+    });
+    let named = named.filter_map(|(name, value)| written(name, &value.kind));
+    let operations = match &send.patch {
+        Some(Patch::Operations(operations)) => match &operations.kind {
+            TermKind::List(operations) => operations.as_slice(),
+            _ => &[],
+        },
+        _ => &[],
     };
     let numerical = lengths?.get("idNumericalOnly").and_then(Value::as_bool) == Some(true);
     let longest = limit(lengths, "idLen");
-    let mut ids = operations.iter().filter_map(spelled);
+    let mut ids = named.chain(operations.iter().filter_map(spelled));
     ids.find_map(|(length, digits)| {
         let longest = longest.filter(|longest| *longest < u64::try_from(length).unwrap_or(u64::MAX));
         match longest {
@@ -78,9 +84,17 @@ fn spelled(operation: &Term) -> Option<(usize, bool)> {
     let TermKind::Literal(Value::String(path)) = member("path")? else {
         return None;
     };
-    let TermKind::Text(pieces) = member("value").filter(|_| path.ends_with("Id"))? else {
+    written(path, member("value")?)
+}
+
+/// The same of a value under a name or at the end of a path.
+fn written(name: &str, value: &TermKind) -> Option<(usize, bool)> {
+    let TermKind::Text(pieces) = value else {
         return None;
     };
+    if !name.ends_with("Id") {
+        return None;
+    }
     let length = pieces.iter().map(|piece| match piece {
         Piece::Text(text) => text.chars().count(),
         Piece::Variable(_) => VARIABLE,
