@@ -109,6 +109,12 @@ impl Site {
             let habit = self.faults.has(F::DeviceByHabit);
             parameters.insert("lhd".into(), if habit { json!("LHD1") } else { json!(devices[0]) });
         }
+        if let Some(named) = parameters.get_mut("lhd")
+            && let Some(index) = devices.iter().position(|device| *named == json!(device))
+            && self.faults.has(F::R5LhdAsIndex)
+        {
+            *named = json!(index.to_string());
+        }
         let vendor = SCOPES.iter().all(|(name, _)| *name != kind);
         if vendor && self.faults.has(F::R1VendorParametersDropped) {
             parameters.clear();

@@ -26,6 +26,7 @@ R5PickHeightAsString "r5-pick-height-as-string" ["BP-05", "FACT-15"] "It sends n
 R5PickWithoutLoadType "r5-pick-without-load-type" ["ACT-31", "FACT-15"] "It leaves loadType out of pick when the operator did not choose one.";
 R5TriggerTimeoutOnlyDropsTransport "r5-trigger-timeout-only-drops-transport" ["ACT-39", "ORD-CANCEL-01"] "It drops the transport in its own list when waitForTrigger takes too long, but does not cancel the order.";
 R5VendorActionLowerCase "r5-vendor-action-lower-case" ["ACT-07", "FACT-15"] "It sends a vendor action with its type written in lower case.";
+R5LhdAsIndex "r5-lhd-as-index" ["ACT-32"] "It names the load handling device by its index in the list (as the text 0 or 1) instead of its name in loadPositions.";
 R5CancelOnEnteringManual "r5-cancel-on-entering-manual" ["MODE-04"] "It sends cancelOrder when a vehicle with an order switches to MANUAL.";
 R5OfflineVehicleGetsOrders "r5-offline-vehicle-gets-orders" ["CONN-12"] "It takes only CONNECTIONBROKEN for a lost connection and dispatches to a vehicle that is OFFLINE.";
 R5PublishesConnectionForSilentVehicle "r5-publishes-connection-for-silent-vehicle" ["TOPIC-15"] "It publishes CONNECTIONBROKEN on the vehicle's connection topic itself when no state came for a while.";

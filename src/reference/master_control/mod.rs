@@ -4,7 +4,8 @@
 //! read by `seen`; `dispatch` plans transports over the `layout`, `order` words their messages, `driving` extends
 //! the base, sends again what was lost and sees the end, `cancel` calls orders off; `instant` sends instant actions,
 //! made in `actions`, and `maps` rolls maps out; `commands` is what people ask for; `publish` and `wording` speak to
-//! the broker. Every deviation from good behaviour is declared in `faults`, every liberty in `tolerances`.
+//! the broker; `habits` holds what some do besides. Every deviation from good behaviour is declared in `faults`, every
+//! liberty in `tolerances`.
 
 #[macro_use]
 mod blind_faults;
