@@ -83,7 +83,12 @@ impl Site {
             .iter()
             .find(|(name, _)| *name == kind)
             .map_or(&[][..], |(_, keys)| *keys);
-        for key in mandatory {
+        // Nobody has chosen one.
+        let open = |key: &str| {
+            let load = kind == "pick" && key == "loadType" && given.get(key).is_none();
+            load && self.faults.has(F::R5PickWithoutLoadType)
+        };
+        for key in mandatory.iter().filter(|key| !open(key)) {
             self.supply(vehicle, &mut parameters, key, "STRING");
         }
         let offered: Vec<ParameterOffer> = offer
@@ -93,6 +98,7 @@ impl Site {
         for parameter in offered
             .iter()
             .filter(|parameter| generous || parameter.is_optional != Some(true))
+            .filter(|parameter| !open(&parameter.key))
         {
             if !self.faults.has(F::RequiredKeyMissing) || !mandatory.is_empty() {
                 self.supply(vehicle, &mut parameters, &parameter.key, &parameter.value_data_type);
@@ -103,6 +109,12 @@ impl Site {
             let habit = self.faults.has(F::DeviceByHabit);
             parameters.insert("lhd".into(), if habit { json!("LHD1") } else { json!(devices[0]) });
         }
+        if let Some(named) = parameters.get_mut("lhd")
+            && let Some(index) = devices.iter().position(|device| *named == json!(device))
+            && self.faults.has(F::R5LhdAsIndex)
+        {
+            *named = json!(index.to_string());
+        }
         let vendor = SCOPES.iter().all(|(name, _)| *name != kind);
         if vendor && self.faults.has(F::R1VendorParametersDropped) {
             parameters.clear();
@@ -112,9 +124,16 @@ impl Site {
                 *value = json!(value.to_string());
             }
         }
+        if let Some(running) = vehicle.running.as_ref().filter(|_| kind == "cancelOrder")
+            && self.faults.has(F::R5CancelWithOrderIdParameter)
+        {
+            parameters.insert("orderId".into(), json!(running.id));
+        }
         let blocking = self.blocking(offer);
         let sent = if self.faults.has(F::VendorActionRenamed) && SCOPES.iter().all(|(name, _)| *name != kind) {
             capitalized(kind)
+        } else if vendor && self.faults.has(F::R5VendorActionLowerCase) {
+            kind.to_lowercase()
         } else {
             kind.to_owned()
         };

@@ -8,6 +8,34 @@ macro_rules! with_blind_faults {
     ($registry:ident! $($own:tt)*) => {
         $registry! {
             blind {
+R5WholeOrderAgainAfterReconnect "r5-whole-order-again-after-reconnect" ["ORD-UPD-05", "ORD-UPD-03"] "It sends the whole order from its first node on as an update, with the next orderUpdateId, when a vehicle with a running order comes ONLINE again.";
+R5StitchingNodeDeviationReset "r5-stitching-node-deviation-reset" ["ORD-UPD-06"] "It sends the stitching node of an update with the deviation of a stop (zero), although it was first sent with the deviation of a pass-through node.";
+R5BaseTakenBackOnDestinationChange "r5-base-taken-back-on-destination-change" ["ORD-UPD-03"] "It sends the stitching node as not released in the update that changes the destination.";
+R5NodeBoundVehicleGetsTemporaryNode "r5-node-bound-vehicle-gets-temporary-node" ["ORD-CANCEL-14", "ORD-03"] "It begins the order after a cancel at a temporary node also for a line-guided vehicle that localizes on nodes by tags.";
+R5CancelOfPausedVehicleOnlyInternal "r5-cancel-of-paused-vehicle-only-internal" ["ORD-CANCEL-01", "TOPIC-13"] "It deletes the transport of a paused vehicle in its own list without sending cancelOrder, and dispatches the next one after stopPause.";
+R5CancelLostWhileDisconnected "r5-cancel-lost-while-disconnected" ["ORD-CANCEL-01"] "It forgets a cancel request that comes while the vehicle is CONNECTIONBROKEN and sends a new order after ONLINE without any cancelOrder.";
+R5CancelWithOrderIdParameter "r5-cancel-with-order-id-parameter" ["FACT-15", "ACT-31"] "It adds the parameter orderId of version 3.0 to cancelOrder although the factsheet lists no parameter for it.";
+R5ActionIdsRestartAfterReconnect "r5-action-ids-restart-after-reconnect" ["ORD-MSG-17"] "It starts the count in its action ids anew when the vehicle comes ONLINE again, so that ids of the session return.";
+R5ActionIdsCountedPerMessage "r5-action-ids-counted-per-message" ["ORD-MSG-17"] "It numbers the actions within each order message, so that the actions of an update get the ids of those of the first message.";
+R5StopPauseWithIdOfStartPause "r5-stop-pause-with-id-of-start-pause" ["ORD-MSG-17"] "It sends stopPause with the actionId of the startPause that it ends.";
+R5ActionIdsCutToIdLength "r5-action-ids-cut-to-id-length" ["ORD-MSG-17", "FACT-12"] "It cuts action ids to the idLen of the factsheet from the end, so that several actions have the same id.";
+R5DuplicateDeletesEnabledVersion "r5-duplicate-deletes-enabled-version" ["MAP-28"] "It deletes the enabled version of the map after a duplicate rejection instead of the version that it wants to download again.";
+R5MapCheckOnlyAtFirstOrder "r5-map-check-only-at-first-order" ["MAP-09"] "It checks the maps of a vehicle before its first order only; if the map is disabled later, it still sends the next order.";
+R5EmptyMapHashAsNull "r5-empty-map-hash-as-null" ["BP-05"] "It sends mapHash with the value null when it has no hash.";
+R5PickHeightAsString "r5-pick-height-as-string" ["BP-05", "FACT-15"] "It sends number parameters of pick and drop as strings.";
+R5PickWithoutLoadType "r5-pick-without-load-type" ["ACT-31", "FACT-15"] "It leaves loadType out of pick when the operator did not choose one.";
+R5TriggerTimeoutOnlyDropsTransport "r5-trigger-timeout-only-drops-transport" ["ACT-39", "ORD-CANCEL-01"] "It drops the transport in its own list when waitForTrigger takes too long, but does not cancel the order.";
+R5VendorActionLowerCase "r5-vendor-action-lower-case" ["ACT-07", "FACT-15"] "It sends a vendor action with its type written in lower case.";
+R5LhdAsIndex "r5-lhd-as-index" ["ACT-32"] "It names the load handling device by its index in the list (as the text 0 or 1) instead of its name in loadPositions.";
+R5CancelOnEnteringManual "r5-cancel-on-entering-manual" ["MODE-04"] "It sends cancelOrder when a vehicle with an order switches to MANUAL.";
+R5OfflineVehicleGetsOrders "r5-offline-vehicle-gets-orders" ["CONN-12"] "It takes only CONNECTIONBROKEN for a lost connection and dispatches to a vehicle that is OFFLINE.";
+R5PublishesConnectionForSilentVehicle "r5-publishes-connection-for-silent-vehicle" ["TOPIC-15"] "It publishes CONNECTIONBROKEN on the vehicle's connection topic itself when no state came for a while.";
+R5HeaderOfOtherVehicle "r5-header-of-other-vehicle" ["HDR-05", "TOPIC-04"] "It puts into instantActions messages the serialNumber of the vehicle that got the last order.";
+R5MissingValuesAsNull "r5-missing-values-as-null" ["JSON-06", "JSON-10"] "It writes optional fields for which it has no value as null.";
+R5RotationAllowedAsWord "r5-rotation-allowed-as-word" ["JSON-07", "JSON-06"] "It writes rotationAllowed as the string true or false.";
+R5CorridorWithoutTrajectory "r5-corridor-without-trajectory" ["CORR-02"] "It leaves the trajectory out on edges with a corridor although the vehicle knows none of its own.";
+R5CorridorNarrowerThanNode "r5-corridor-narrower-than-node" ["CORR-04"] "It sends a corridor that is narrower than the allowed deviation at the node where the edge begins.";
+R5NewBaseRequestHeardOnce "r5-new-base-request-heard-once" ["STATE-17", "ORD-UPD-02"] "It answers only the first newBaseRequest of an order and waits for the decision point afterwards.";
 R4StartFromVisualization "r4-start-from-visualization" ["VIS-03", "ORD-03"] "It chooses the start of a new order by the position in the newest visualization message rather than by the state.";
 R4InformationBlocksDispatch "r4-information-blocks-dispatch" ["INFO-02"] "It dispatches no order to a vehicle that reports an information entry of level INFO.";
 R4OldWillIgnored "r4-old-will-ignored" ["CONN-13", "CONN-12"] "It ignores a connection message whose headerId is lower than that of the one before.";

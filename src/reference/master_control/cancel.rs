@@ -31,6 +31,12 @@ impl Site {
         if vehicle.presence == Presence::Away && self.faults.has(F::R1CancelLostWhileAway) {
             return;
         }
+        if vehicle.presence == Presence::Away && self.faults.has(F::R5CancelLostWhileDisconnected) {
+            vehicle.last_order = vehicle.running.take();
+            vehicle.r1_hasty = true;
+            vehicle.queue.extend(then);
+            return;
+        }
         if vehicle.r3_cancels > 0 && self.faults.has(F::R3CancelsOnlyOnce) {
             return;
         }
@@ -38,6 +44,12 @@ impl Site {
         let position = vehicle.state.as_ref().and_then(|state| state.agv_position.clone());
         vehicle.r3_cancelled_at = position;
         let paused = vehicle.state.as_ref().is_some_and(super::seen::State::is_paused);
+        if paused && self.faults.has(F::R5CancelOfPausedVehicleOnlyInternal) {
+            vehicle.last_order = vehicle.running.take();
+            vehicle.r5_dropped = true;
+            vehicle.queue.extend(then);
+            return;
+        }
         if self.faults.has(F::R1PauseInsteadOfCancel) {
             let pausing = vehicle.instants.iter().any(|instant| instant.kind() == "startPause");
             if !paused && !pausing {

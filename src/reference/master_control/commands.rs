@@ -92,6 +92,9 @@ impl Site {
             "cancel" => self.call_off(vehicle),
             "pause" => {
                 self.instant(vehicle, "startPause", &Value::Null);
+                if self.takes(T::R5PauseTogetherWithStateRequest) {
+                    self.instant(vehicle, "stateRequest", &Value::Null);
+                }
                 if self.takes(T::R4PauseSentTwice) {
                     self.send_instants(vehicle);
                     self.instant(vehicle, "startPause", &Value::Null);

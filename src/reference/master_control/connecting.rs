@@ -172,7 +172,9 @@ impl MasterControl {
             }
         }
         if returning {
-            self.site.r1_actions = 0;
+            if !self.site.faults.has(F::R5ActionIdsRestartAfterReconnect) {
+                self.site.r1_actions = 0;
+            }
             self.site.r4_orders = 0;
         }
     }

@@ -53,6 +53,14 @@ impl Site {
     /// Begins the next transport of a vehicle that is free, fit and known.
     pub(super) fn begin_next(&mut self, vehicle: &mut Vehicle) {
         let idle = vehicle.running.is_none() && vehicle.cancel.is_none();
+        if idle && vehicle.r1_cancelled && self.takes(T::R5PauseAfterCancelBeforeNextOrder) {
+            let now = self.now.moment;
+            let due = *vehicle.r5_rest.get_or_insert(now + Duration::from_secs(3));
+            if due > now {
+                vehicle.at(due);
+                return;
+            }
+        }
         if !idle || vehicle.queue.is_empty() || !self.commandable(vehicle) || !self.may_begin(vehicle) {
             return;
         }
@@ -159,6 +167,9 @@ impl Site {
             }
         }
         vehicle.queue.pop_front();
+        if self.faults.has(F::R5ActionIdsCountedPerMessage) {
+            super::habits::number_actions(vehicle, &mut running, 0);
+        }
         let Some((message, window)) = self.order_message(vehicle, &running, window) else {
             return;
         };
@@ -167,6 +178,9 @@ impl Site {
         vehicle.r1_sequence += 2 * running.stops.len();
         vehicle.r1_stale = false;
         vehicle.r4_returned = false;
+        vehicle.r5_whole = false;
+        vehicle.r5_dropped = false;
+        vehicle.r5_rest = None;
         vehicle.r1_hasty = false;
         vehicle.r1_cancelled = false;
         vehicle.r1_kept = None;
@@ -229,8 +243,9 @@ impl Site {
         let Some(state) = &vehicle.state else { return false };
         let hasty = [F::OrderInsteadOfCancel, F::CancelNotAwaited, F::BrokenIsDead];
         let hasty = hasty.iter().any(|fault| self.faults.has(*fault));
-        let busy = !state.route_empty() && !hasty && !vehicle.r1_hasty;
-        if vehicle.shunned {
+        let busy = !state.route_empty() && !hasty && !vehicle.r1_hasty && !vehicle.r5_dropped;
+        let dropped = vehicle.r5_dropped && state.is_paused();
+        if vehicle.shunned || dropped || self.r5_left_paused(vehicle) {
             return false;
         }
         let waits = (vehicle.factsheet.is_none() && self.takes(T::R2FactsheetAwaited))

@@ -201,7 +201,7 @@ impl Site {
             vehicle.at(lost);
             return true;
         }
-        if self.faults.has(F::LostOrderNotResent) {
+        if self.faults.has(F::LostOrderNotResent) || self.r5_left_paused(vehicle) {
             return true;
         }
         if running.resends >= self.config.resend_limit {
@@ -350,7 +350,7 @@ impl Site {
             vehicle.at(due);
             return;
         }
-        if running.r3_held {
+        if running.r3_held || self.r5_left_paused(vehicle) {
             return;
         }
         let stopped = !matches!(state.safety_state.e_stop.as_str(), "NONE" | "");
@@ -375,7 +375,8 @@ impl Site {
         let deaf = (vehicle.r1_answered && self.faults.has(F::R1NewBaseAnsweredOnce))
             || (state.driving && self.faults.has(F::R1NewBaseOnlyAtRest));
         let half = state.operating_mode == "SEMIAUTOMATIC" && self.faults.has(F::R2NewBaseIgnoredInSemiautomatic);
-        let asked = asked && !deaf && !half;
+        let spent = running.r5_asked && self.faults.has(F::R5NewBaseRequestHeardOnce);
+        let asked = asked && !deaf && !half && !spent;
         running.r3_asked = asked;
         let showing = asked && self.faults.has(F::R3NewBaseAnsweredByHorizon);
         if showing && !running.r3_answered && !running.is_whole() {
@@ -394,6 +395,9 @@ impl Site {
             return;
         }
         let halts = !state.driving && ahead == 0;
+        let short = state.is_paused() && !running.is_whole() && self.takes(T::R5HorizonDeletedOnPause);
+        running.changed |= short != running.r5_short;
+        running.r5_short = short;
         if self.takes(T::R1HorizonSentAgain) && !running.r1_again && !running.is_whole() {
             running.r1_again = true;
             running.changed = true;
@@ -404,9 +408,9 @@ impl Site {
         } else {
             1
         };
-        let wanted = if withdraws || showing || running.r4_drops_horizon {
+        let wanted = if withdraws || showing || short || running.r4_drops_horizon {
             false
-        } else if self.faults.has(F::BaseExtendedLate) {
+        } else if self.faults.has(F::BaseExtendedLate) || spent {
             ahead == 0 && !state.driving
         } else {
             ahead <= enough || asked || eager
@@ -446,6 +450,7 @@ impl Site {
             first: if self.faults.has(F::BaseSentAgain)
                 || (running.r3_paused && self.faults.has(F::R3BaseSentAgainAfterPause))
                 || (vehicle.r4_returned && self.faults.has(F::R4WholeOrderAfterReconnect))
+                || vehicle.r5_whole
             {
                 0
             } else if self.faults.has(F::R1UpdateFromVehicle) {
@@ -471,7 +476,7 @@ impl Site {
         } else {
             window
         };
-        let window = if running.r4_drops_horizon {
+        let window = if running.r4_drops_horizon || short {
             Window {
                 end: window.released,
                 ..window
@@ -488,12 +493,20 @@ impl Site {
             let state = vehicle.state.as_ref().filter(|state| state.order_id == running.id);
             running.update_id = state.map_or(0, |state| state.order_update_id).saturating_add(1);
         }
+        if self.takes(T::R5HorizonActionsGetNewIds) {
+            self.r5_rename_horizon(vehicle, running);
+        }
+        if self.faults.has(F::R5ActionIdsCountedPerMessage) {
+            super::habits::number_actions(vehicle, running, running.released);
+        }
         match self.order_message(vehicle, running, window) {
             Some((message, window)) if window.released > running.released || running.changed => {
                 running.released = window.released;
                 vehicle.r1_answered |= asked;
+                running.r5_asked |= asked;
                 self.send_order(vehicle, running, message);
                 vehicle.r4_returned = false;
+                vehicle.r5_whole = false;
                 // The horizon is gone; the new one is still to be sent.
                 running.changed = std::mem::take(&mut running.r4_drops_horizon);
             }
@@ -540,6 +553,9 @@ impl Site {
             vehicle.at(now + self.config.trigger_timeout);
             self.instant(vehicle, "startPause", &Value::Null);
             return Fate::Runs;
+        }
+        if due <= now && self.faults.has(F::R5TriggerTimeoutOnlyDropsTransport) {
+            return Fate::Over;
         }
         if due <= now {
             return Fate::CalledOff;

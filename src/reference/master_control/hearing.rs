@@ -155,6 +155,7 @@ impl Site {
             return;
         }
         let presence = match message.get("connectionState").and_then(Value::as_str) {
+            Some("OFFLINE") if self.faults.has(F::R5OfflineVehicleGetsOrders) => return,
             Some("ONLINE") => Presence::Online,
             Some("OFFLINE" | "CONNECTIONBROKEN") => Presence::Away,
             _ => return,
@@ -183,6 +184,7 @@ impl Site {
         if presence == Presence::Online && vehicle.presence == Presence::Away {
             vehicle.r2_stale = true;
             vehicle.r4_returned = vehicle.running.is_some();
+            self.r5_returned(vehicle);
             if let Some(running) = &mut vehicle.running
                 && self.faults.has(F::R2UpdateIdsRestartWithVehicle)
             {
@@ -196,6 +198,9 @@ impl Site {
             vehicle.give_time(self.now.moment);
             vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
             self.forget_on_return(vehicle);
+            if self.takes(T::R5StateRequestAfterOnline) {
+                self.instant(vehicle, "stateRequest", &Value::Null);
+            }
             if self.takes(T::R4RequestsStateAndFactsheetWhenOnline) {
                 self.instant(vehicle, "stateRequest", &Value::Null);
                 if self.config.has("factsheetRequest") {
@@ -312,7 +317,10 @@ impl Site {
         {
             running.cleared = true;
         }
+        let seized = vehicle.state.as_ref().is_some_and(State::takes_orders) && state.operating_mode == "MANUAL";
         vehicle.r2_stale = false;
+        vehicle.r5_declared = false;
+        vehicle.r5_back &= state.is_paused();
         if vehicle.presence == Presence::Away && self.faults.has(F::R2StateMeansOnline) {
             vehicle.presence = Presence::Online;
         }
@@ -328,6 +336,9 @@ impl Site {
         }
         if back {
             vehicle.give_time(self.now.moment);
+        }
+        if seized {
+            self.r5_cancel_in_manual(vehicle);
         }
         self.r2_answer(vehicle);
         if self.faults.has(F::InformationObeyed) {

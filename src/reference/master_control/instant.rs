@@ -34,6 +34,15 @@ impl Site {
         if nothing && self.takes(T::R1InstantsBlockNothing) {
             action["blockingType"] = json!("NONE");
         }
+        if kind == "stopPause"
+            && let Some(id) = vehicle.r5_pause_id.take()
+            && self.faults.has(F::R5StopPauseWithIdOfStartPause)
+        {
+            action["actionId"] = json!(id);
+        }
+        if kind == "startPause" {
+            vehicle.r5_pause_id = action["actionId"].as_str().map(str::to_owned);
+        }
         self.queue(vehicle, action)
     }
 
@@ -147,6 +156,9 @@ impl Site {
         instants.retain(|instant| instant.resends < u32::MAX || is_awaited(instant));
         if let Some(wake) = wake {
             vehicle.at(wake);
+        }
+        if self.takes(T::R5CancelRepeatedWithNewId) {
+            self.r5_rename_cancel(vehicle);
         }
     }
 }

@@ -107,6 +107,8 @@ impl Site {
                         job.stage = Stage::Delete;
                         let version = if self.faults.has(F::R1DuplicateOtherVersionDeleted) {
                             other_version(vehicle, &job.map)
+                        } else if self.faults.has(F::R5DuplicateDeletesEnabledVersion) {
+                            enabled_version(vehicle, &job.map)
                         } else {
                             job.map.map_version.clone()
                         };
@@ -183,6 +185,9 @@ impl Site {
         if self.faults.has(F::MapNotEnabled) || !self.config.has("mapActions") {
             return true;
         }
+        if vehicle.r5_maps_checked && self.faults.has(F::R5MapCheckOnlyAtFirstOrder) {
+            return true;
+        }
         let mut ready = true;
         for map_id in maps {
             let Some(state) = &vehicle.state else { return false };
@@ -221,6 +226,7 @@ impl Site {
                 _ => {}
             }
         }
+        vehicle.r5_maps_checked |= ready;
         ready
     }
 
@@ -329,6 +335,14 @@ fn other_version(vehicle: &Vehicle, map: &SiteMap) -> String {
     others
         .next()
         .map_or_else(|| "latest".to_owned(), |seen| seen.map_version.clone())
+}
+
+/// `r5-duplicate-deletes-enabled-version`: the version of a map that is enabled, if there is one.
+fn enabled_version(vehicle: &Vehicle, map: &SiteMap) -> String {
+    let maps = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
+    let mut maps = maps.into_iter().flatten();
+    let enabled = maps.find(|seen| seen.map_id == map.map_id && seen.map_status == "ENABLED");
+    enabled.map_or(&map.map_version, |seen| &seen.map_version).clone()
 }
 
 /// Whether a download failed because the map is on board already.

@@ -4,7 +4,8 @@
 //! read by `seen`; `dispatch` plans transports over the `layout`, `order` words their messages, `driving` extends
 //! the base, sends again what was lost and sees the end, `cancel` calls orders off; `instant` sends instant actions,
 //! made in `actions`, and `maps` rolls maps out; `commands` is what people ask for; `publish` and `wording` speak to
-//! the broker. Every deviation from good behaviour is declared in `faults`, every liberty in `tolerances`.
+//! the broker; `habits` holds what some do besides. Every deviation from good behaviour is declared in `faults`, every
+//! liberty in `tolerances`.
 
 #[macro_use]
 mod blind_faults;
@@ -16,6 +17,7 @@ mod connecting;
 mod dispatch;
 mod driving;
 pub mod faults;
+mod habits;
 mod hearing;
 mod instant;
 pub mod lapses;
@@ -91,6 +93,8 @@ struct Site {
     r4_first_sheet: Option<(usize, seen::Factsheet)>,
     /// When the next heartbeat is due (`r4-heartbeat-outside-the-protocol`).
     r4_beat_at: Option<Moment>,
+    /// The serial number of the vehicle that got the last order (`r5-header-of-other-vehicle`).
+    r5_ordered: Option<String>,
 }
 
 impl Site {
@@ -114,7 +118,9 @@ impl Site {
             return format!("{what}-{}-{:064}", self.session, self.ids);
         }
         let mut count = self.ids;
-        if self.faults.has(FaultName::R1ActionIdsRestartOnReconnect) && what == "action" {
+        let restarts = self.faults.has(FaultName::R1ActionIdsRestartOnReconnect)
+            || self.faults.has(FaultName::R5ActionIdsRestartAfterReconnect);
+        if restarts && what == "action" {
             self.r1_actions += 1;
             count = self.r1_actions;
         }
@@ -149,7 +155,9 @@ impl Site {
             () if self.takes(ToleranceName::R1IdsWithPunctuation) => format!("{what}:{number}_a.-"),
             () => format!("{what}-{number}"),
         };
+        let cuts = what == "action" && self.faults.has(FaultName::R5ActionIdsCutToIdLength);
         match () {
+            () if cuts => if numerical { number } else { full }.chars().take(longest).collect(),
             () if !numerical && full.len() <= longest => full,
             () if number.len() <= longest => number,
             () => count.to_string(),
@@ -225,6 +233,7 @@ impl MasterControl {
                 r4_orders: 0,
                 r4_first_sheet: None,
                 r4_beat_at: None,
+                r5_ordered: None,
             },
             fleet,
             by_topic,
@@ -270,6 +279,8 @@ impl Site {
         }
         self.r4_beat(vehicle);
         self.r4_call_off(vehicle);
+        self.r5_declare_silent(vehicle);
+        self.r5_repeat(vehicle);
         self.miss_factsheet(vehicle);
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);

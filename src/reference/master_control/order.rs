@@ -91,6 +91,12 @@ impl Site {
                 });
                 let reserved = goal && self.faults.has(F::R4ReleasesTheReservedStation);
                 let released = index < window.released || reserved;
+                let taken_back = window.first > 0
+                    && index == window.first
+                    && running.changed
+                    && running.r1_rerouted
+                    && self.faults.has(F::R5BaseTakenBackOnDestinationChange);
+                let released = released && !taken_back;
                 let mut node = self.node(sheet, unlimited.as_ref().unwrap_or(stop), index, released);
                 node["sequenceId"] = json!(running.r1_number(2 * index));
                 if index == 0
@@ -111,7 +117,7 @@ impl Site {
         let dangling = window.end < running.stops.len() && dangling;
         let last = window.end.saturating_sub(usize::from(!dangling));
         let incoming = window.first > 0 && self.faults.has(F::R3UpdateKeepsIncomingEdge);
-        let edges: Vec<Value> = (window.first.saturating_sub(usize::from(incoming))..last)
+        let mut edges: Vec<Value> = (window.first.saturating_sub(usize::from(incoming))..last)
             .filter_map(|index| {
                 let ends = (running.stops.get(index)?, running.stops.get(index + 1)?);
                 let leg = running.legs.get(index)?;
@@ -125,6 +131,9 @@ impl Site {
                 Some(edge)
             })
             .collect();
+        if self.faults.has(F::R5CorridorNarrowerThanNode) {
+            super::habits::narrow(&nodes, &mut edges);
+        }
         if self.faults.has(F::R3DeviationWiderThanCorridor) {
             for (node, edge) in nodes.iter_mut().zip(&edges) {
                 let width = |key: &str| edge["corridor"][key].as_f64().unwrap_or_default();
@@ -407,6 +416,9 @@ impl Site {
         let Some(fields) = edge.as_object_mut() else { return };
         if !fields.contains_key("trajectory") {
             fields.remove("corridor");
+        }
+        if fields.contains_key("corridor") && self.faults.has(F::R5CorridorWithoutTrajectory) {
+            fields.shift_remove("trajectory");
         }
         if self.faults.has(F::CorridorWithoutTrajectory) {
             fields.remove("trajectory");

@@ -112,6 +112,13 @@ impl Site {
         {
             message.insert("serialNumber".into(), json!(other));
         }
+        if name == "order" {
+            self.r5_ordered = Some(vehicle.config.serial_number.clone());
+        } else if let Some(ordered) = &self.r5_ordered
+            && self.faults.has(F::R5HeaderOfOtherVehicle)
+        {
+            message.insert("serialNumber".into(), json!(ordered));
+        }
         if name == "order" && self.faults.has(F::R3HeaderIdIsUpdateId) {
             message.insert("headerId".into(), body["orderUpdateId"].clone());
         }

@@ -32,6 +32,16 @@ macro_rules! tolerances {
 tolerances! {
     // Of blind rounds: the suites may still accuse or miss something with them.
     blind {
+R5HorizonActionsGetNewIds "r5-horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update.";
+R5RepeatsOrderAfterOnline "r5-repeats-order-after-online" ["ORD-REJ-18", "ORD-UPD-04", "ORD-UPD-05"] "It repeats the last order message with the same content when the vehicle comes ONLINE again.";
+R5StateRequestAfterOnline "r5-state-request-after-online" ["TOPIC-13", "IACT-01"] "It asks for a state by stateRequest whenever a vehicle comes ONLINE.";
+R5PauseTogetherWithStateRequest "r5-pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message.";
+R5PauseAfterCancelBeforeNextOrder "r5-pause-after-cancel-before-next-order" ["TOPIC-13", "ORD-CANCEL-17"] "It waits some seconds after a finished cancelOrder before it sends the next order.";
+R5WholeNumbersWithoutPoint "r5-whole-numbers-without-point" ["JSON-06", "JSON-09"] "It writes whole coordinates and speeds without a decimal point.";
+R5NoOrdersOnLowBattery "r5-no-orders-on-low-battery" ["TOPIC-13"] "It gives no new transport to a vehicle whose batteryCharge is below 30 percent and that is not charging.";
+R5HorizonDeletedOnPause "r5-horizon-deleted-on-pause" ["ORD-UPD-03", "ORD-UPD-02"] "It deletes the horizon by an update when the operator pauses a vehicle and sends it again after the resume.";
+R5CancelRepeatedWithNewId "r5-cancel-repeated-with-new-id" ["ORD-MSG-17", "IACT-02"] "It repeats a cancelOrder that did not appear in the state within some seconds, with a new actionId.";
+R5StopsPauseAfterReconnectOnlyByOperator "r5-stops-pause-after-reconnect-only-by-operator" ["TOPIC-13", "IACT-02"] "It sends nothing to a vehicle that came back paused until the operator resumes it.";
 R4NumbersWithExponent "r4-numbers-with-exponent" ["JSON-06", "JSON-09"] "It writes coordinates with an exponent, such as 1.05e1.";
 R4NoThetaOnNodes "r4-no-theta-on-nodes" ["ORD-MSG-09", "MAP-02"] "It sends no theta and leaves the orientation to the vehicle.";
 R4RequestsStateAndFactsheetWhenOnline "r4-requests-state-and-factsheet-when-online" ["IACT-01", "TOPIC-13"] "It sends stateRequest and factsheetRequest in one message each time a vehicle reports ONLINE.";
@@ -173,6 +183,7 @@ impl MasterControlConfig {
             ToleranceName::LongHorizon => self.horizon_length = usize::MAX,
             ToleranceName::WholeBase => self.base_length = usize::MAX,
             ToleranceName::SmallSteps => self.base_length = self.base_length.max(4),
+            ToleranceName::R5NoOrdersOnLowBattery => self.low_battery = 30.0,
             ToleranceName::ResendsOnce => {
                 self.resend_after = Duration::from_secs(1);
                 self.resend_limit = 1;

@@ -128,6 +128,10 @@ pub(super) struct Running {
     /// Number of nodes the vehicle has to complete before more are sent
     /// (`r4-second-leg-as-update-of-the-completed-order`).
     pub(super) r4_halt: Option<usize>,
+    /// A request for a new base was answered (`r5-new-base-request-heard-once`).
+    pub(super) r5_asked: bool,
+    /// Its horizon is deleted as long as the vehicle is paused (`r5-horizon-deleted-on-pause`).
+    pub(super) r5_short: bool,
 }
 
 impl Running {
@@ -321,6 +325,22 @@ pub(super) struct Vehicle {
     pub(super) r4_shown_at: Option<Position>,
     /// headerId of its last connection message (`r4-old-will-ignored`).
     pub(super) r4_connection_header: Option<u64>,
+    /// It came back during the running order (`r5-whole-order-again-after-reconnect`).
+    pub(super) r5_whole: bool,
+    /// Its order was struck while it was paused (`r5-cancel-of-paused-vehicle-only-internal`).
+    pub(super) r5_dropped: bool,
+    /// The actionId of its last startPause (`r5-stop-pause-with-id-of-start-pause`).
+    pub(super) r5_pause_id: Option<String>,
+    /// Its maps were checked once (`r5-map-check-only-at-first-order`).
+    pub(super) r5_maps_checked: bool,
+    /// It was said to be gone since its last state (`r5-publishes-connection-for-silent-vehicle`).
+    pub(super) r5_declared: bool,
+    /// Its order is to be repeated (`r5-repeats-order-after-online`).
+    pub(super) r5_repeat: bool,
+    /// No order is begun before, after one was called off (`r5-pause-after-cancel-before-next-order`).
+    pub(super) r5_rest: Option<Moment>,
+    /// It has not driven since it came back (`r5-stops-pause-after-reconnect-only-by-operator`).
+    pub(super) r5_back: bool,
 }
 
 impl Vehicle {

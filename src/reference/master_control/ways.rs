@@ -78,6 +78,12 @@ impl Site {
             return alone(node);
         }
         let Some(position) = &state.agv_position else {
+            let tagged =
+                last.filter(|_| vehicle.r1_cancelled && self.faults.has(F::R5NodeBoundVehicleGetsTemporaryNode));
+            if let Some(node) = tagged.cloned() {
+                let position = Position::of(node.x, node.y, node.map_id);
+                return self.between(vehicle, &position, goal);
+            }
             let goal = vehicle.last_order.as_ref().and_then(|order| {
                 let end = order.released.checked_sub(1)?;
                 self.config.node(&order.stops.get(end)?.id)

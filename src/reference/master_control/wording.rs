@@ -53,6 +53,9 @@ pub(super) fn reworded(faults: Faults, tolerances: Tolerances, name: &str, messa
             message[key.as_str()] = value.clone();
         }
     }
+    if faults.has(F::R5MissingValuesAsNull) {
+        super::habits::with_nulls(name, message);
+    }
     if tolerances.has(T::VendorFields)
         && let Some(message) = message.as_object_mut()
     {
@@ -70,6 +73,9 @@ pub(super) fn written(faults: Faults, tolerances: Tolerances, message: &Value) -
         && let Value::Object(members) = &message
     {
         message = Value::Object(members.iter().rev().map(|(k, v)| (k.clone(), v.clone())).collect());
+    }
+    if tolerances.has(T::R5WholeNumbersWithoutPoint) {
+        super::habits::without_point(&mut message);
     }
     if tolerances.has(T::R4NumbersWithExponent) {
         mark_coordinates(&mut message);
@@ -288,6 +294,11 @@ fn stitching(faults: Faults, message: &mut Value) {
             && let Some(position) = node.get_mut("nodePosition").and_then(Value::as_object_mut)
         {
             position.insert("allowedDeviationXY".into(), json!(1.0));
+        }
+        if faults.has(F::R5StitchingNodeDeviationReset)
+            && let Some(deviation) = node.pointer_mut("/nodePosition/allowedDeviationXY")
+        {
+            *deviation = json!(0.0);
         }
         if faults.has(F::R1StitchingActionsRenamed) {
             for action in elements(node, "actions") {
@@ -515,6 +526,11 @@ fn edge(faults: Faults, edge: &mut Value) {
         && let Some(actions) = remove(edge, "actions")
     {
         edge["action"] = actions;
+    }
+    if faults.has(F::R5RotationAllowedAsWord)
+        && let Some(allowed) = edge.get("rotationAllowed").and_then(Value::as_bool)
+    {
+        edge["rotationAllowed"] = json!(allowed.to_string());
     }
     if faults.has(F::R3SpeedsAsText)
         && let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64)

@@ -62,6 +62,10 @@ pub(super) fn action(faults: Faults, name: &str, action: &mut Value) {
         if kind == "pick" && !known && faults.has(F::R4NullForUnknownLoadId) {
             parameters.push(json!({ "key": "loadId", "value": null }));
         }
+        let hashed = parameters.iter().any(|parameter| parameter["key"] == "mapHash");
+        if kind == "downloadMap" && !hashed && faults.has(F::R5EmptyMapHashAsNull) {
+            parameters.push(json!({ "key": "mapHash", "value": null }));
+        }
         for parameter in parameters.iter_mut() {
             self::parameter(faults, &kind, parameter);
         }
@@ -184,6 +188,9 @@ pub(super) fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
             .and_then(|text| text.parse::<serde_json::Number>().ok())
     {
         parameter["value"] = json!(number);
+    }
+    if matches!(kind, "pick" | "drop") && parameter["value"].is_number() && faults.has(F::R5PickHeightAsString) {
+        parameter["value"] = json!(parameter["value"].to_string());
     }
     if faults.has(F::DeviceUnknown) && key == "lhd" {
         parameter["value"] = json!("1");
