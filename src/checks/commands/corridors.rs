@@ -16,7 +16,7 @@ pub(in crate::checks) const CORRIDORS: Check = Check {
     doc: "A corridor has a left and a right width of at least 0, not both 0, and a reference point the protocol knows. It \
           comes with a trajectory, unless the vehicle is bound to lines or reports trajectories of its own. Where two \
           corridors meet, the end of the first way lies inside the second corridor; a node that allows a wider \
-          deviation than the second corridor, or than both sides of it together, is a warning, and so are two corridors \
+          deviation than the second corridor, or than both sides of it together, is a warning, and so is one at the first node; so are two corridors \
           of which one lies to the left only and the other to the right only.",
     arguments: &[],
     start: |_| Box::new(Corridors::default()),
@@ -82,6 +82,9 @@ impl Running for Corridors {
         }
         let nodes = in_sequence(order, "nodes");
         if nodes.len() == edges.len() + 1 {
+            if let (Some(edge), Some(node)) = (edges.first(), nodes.first()) {
+                beginning(edge, node, &mut found);
+            }
             for (pair, around) in edges.windows(2).zip(nodes.windows(3)) {
                 meeting(pair, around, &mut found);
             }
@@ -114,6 +117,19 @@ fn by_itself(corridor: &Value, edge: &Value, context: &CheckContext<'_>, found: 
         if known.is_some_and(|known| !known.values().any(|known| known == point)) {
             found.broken("CORR-09", format!("corridorRefPoint of edge {id} is {}", show(point)));
         }
+    }
+}
+
+/// The first node, behind no other corridor: where the vehicle may be on it, it is inside the corridor that begins there.
+fn beginning(edge: &Value, node: &Value, found: &mut Found<'_>) {
+    let allowed = node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64);
+    let (Some((left, right)), Some(allowed)) = (widths(edge), allowed) else {
+        return;
+    };
+    if left + right > 0.0 && allowed > left.max(right) + ROUNDING {
+        let id = quote(text(node, "nodeId"));
+        let text = format!("node {id} allows {allowed} m, the corridor that begins there is narrower to both sides");
+        found.remark("CORR-04", text);
     }
 }
 

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::{action, all, begun, merged, order, pick};
+use crate::checks::trace::Trace;
 
 /// One order, changed.
 fn with(change: impl FnOnce(&mut Value)) -> Vec<String> {
@@ -145,4 +146,23 @@ fn curves_that_lead_elsewhere_are_found() {
     assert_eq!(curve(json!([0, 0, 1]), 2.0), ["OPT-03", "ORD-MSG-29"]);
     assert_eq!(curve(json!("x"), 2.0), ["OPT-03", "ORD-MSG-28"]);
     assert_eq!(curve(json!([0, 0, 1, 1]), 5.0), ["OPT-03", "ORD-MSG-30"]);
+}
+
+#[test]
+fn corridors_that_have_only_the_line_in_common_are_remarked() {
+    let corridors = |widths: [(f64, f64); 2], allowed: f64| {
+        let mut order = order("o1", 0, 0, 2, 2);
+        for (at, (left, right)) in widths.into_iter().enumerate() {
+            order["edges"][at]["corridor"] = json!({ "leftWidth": left, "rightWidth": right });
+        }
+        order["nodes"][0]["nodePosition"]["allowedDeviationXY"] = json!(allowed);
+        let mut trace = Trace::master_control();
+        trace.commands("order", &order);
+        trace.judge("commands/corridors").summary()
+    };
+    assert_eq!(corridors([(1.0, 1.0), (1.0, 1.0)], 0.2), Vec::<String>::new());
+    assert_eq!(corridors([(2.0, 0.0), (2.0, 0.5)], 0.2), Vec::<String>::new());
+    assert_eq!(corridors([(2.0, 0.0), (0.0, 2.0)], 0.2), ["CORR-04 warning"]);
+    assert_eq!(corridors([(0.0, 2.0), (2.0, 0.0)], 0.2), ["CORR-04 warning"]);
+    assert_eq!(corridors([(0.5, 0.5), (1.0, 1.0)], 0.8), ["CORR-04 warning"]);
 }

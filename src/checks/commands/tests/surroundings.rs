@@ -37,7 +37,7 @@ fn a_map_that_was_refused_is_deleted_first() {
         { "key": "mapId", "value": "hall" }, { "key": "mapVersion", "value": "1" },
         { "key": "mapDownloadLink", "value": "http://maps/hall" },
     ]);
-    let again = |delete: bool| {
+    let again = |delete: bool, fails: bool| {
         let mut trace = begun();
         trace.commands(
             "instantActions",
@@ -54,14 +54,22 @@ fn a_map_that_was_refused_is_deleted_first() {
                 &json!({ "actions": [action("deleteMap", "d2", &map)] }),
             );
         }
+        if fails {
+            trace.wait(1.0).shows(&json!({
+                "maps": [{ "mapId": "hall", "mapVersion": "1", "mapStatus": "ENABLED" }],
+                "actionStates": [{ "actionId": "d2", "actionStatus": "FAILED" }],
+            }));
+            trace.wait(10.0);
+        }
         trace.commands(
             "instantActions",
             &json!({ "actions": [action("downloadMap", "d3", &map)] }),
         );
         trace.judge("commands/map-duplicate").summary()
     };
-    assert_eq!(again(false), ["MAP-28"]);
-    assert_eq!(again(true), Vec::<String>::new());
+    assert_eq!(again(false, false), ["MAP-28"]);
+    assert_eq!(again(true, false), Vec::<String>::new());
+    assert_eq!(again(true, true), ["MAP-28"]);
     let mut trace = begun();
     trace.commands(
         "instantActions",
@@ -71,6 +79,34 @@ fn a_map_that_was_refused_is_deleted_first() {
         trace.judge("commands/map-download").summary(),
         ["MAP-16", "MAP-16", "MAP-16 warning"]
     );
+}
+
+#[test]
+fn a_link_leads_to_a_host() {
+    let link = |link: &str| {
+        let map = json!([
+            { "key": "mapId", "value": "hall" }, { "key": "mapVersion", "value": "1" },
+            { "key": "mapDownloadLink", "value": link },
+        ]);
+        let mut trace = begun();
+        trace.commands(
+            "instantActions",
+            &json!({ "actions": [action("downloadMap", "d1", &map)] }),
+        );
+        trace.judge("commands/map-download").summary()
+    };
+    for right in ["http://maps.example/hall.zip", "ftps://10.0.0.1/hall", "HTTPS://x"] {
+        assert_eq!(link(right), Vec::<String>::new(), "{right}");
+    }
+    for wrong in [
+        "/maps/hall.zip",
+        "file:///home/maps/hall.zip",
+        "C:\\maps\\hall.zip",
+        "maps.example/hall.zip",
+        "http:///hall",
+    ] {
+        assert_eq!(link(wrong), ["MAP-16 warning"], "{wrong}");
+    }
 }
 
 #[test]

@@ -211,3 +211,26 @@ fn an_order_is_not_over_while_one_of_its_actions_runs() {
     assert_eq!(next("RUNNING"), ["ORD-CANCEL-01"]);
     assert_eq!(next("FINISHED"), Vec::<String>::new());
 }
+
+#[test]
+fn a_vehicle_that_is_back_with_its_order_gets_the_rest_of_it_and_not_the_whole() {
+    let updated = |update: &Value, shown: &Value| {
+        let mut trace = begun();
+        trace.commands("order", &order("o1", 0, 0, 2, 4)).wait(2.0);
+        trace.shows(&under_way("o1", 0, 1)).wait(2.0);
+        trace.vehicle("break-off").wait(2.0);
+        trace.vehicle("start").wait(0.5);
+        trace.shows(shown).wait(2.0);
+        trace.commands("order", update);
+        trace.judge("commands/updates").summary()
+    };
+    let same = under_way("o1", 0, 1);
+    assert_eq!(updated(&order("o1", 1, 2, 4, 4), &same), Vec::<String>::new());
+    assert_eq!(updated(&order("o1", 1, 0, 4, 4), &same), ["ORD-UPD-05", "ORD-UPD-03"]);
+    let lost = json!({ "orderId": "o1", "nodeStates": [], "edgeStates": [] });
+    assert_eq!(
+        updated(&order("o1", 1, 0, 4, 4), &lost),
+        Vec::<String>::new(),
+        "it has given its order up"
+    );
+}

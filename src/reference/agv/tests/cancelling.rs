@@ -119,12 +119,12 @@ fn the_last_node_with_an_enlarged_deviation_counts_as_traversed() {
 
 #[test]
 fn without_an_order_there_is_nothing_to_cancel() {
-    let never = Bench::new();
+    let mut never = Bench::new();
     let mut done = Bench::new();
     done.order(order("o1", 0, 0, "n1 n2"));
     done.wait(10.0);
-    let cancelled = vehicle(true, true);
-    for mut bench in vec![never, done, cancelled] {
+    let mut cancelled = vehicle(true, true);
+    for bench in [&mut never, &mut done, &mut cancelled] {
         bench.instant("cancelOrder", "x", json!({}));
         assert_eq!(bench.status("x"), "FAILED");
         assert_eq!(bench.error_types(), ["noOrderToCancel"]);
