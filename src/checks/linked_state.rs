@@ -33,6 +33,7 @@ pub(super) const LINKED_STATE: Check = Check {
         "ACT-23",
         "ACT-24",
         "MAP-24",
+        "ORD-CANCEL-06",
         "ORD-CANCEL-07",
         "ORD-CANCEL-11",
         "STATE-MSG-08",
@@ -40,7 +41,7 @@ pub(super) const LINKED_STATE: Check = Check {
     doc: "The state that reports an action FINISHED for the first time shows what is linked to it: paused of startPause and \
           stopPause, batteryState.charging of startCharging and stopCharging, the pose (within half a metre and 20 degrees), \
           map and last node of initPosition, the one ENABLED version of enableMap; of startPause and cancelOrder also that \
-          the vehicle stands, and of cancelOrder that no node or edge is left. Not judged where another action on the \
+          the vehicle stands, and of cancelOrder that no node or edge is left and every action of the order is over. Not judged where another action on the \
           same may have come in between, while the vehicle drives, after a restart, while an emergency stop, the \
           protective field, a mode or an error may hold it, and for two minutes after what a person or a hook did to \
           what is linked.",
@@ -53,6 +54,8 @@ pub(super) const LINKED_STATE: Check = Check {
 struct Known {
     kind: String,
     action: Value,
+    /// The entry it was sent with.
+    seq: u64,
 }
 
 #[derive(Default)]
@@ -60,6 +63,9 @@ struct Linked {
     traffic: Traffic,
     life: Continuity,
     known: BTreeMap<String, Known>,
+    /// Actions of nodes and edges, and the entry with the last order.
+    placed: BTreeSet<String>,
+    ordered: u64,
     /// Seen FINISHED or FAILED.
     ended: BTreeSet<String>,
     /// When a person or a hook last had a hand in something.
@@ -134,9 +140,21 @@ impl Linked {
         let instant = to_vehicle("instantActions", entry, context)
             .into_iter()
             .flat_map(actions);
-        let order = to_vehicle("order", entry, context).into_iter();
-        let placed = order.flat_map(|order| elements(order, "nodes").chain(elements(order, "edges")));
-        let placed = placed.flat_map(|element| elements(element, "actions"));
+        let order = to_vehicle("order", entry, context);
+        if order.is_some() {
+            self.ordered = entry.seq();
+        }
+        let placed = order
+            .into_iter()
+            .flat_map(|order| elements(order, "nodes").chain(elements(order, "edges")))
+            .flat_map(|element| elements(element, "actions"));
+        let placed: Vec<&Value> = placed.take(ACTIONS).collect();
+        for action in &placed {
+            if self.placed.len() >= ACTIONS {
+                self.placed.clear();
+            }
+            self.placed.insert(text(action, "actionId").chars().take(512).collect());
+        }
         for action in instant.chain(placed).take(ACTIONS) {
             let kind = text(action, "actionType");
             let id: String = text(action, "actionId").chars().take(512).collect();
@@ -150,9 +168,36 @@ impl Linked {
             let known = Known {
                 kind: kind.to_owned(),
                 action: action.clone(),
+                seq: entry.seq(),
             };
             self.known.insert(id, known);
         }
+    }
+
+    /// Which actions of the order are not over although its cancellation is.
+    fn outlive(&self, cancel: &Known, state: &Value) -> Vec<(&'static str, String)> {
+        // Those of an order that was sent since may wait already.
+        if self.ordered > cancel.seq {
+            return Vec::new();
+        }
+        let placed = |action: &&Value| self.placed.contains(text(action, "actionId"));
+        let open = |action: &&Value| !matches!(text(action, "actionStatus"), "FINISHED" | "FAILED");
+        let waits = |action: &&Value| text(action, "actionStatus") == "WAITING";
+        let left = elements(state, "actionStates")
+            .take(ACTIONS)
+            .filter(placed)
+            .filter(open);
+        // One that runs rather than one that waits.
+        let Some(action) = left.min_by_key(waits) else {
+            return Vec::new();
+        };
+        let what = format!(
+            "action {} of the order is {}",
+            quote(text(action, "actionId")),
+            text(action, "actionStatus")
+        );
+        let still_running = (!waits(&action)).then(|| ("ORD-CANCEL-06", what.clone()));
+        still_running.into_iter().chain([("ORD-CANCEL-07", what)]).collect()
     }
 
     /// What is wrong in the state that shows the end of an action.
@@ -301,7 +346,11 @@ impl Running for Linked {
                 continue;
             }
             judged = true;
-            for (requirement, text) in Self::contradiction(known, state) {
+            let outlive = match known.kind.as_str() {
+                "cancelOrder" => self.outlive(known, state),
+                _ => Vec::new(),
+            };
+            for (requirement, text) in Self::contradiction(known, state).into_iter().chain(outlive) {
                 let text = format!("{} {} is FINISHED, and {text}", known.kind, quote(id));
                 findings.push(broken(requirement, entry.seq(), text));
             }
@@ -371,6 +420,39 @@ mod tests {
             json!([{ "actionId": "x", "actionStatus": "FINISHED" }, { "actionId": "y", "actionStatus": "FINISHED" }]);
         trace.state(&json!({ "actionStates": both, "paused": false }));
         assert!(trace.judge("action/linked-state").findings.is_empty());
+    }
+
+    /// What is found when a cancellation ends beside an action of the order with this status.
+    fn cancel_beside(status: &str, ordered_since: bool) -> Vec<String> {
+        let order = |update: u64| {
+            json!({ "orderId": "o", "orderUpdateId": update,
+                "nodes": [{ "nodeId": "a", "sequenceId": 0, "released": true, "actions": [] }],
+                "edges": [{ "edgeId": "a-b", "sequenceId": 1, "released": true, "actions": [{ "actionId": "w" }] }] })
+        };
+        let shown = |cancel: &str| {
+            json!({ "orderId": "o", "driving": false, "nodeStates": [], "edgeStates": [], "actionStates": [
+                { "actionId": "x", "actionStatus": cancel }, { "actionId": "w", "actionStatus": status }] })
+        };
+        let mut trace = Trace::subscriber();
+        trace.sent("order", &order(0));
+        trace.state(&shown("WAITING")).instant("cancelOrder", "x", &json!([]));
+        trace.state(&shown("RUNNING"));
+        if ordered_since {
+            trace.sent("order", &order(0));
+        }
+        trace.state(&shown("FINISHED"));
+        trace.judge("action/linked-state").summary()
+    }
+
+    #[test]
+    fn an_action_that_outlives_its_cancellation_is_found() {
+        assert!(cancel_beside("FAILED", false).is_empty());
+        assert!(cancel_beside("FINISHED", false).is_empty());
+        for status in ["RUNNING", "PAUSED", "INITIALIZING"] {
+            assert_eq!(cancel_beside(status, false), ["ORD-CANCEL-06", "ORD-CANCEL-07"]);
+        }
+        assert_eq!(cancel_beside("WAITING", false), ["ORD-CANCEL-07"]);
+        assert!(cancel_beside("WAITING", true).is_empty());
     }
 
     #[test]
