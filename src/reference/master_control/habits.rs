@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::Site;
 use super::faults::FaultName as F;
+use super::order::Window;
 use super::seen::State;
 use super::tolerances::ToleranceName as T;
 use super::vehicle::{Presence, Running, Vehicle};
@@ -120,6 +121,32 @@ impl Site {
     pub(super) fn r5_rename_horizon(&mut self, vehicle: &Vehicle, running: &mut Running) {
         for action in unreleased(running, running.released) {
             action["actionId"] = json!(self.next_id(vehicle, "action"));
+        }
+    }
+
+    /// Defects and liberties of an edge that depend on the vehicle.
+    pub(super) fn r2_edge(&self, vehicle: &Vehicle, window: Window, index: usize, edge: &mut Value) {
+        let has = |fault: F| self.faults.has(fault);
+        let Some(state) = &vehicle.state else { return };
+        let loaded = state.loads.as_ref().is_some_and(|loads| !loads.is_empty());
+        let score = state
+            .agv_position
+            .as_ref()
+            .and_then(|position| position.localization_score);
+        if let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64) {
+            if score.is_some_and(|score| score < 0.5) && has(F::R2LowScoreSlowsDown) {
+                edge["maxSpeed"] = json!(speed / 3.0);
+            } else if loaded && self.takes(T::R2SlowerWhenLoaded) {
+                edge["maxSpeed"] = json!(speed / 2.0);
+            }
+        }
+        if loaded && edge.get("corridor").is_some() && has(F::R2CorridorClosedWhenLoaded) {
+            edge["corridor"]["leftWidth"] = json!(0.0);
+            edge["corridor"]["rightWidth"] = json!(0.0);
+        }
+        let first = index == window.first && window.first > 0;
+        if first && !state.last_node_id.is_empty() && has(F::R2UpdateEdgeStartsAtVehicle) {
+            edge["startNodeId"] = json!(state.last_node_id);
         }
     }
 }

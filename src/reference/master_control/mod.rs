@@ -26,6 +26,7 @@ mod maps;
 mod odd;
 mod order;
 mod publish;
+mod repeating;
 mod rerouting;
 mod seen;
 #[cfg(test)]

@@ -164,32 +164,6 @@ impl Site {
         message
     }
 
-    /// Defects and liberties of an edge that depend on the vehicle.
-    fn r2_edge(&self, vehicle: &Vehicle, window: Window, index: usize, edge: &mut Value) {
-        let has = |fault: F| self.faults.has(fault);
-        let Some(state) = &vehicle.state else { return };
-        let loaded = state.loads.as_ref().is_some_and(|loads| !loads.is_empty());
-        let score = state
-            .agv_position
-            .as_ref()
-            .and_then(|position| position.localization_score);
-        if let Some(speed) = edge.get("maxSpeed").and_then(Value::as_f64) {
-            if score.is_some_and(|score| score < 0.5) && has(F::R2LowScoreSlowsDown) {
-                edge["maxSpeed"] = json!(speed / 3.0);
-            } else if loaded && self.takes(T::R2SlowerWhenLoaded) {
-                edge["maxSpeed"] = json!(speed / 2.0);
-            }
-        }
-        if loaded && edge.get("corridor").is_some() && has(F::R2CorridorClosedWhenLoaded) {
-            edge["corridor"]["leftWidth"] = json!(0.0);
-            edge["corridor"]["rightWidth"] = json!(0.0);
-        }
-        let first = index == window.first && window.first > 0;
-        if first && !state.last_node_id.is_empty() && has(F::R2UpdateEdgeStartsAtVehicle) {
-            edge["startNodeId"] = json!(state.last_node_id);
-        }
-    }
-
     /// Defects and liberties of nodes that depend on where in the order they are.
     fn r3_nodes(&self, running: &Running, window: Window, nodes: &mut [Value]) {
         let has = |fault: F| self.faults.has(fault);
