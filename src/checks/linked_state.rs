@@ -41,10 +41,10 @@ pub(super) const LINKED_STATE: Check = Check {
     doc: "The state that reports an action FINISHED for the first time shows what is linked to it: paused of startPause and \
           stopPause, batteryState.charging of startCharging and stopCharging, the pose (within half a metre and 20 degrees), \
           map and last node of initPosition, the one ENABLED version of enableMap; of startPause and cancelOrder also that \
-          the vehicle stands, and of cancelOrder that no node or edge is left and every action of the order is over. Not judged where another action on the \
-          same may have come in between, while the vehicle drives, after a restart, while an emergency stop, the \
-          protective field, a mode or an error may hold it, and for two minutes after what a person or a hook did to \
-          what is linked.",
+          the vehicle stands, and of cancelOrder that no node or edge is left and every action of the order is over. Not \
+          judged where another action on the same may have come in between, while the vehicle drives, after a restart, \
+          while an emergency stop, the protective field, a mode or an error may hold it, and for two minutes after what \
+          a person or a hook did to what is linked.",
     arguments: &[],
     start: |_| Box::new(Linked::default()),
 };
