@@ -11,6 +11,10 @@ use vda5050_tck::pack::{Pack, Role};
 use vda5050_tck::run::{BuiltIn, Decider, Library, Qualification, VirtualRun, decided, qualify, run_silently};
 use vda5050_tck::verdict::Verdict;
 
+/// The allocator of the program: a qualification is a million small trees.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// What is excused on one side of the interface.
 struct Side {
     role: Role,

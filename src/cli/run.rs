@@ -6,6 +6,7 @@ mod hooks;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
@@ -229,7 +230,7 @@ impl Job {
         request.command.clone_from(&self.command);
         request.motion = self.motion();
         let mut terminal = self.screen(&device_name);
-        let mut saved = |judge: &RunJudge| drop(write_result(&bundle, &judge.result()));
+        let mut saved = saving(&bundle);
         let finished = run_virtually(
             &self.library,
             &self.pack,
@@ -496,7 +497,7 @@ impl Job {
             run: self.run.clone(),
         };
         let mut terminal = self.screen(&device_name);
-        let mut saved = |judge: &RunJudge| drop(write_result(bundle, &judge.result()));
+        let mut saved = saving(bundle);
         let end = run(&mut engine, setup, &mut terminal, &mut saved).await;
         let Engine {
             link,
@@ -512,6 +513,21 @@ impl Job {
             recorder,
         };
         self.conclude(bundle, finished, terminal)
+    }
+}
+
+/// How long a result on the disk may be behind the journal. Written after every test, the results of a long run cost more
+/// than the run; what a crash leaves is complete in the journal, and `report` reads it from there.
+const SAVED_EVERY: Duration = Duration::from_secs(5);
+
+/// Keeps `result.json` on the disk while a run goes on.
+fn saving(bundle: &Bundle) -> impl FnMut(&RunJudge) + '_ {
+    let mut last: Option<Instant> = None;
+    move |judge| {
+        if last.is_none_or(|last| last.elapsed() >= SAVED_EVERY) {
+            last = Some(Instant::now());
+            drop(write_result(bundle, &judge.result()));
+        }
     }
 }
 
