@@ -7,6 +7,9 @@
     reason = "a test may fail by panicking"
 )]
 
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use vda5050_tck::pack::{Pack, Role};
 use vda5050_tck::run::{BuiltIn, Decider, Library, Qualification, VirtualRun, decided, qualify, run_silently};
 use vda5050_tck::verdict::Verdict;
@@ -22,6 +25,8 @@ struct Side {
     unfound: &'static str,
     /// Faults for which the report names something else first than what they break, and why.
     first: &'static str,
+    /// Faults of blind rounds that are found: fault, requirement, the tests that find it together.
+    found: &'static str,
     /// Name of the snapshot.
     matrix: &'static str,
 }
@@ -30,6 +35,7 @@ const AGV: Side = Side {
     role: Role::Agv,
     unfound: include_str!("qualification/unfound.tsv"),
     first: include_str!("qualification/first.tsv"),
+    found: include_str!("qualification/found.tsv"),
     matrix: "kill_matrix",
 };
 
@@ -37,6 +43,7 @@ const MASTER_CONTROL: Side = Side {
     role: Role::MasterControl,
     unfound: include_str!("qualification/master-control-unfound.tsv"),
     first: include_str!("qualification/master-control-first.tsv"),
+    found: include_str!("qualification/master-control-found.tsv"),
     matrix: "master_control_kill_matrix",
 };
 
@@ -206,6 +213,85 @@ fn lapses_and_faults(
         wrong.map(|kill| kill.fault.name).collect::<Vec<_>>()
     };
     (named(false), named(true))
+}
+
+/// A fault of a blind round, the requirement that is found broken, and the tests it takes.
+struct Found<'t> {
+    fault: &'t str,
+    requirement: &'t str,
+    tests: Vec<&'t str>,
+}
+
+impl Found<'_> {
+    /// Whether it is found, on one of the devices that the suites are proven on.
+    fn is_found(&self, library: &Library, pack: &Pack, role: Role) -> bool {
+        BuiltIn::variants(role, pack).into_iter().any(|device| {
+            let mut request = VirtualRun {
+                device,
+                ..VirtualRun::of_role(role, library, pack)
+            };
+            request.tests.retain(|test| self.tests.contains(&test.id.as_str()));
+            request.draw = None;
+            request.complete = false;
+            request.faults = vec![self.fault.to_owned()];
+            if request.tests.is_empty() {
+                return false;
+            }
+            let result = run_silently(library, pack, request).expect("a run").result;
+            decided(&result).into_iter().any(|(decider, verdict)| {
+                decider.requirement == self.requirement && matches!(verdict, Verdict::Fail | Verdict::Warning)
+            })
+        })
+    }
+}
+
+/// What was found of a blind round stays found, each fault by the tests that found it.
+#[test]
+fn what_was_found_of_blind_rounds_is_found_again() {
+    let library = library();
+    let pack = library.rules.packs.latest();
+    let mut all = Vec::new();
+    for side in [&AGV, &MASTER_CONTROL] {
+        let lines = side.found.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
+        for line in lines {
+            let mut cells = line.split('\t');
+            let mut cell = || cells.next().expect("three columns");
+            let (fault, requirement, tests) = (cell(), cell(), cell().split(' ').collect());
+            let found = Found {
+                fault,
+                requirement,
+                tests,
+            };
+            let known = BuiltIn::blind_faults(side.role).iter().find(|one| one.name == fault);
+            let known = known.unwrap_or_else(|| panic!("there is no fault {fault}"));
+            assert!(known.breaks.contains(&requirement), "{fault} does not break {requirement}");
+            all.push((side.role, found));
+        }
+    }
+    let next = AtomicUsize::new(0);
+    let lost = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some((role, found)) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    if !found.is_found(&library, pack, *role) {
+                        lost.lock().unwrap().push(found.fault);
+                    }
+                }
+            });
+        }
+    });
+    let mut lost = lost.into_inner().unwrap();
+    lost.sort_unstable();
+    assert!(lost.is_empty(), "not found any more: {lost:#?}");
+    // So many there are, and so many are found.
+    let mut shares = String::new();
+    for side in [&AGV, &MASTER_CONTROL] {
+        let found = all.iter().filter(|(role, _)| *role == side.role).count();
+        let of = BuiltIn::blind_faults(side.role).len();
+        shares.push_str(&format!("{}: {found} of {of}\n", side.role));
+    }
+    insta::assert_snapshot!("found_of_blind_rounds", shares);
 }
 
 #[test]

@@ -134,7 +134,10 @@ impl Qualification {
     pub fn matrix(&self) -> String {
         use std::fmt::Write as _;
         let mut text = String::new();
-        for kill in &self.kills {
+        // Beside the proven faults, those of blind rounds were tried on what was left to prove only.
+        let are_late = self.kills.iter().any(|kill| !self.is_of_blind_round(&kill.fault));
+        let is_shown = |kill: &&Kill| !are_late || !self.is_of_blind_round(&kill.fault);
+        for kill in self.kills.iter().filter(is_shown) {
             let verdict = kill.verdict.map_or("nothing", Verdict::word);
             let _ = writeln!(text, "{} ({verdict})", kill.fault.name);
             let mut by_requirement: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
@@ -279,10 +282,16 @@ pub fn qualify_tests(
     };
     let possible = |fault: &&Fault| faults.len() <= FEW || fault.breaks.iter().any(|id| in_version(id));
     let faults: Vec<Fault> = faults.iter().filter(possible).copied().collect();
-    let faults = &faults[..];
+    // Those of blind rounds need not be found here: they are tried on what the others leave unproven.
+    let is_blind = |fault: &Fault| BuiltIn::blind_faults(role).iter().any(|one| one.name == fault.name);
+    let (mut early, mut late): (Vec<Fault>, Vec<Fault>) = faults.iter().copied().partition(|fault| !is_blind(fault));
+    if early.is_empty() || faults.len() <= FEW {
+        early.clone_from(&faults);
+        late.clear();
+    }
     // A few faults are tried on everything; all of them would take minutes.
     let selected = |fault: &Fault, test: &Test| faults.len() <= FEW || concerns(fault, test);
-    let mut kills = each(faults, |fault| {
+    let mut kills = each(&early, |fault| {
         told(fault.name);
         kill(library, pack, &vehicles, fault, DRAWN, &|test| selected(fault, test))
     })?;
@@ -304,7 +313,8 @@ pub fn qualify_tests(
             &mut kills,
             each(&missed, |fault| kill(library, pack, &vehicles, fault, DRAWN, &|_| true))?,
         );
-        prove_the_rest(library, pack, &vehicles, faults, &deciders, &mut kills)?;
+        try_the_late(library, pack, &vehicles, &late, &deciders, &mut kills)?;
+        prove_the_rest(library, pack, &vehicles, &faults, &deciders, &mut kills)?;
     }
     let excused = library.rules.suites.unproven.iter();
     Ok(Qualification {
@@ -329,6 +339,50 @@ const FEW: usize = 5;
 /// So many faults are tried before it is looked again what is still unproven.
 const CHUNK: usize = 12;
 
+/// Tries the faults of blind rounds on the tests that decide what they break and are not proven yet.
+fn try_the_late(
+    library: &Library,
+    pack: &Pack,
+    vehicles: &[Vehicle],
+    late: &[Fault],
+    deciders: &BTreeSet<Decider>,
+    kills: &mut Vec<Kill>,
+) -> Result<(), EngineError> {
+    for some in late.chunks(CHUNK) {
+        let open = unproven_of(deciders, kills);
+        let more = each(some, |fault| {
+            let about = open.iter().filter(|one| fault.breaks.contains(&one.requirement.as_str()));
+            let places: BTreeSet<&str> = about.filter_map(|one| one.place.split(' ').next()).collect();
+            kill(library, pack, vehicles, fault, DRAWN, &|test| places.contains(test.table()))
+        })?;
+        kills.extend(more);
+    }
+    // What only some members show is tried on all that is drawn from.
+    for some in late.chunks(CHUNK) {
+        let open: BTreeSet<String> = unproven_of(deciders, kills)
+            .into_iter()
+            .map(|one| one.requirement)
+            .collect();
+        let about = |fault: &&Fault| fault.breaks.iter().any(|id| open.contains(*id));
+        let some: Vec<Fault> = some.iter().filter(about).copied().collect();
+        let more = each(&some, |fault| {
+            kill(library, pack, vehicles, fault, None, &|test| {
+                let decides = test.requirements().into_iter().any(|id| open.contains(id.as_str()));
+                test.drawn.is_some() && decides && concerns(fault, test)
+            })
+        })?;
+        merge(kills, more);
+    }
+    Ok(())
+}
+
+/// What none of these kills proves.
+fn unproven_of(deciders: &BTreeSet<Decider>, kills: &[Kill]) -> Vec<Decider> {
+    let killed: BTreeSet<&Decider> = kills.iter().flat_map(|kill| &kill.deciders).collect();
+    let open = deciders.iter().filter(|decider| !killed.contains(decider));
+    open.cloned().collect()
+}
+
 /// What is still unproven may be failed by a fault that is about something else: the tests that decide it are tried
 /// with every fault, those about similar requirements first, until all of it is proven.
 fn prove_the_rest(
@@ -339,11 +393,7 @@ fn prove_the_rest(
     deciders: &BTreeSet<Decider>,
     kills: &mut [Kill],
 ) -> Result<(), EngineError> {
-    let unproven = |kills: &[Kill]| -> Vec<Decider> {
-        let killed: BTreeSet<&Decider> = kills.iter().flat_map(|kill| &kill.deciders).collect();
-        let open = deciders.iter().filter(|decider| !killed.contains(decider));
-        open.cloned().collect()
-    };
+    let unproven = |kills: &[Kill]| unproven_of(deciders, kills);
     // A monitor may need other tests than those that decide the same: the faults that are about its requirement, or
     // failed it elsewhere, are tried on everything.
     let tests = &vehicles.first().map_or(&[][..], |vehicle| &vehicle.request.tests);
