@@ -252,7 +252,10 @@ fn what_was_found_of_blind_rounds_is_found_again() {
     let pack = library.rules.packs.latest();
     let mut all = Vec::new();
     for side in [&AGV, &MASTER_CONTROL] {
-        let lines = side.found.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
+        let lines = side
+            .found
+            .lines()
+            .filter(|line| !line.starts_with('#') && !line.is_empty());
         for line in lines {
             let mut cells = line.split('\t');
             let mut cell = || cells.next().expect("three columns");
@@ -264,7 +267,10 @@ fn what_was_found_of_blind_rounds_is_found_again() {
             };
             let known = BuiltIn::blind_faults(side.role).iter().find(|one| one.name == fault);
             let known = known.unwrap_or_else(|| panic!("there is no fault {fault}"));
-            assert!(known.breaks.contains(&requirement), "{fault} does not break {requirement}");
+            assert!(
+                known.breaks.contains(&requirement),
+                "{fault} does not break {requirement}"
+            );
             all.push((side.role, found));
         }
     }

@@ -11,7 +11,7 @@ use super::timeline::Timeline;
 use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::journal::Entry;
 use crate::journal::event::Waiver;
-use crate::pack::{Pack, Role};
+use crate::pack::{Pack, RequirementId, Role};
 use crate::pattern::Bindings;
 use crate::suite::model::{Binding, CheckUse};
 use crate::verdict::Verdict;
@@ -45,6 +45,9 @@ pub(super) struct CheckWindow {
     shared: Shared,
     with: Map<String, Value>,
     findings: Vec<CheckFinding>,
+    /// The requirements the check names, and those of them that count here.
+    decides: &'static [&'static str],
+    about: Vec<RequirementId>,
     /// How the states are read.
     mends: Mends,
     /// Those of them that are about the window.
@@ -92,10 +95,26 @@ impl CheckWindow {
             shared,
             with,
             findings: Vec::new(),
+            decides: definition.decides,
+            about: Vec::new(),
             mends: Mends::default(),
             told: Vec::new(),
             seen: 0,
         })
+    }
+
+    /// Of what the check finds, what names another requirement than the clause does is no business of the clause: the
+    /// monitor finds it by its right name. A clause about something the check never names takes everything.
+    pub(super) fn about(mut self, bindings: &[Binding]) -> Self {
+        let ids = bindings.iter().map(|binding| &binding.requirement);
+        let named = ids.filter(|id| self.decides.contains(&id.as_str()));
+        self.about = named.cloned().collect();
+        self
+    }
+
+    fn counts(&self, finding: &CheckFinding) -> bool {
+        let named = finding.requirement.as_ref();
+        self.about.is_empty() || named.is_none_or(|id| self.about.contains(id))
     }
 
     /// From now on the states are read as they are meant.
@@ -118,8 +137,9 @@ impl CheckWindow {
                 .observe(shown, &context(scene, &self.with, &self.shared), &mut self.findings);
             if next.seq() == entry.seq() {
                 let here = self.findings.iter().skip(before);
-                self.told
-                    .extend(here.filter(|finding| finding.seq == next.seq()).cloned());
+                let here = here.filter(|finding| finding.seq == next.seq() && self.counts(finding));
+                let here: Vec<CheckFinding> = here.cloned().collect();
+                self.told.extend(here);
                 said = match self.worst(before, Some(entry.seq())) {
                     Some(found) => found,
                     None if judged => Said::Right,
@@ -138,7 +158,7 @@ impl CheckWindow {
             _ => 2,
         };
         let found = self.findings.get(first..)?.iter();
-        let found = found.filter(|finding| seq.is_none_or(|seq| finding.seq == seq));
+        let found = found.filter(|finding| seq.is_none_or(|seq| finding.seq == seq) && self.counts(finding));
         found.max_by_key(severity).map(Said::of)
     }
 
@@ -168,7 +188,9 @@ impl CheckWindow {
         let before = self.findings.len();
         self.running
             .finish(end, &context(scene, &self.with, &self.shared), &mut self.findings);
-        self.told.extend(self.findings.iter().skip(before).cloned());
+        let here = self.findings.iter().skip(before);
+        let here: Vec<CheckFinding> = here.filter(|finding| self.counts(finding)).cloned().collect();
+        self.told.extend(here);
         match self.worst(before, None)? {
             Said::Wrong(holds, message) => Some((holds, message)),
             Said::Nothing | Said::Right => None,
@@ -217,6 +239,8 @@ mod tests {
             shared: Shared::default(),
             with: Map::new(),
             findings: Vec::new(),
+            decides: &[],
+            about: Vec::new(),
             mends: Mends::default(),
             told,
             seen: 0,

@@ -115,6 +115,11 @@ fn sizes(send: &Send) -> Vec<(&'static str, u64)> {
         let nodes = route.base.len() + route.horizon.len();
         all.push(("order.nodes", count(nodes)));
         all.push(("order.edges", count(nodes.saturating_sub(1))));
+        // What the vehicle is to list of it.
+        all.push(("state.nodeStates", count(nodes)));
+        all.push(("state.edgeStates", count(nodes.saturating_sub(1))));
+        let actions = route.actions.iter().map(|(_, actions)| actions.len()).sum();
+        all.push(("state.actionStates", count(actions)));
         for (place, actions) in &route.actions {
             let name = match place {
                 RoutePlace::Node(_) => "node.actions",

@@ -351,9 +351,13 @@ fn try_the_late(
     for some in late.chunks(CHUNK) {
         let open = unproven_of(deciders, kills);
         let more = each(some, |fault| {
-            let about = open.iter().filter(|one| fault.breaks.contains(&one.requirement.as_str()));
+            let about = open
+                .iter()
+                .filter(|one| fault.breaks.contains(&one.requirement.as_str()));
             let places: BTreeSet<&str> = about.filter_map(|one| one.place.split(' ').next()).collect();
-            kill(library, pack, vehicles, fault, DRAWN, &|test| places.contains(test.table()))
+            kill(library, pack, vehicles, fault, DRAWN, &|test| {
+                places.contains(test.table())
+            })
         })?;
         kills.extend(more);
     }
