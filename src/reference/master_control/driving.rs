@@ -261,9 +261,7 @@ impl Site {
     /// Extends the base before the vehicle has to halt at its end (ORD-UPD-02).
     fn extend_base(&mut self, vehicle: &mut Vehicle, running: &mut Running) {
         let Some(state) = &vehicle.state else { return };
-        let reached = self
-            .reached_by_node(running, state)
-            .unwrap_or_else(|| running.reached(Some(state)));
+        let reached = running.reached(Some(state));
         let last_order = vehicle
             .last_order_at
             .filter(|_| self.faults.has(F::R3BasePlannedEveryHalfMinute));

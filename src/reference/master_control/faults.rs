@@ -232,7 +232,6 @@ with_blind_faults! { faults!
     EmptyListMeansAll "empty-list-means-all" ["OPT-03"] "Takes an empty list of optionalParameters for support of everything.";
     LoopNumberedByNode "loop-numbered-by-node" ["ORD-UPD-11"] "Gives a node that the way passes twice the sequenceId of the first time.";
     LoopStitchedAtFirstPass "loop-stitched-at-first-pass" ["ORD-UPD-05", "ORD-UPD-03"] "Looks the stitching node up by its nodeId, and begins where the way passed it first.";
-    LoopProgressByNode "loop-progress-by-node" ["ORD-UPD-02"] "Looks up how far a vehicle is by its lastNodeId alone.";
     UpdateIdStopsAtTen "update-id-stops-at-ten" ["ORD-UPD-04"] "Compares orderUpdateIds as texts, so that 10 comes behind 9 for ever.";
     ChargingInEveryMode "charging-in-every-mode" ["MODE-04"] "Sends a vehicle whose battery is low to charge, whatever its mode.";
     VersionOfTheVehicle "version-of-the-vehicle" ["HDR-04"] "Copies the version of the last state into its own header.";

@@ -50,7 +50,6 @@ pub const LAPSES: &[(&str, &str)] = &[
         "To send an update again is allowed, not demanded.",
     ),
     ("missing-paused-is-paused", "It breaks a recommendation only."),
-    ("loop-progress-by-node", "It breaks a recommendation only."),
     ("map-not-preloaded", "It breaks a recommendation only."),
     (
         "orders-to-offline",

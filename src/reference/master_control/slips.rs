@@ -126,13 +126,6 @@ impl Site {
         }
     }
 
-    /// `loop-progress-by-node`: where the way passes the last node of the vehicle first.
-    pub(super) fn reached_by_node(&self, running: &Running, state: &State) -> Option<usize> {
-        let own = state.order_id == running.id && self.faults.has(F::LoopProgressByNode);
-        let mut stops = running.stops.iter();
-        stops.position(|stop| stop.id == state.last_node_id).filter(|_| own)
-    }
-
     /// `charging-in-every-mode`: sends a vehicle to charge whose battery has become low.
     pub(super) fn charge_anyway(&mut self, vehicle: &mut Vehicle) {
         let Some(state) = &vehicle.state else { return };
