@@ -100,6 +100,9 @@ impl Site {
             .filter(|parameter| generous || parameter.is_optional != Some(true))
             .filter(|parameter| !open(&parameter.key))
         {
+            if kind == "drop" && self.faults.has(F::LoadParametersByTable) {
+                continue;
+            }
             if !self.faults.has(F::RequiredKeyMissing) || !mandatory.is_empty() {
                 self.supply(vehicle, &mut parameters, &parameter.key, &parameter.value_data_type);
             }

@@ -64,7 +64,8 @@ impl Site {
         if !idle || vehicle.queue.is_empty() || !self.commandable(vehicle) || !self.may_begin(vehicle) {
             return;
         }
-        if let Some(due) = self.next_order_at(vehicle) {
+        let due = self.next_order_at(vehicle);
+        if let Some(due) = due.filter(|_| !self.faults.has(F::IntervalWithinOrderOnly)) {
             vehicle.at(due);
             return;
         }

@@ -47,7 +47,7 @@ impl Site {
         let stubborn = self.faults.has(F::UpdatesInService) || (manual && self.faults.has(F::R1UpdatesInManual));
         let stubborn = stubborn && self.reachable(vehicle);
         let lost = vehicle.presence == Presence::Away && vehicle.state.as_ref().is_some_and(State::takes_orders);
-        let stubborn = stubborn || (lost && self.faults.has(F::R4UpdatesToALostVehicle));
+        let stubborn = stubborn || (lost && self.faults.has(F::R4UpdatesToALostVehicle)) || self.held_update(vehicle);
         if vehicle.cancel.is_some() || !(self.commandable(vehicle) || stubborn) {
             return;
         }
@@ -84,6 +84,7 @@ impl Site {
                 vehicle.running = Some(running);
             }
             Fate::Over => {
+                vehicle.slips.triggered |= running.waits.is_some();
                 vehicle.last_order = Some(running);
                 if self.faults.has(F::R2EmptyMessageAfterOrder) {
                     self.r2_empty_order(vehicle);
@@ -201,7 +202,7 @@ impl Site {
             vehicle.at(lost);
             return true;
         }
-        if self.faults.has(F::LostOrderNotResent) || self.r5_left_paused(vehicle) {
+        if self.faults.has(F::LostOrderNotResent) || self.r5_left_paused(vehicle) || self.not_repeated(running) {
             return true;
         }
         if running.resends >= self.config.resend_limit {
@@ -308,6 +309,7 @@ impl Site {
         }
         let held = (vehicle.r1_stale && self.faults.has(F::R1VehicleReturnStopsUpdates))
             || (state.informs() && self.faults.has(F::R1InformationHoldsBase))
+            || (state.paused.is_none() && self.faults.has(F::MissingPausedIsPaused))
             || (running.r3_paused && self.faults.has(F::R4NoBaseAfterPause));
         let first = self.config.vehicles.first() == Some(&vehicle.config);
         if held || (!first && self.faults.has(F::FirstVehicleExtended)) {
@@ -353,9 +355,11 @@ impl Site {
         let at_once = running.changed && self.faults.has(F::R2IntervalIgnoredOnReroute);
         let at_once = at_once || (asked && self.faults.has(F::R3IntervalNotWhenBaseAsked));
         if let Some(due) = self.next_order_at(vehicle).filter(|_| !at_once) {
+            vehicle.slips.held = true;
             vehicle.at(due);
             return;
         }
+        vehicle.slips.held = false;
         let fresh = running.released.min(target)..target;
         let mut maps: Vec<String> = running.stops[fresh].iter().map(|stop| stop.map_id.clone()).collect();
         if self.faults.has(F::R4ChecksTheFirstMapOnly) {
@@ -403,11 +407,12 @@ impl Site {
         } else {
             window
         };
+        let window = self.stitched_at_first_pass(running, window);
         let stuck = (running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats))
             || (running.changed && self.faults.has(F::R1UpdateIdKeptOnReroute));
         let stuck = stuck || (running.resends > 0 && self.faults.has(F::R3UpdateIdKeptAfterResend));
         let before = running.update_id;
-        running.update_id += u32::from(!stuck);
+        running.update_id += u32::from(!(stuck || running.update_id == 10 && self.faults.has(F::UpdateIdStopsAtTen)));
         if self.faults.has(F::R4CountsUpdatesFromTheReportedState) {
             let state = vehicle.state.as_ref().filter(|state| state.order_id == running.id);
             running.update_id = state.map_or(0, |state| state.order_update_id).saturating_add(1);
@@ -435,7 +440,10 @@ impl Site {
 
     /// Calls the order off when a trigger does not come in time (ACT-39).
     fn supervise_trigger(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
-        if self.faults.has(F::TriggerUnsupervised) || running.r2_unsupervised {
+        if self.faults.has(F::TriggerUnsupervised)
+            || running.r2_unsupervised
+            || self.left_waiting(vehicle, running, state)
+        {
             return Fate::Runs;
         }
         let first = running.message.pointer("/nodes/0/sequenceId").and_then(Value::as_u64);

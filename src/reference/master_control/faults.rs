@@ -218,6 +218,25 @@ with_blind_faults! { faults!
     InformationObeyed "information-obeyed" ["INFO-02"] "Pauses vehicles that report an information.";
     LocalizationObeyed "localization-obeyed" ["INFO-03"] "Gives no work to vehicles with a low localizationScore.";
     VisualizationObeyed "visualization-obeyed" ["VIS-03"] "Takes the position of a vehicle from the visualization.";
+
+    // What others have written down as mistakes to be expected
+    IntervalWithinOrderOnly "interval-within-order-only" ["FACT-13"] "Keeps minOrderInterval between the messages of one order only.";
+    QueuedUpdateInService "queued-update-in-service" ["MODE-04"] "Looks at the mode when it plans an update, not when minOrderInterval lets it out.";
+    InstantsCountedApart "instants-counted-apart" ["ORD-MSG-17"] "Counts actions of orders and instant actions apart, under the same kind of id.";
+    HeaderIdCountsActions "header-id-counts-actions" ["HDR-02"] "Raises headerId by the number of instant actions in a message.";
+    LostUpdateNotResent "lost-update-not-resent" ["MQTT-10"] "Takes every update for accepted once it is sent.";
+    TriggerForgottenInPause "trigger-forgotten-in-pause" ["ACT-39"] "Stops the time of waitForTrigger when the vehicle is paused, and never starts it again.";
+    TriggerSupervisedOnce "trigger-supervised-once" ["ACT-39"] "Supervises waitForTrigger no more once a vehicle has been given its trigger in time.";
+    EnabledForFleet "enabled-for-fleet" ["MAP-09"] "Takes a map for enabled on every vehicle once one of them has enabled it.";
+    LoadParametersByTable "load-parameters-by-table" ["FACT-15"] "Gives drop only the parameters that the text demands, not those the factsheet does.";
+    EmptyListMeansAll "empty-list-means-all" ["OPT-03"] "Takes an empty list of optionalParameters for support of everything.";
+    LoopNumberedByNode "loop-numbered-by-node" ["ORD-UPD-11"] "Gives a node that the way passes twice the sequenceId of the first time.";
+    LoopStitchedAtFirstPass "loop-stitched-at-first-pass" ["ORD-UPD-05", "ORD-UPD-03"] "Looks the stitching node up by its nodeId, and begins where the way passed it first.";
+    UpdateIdStopsAtTen "update-id-stops-at-ten" ["ORD-UPD-04"] "Compares orderUpdateIds as texts, so that 10 comes behind 9 for ever.";
+    ChargingInEveryMode "charging-in-every-mode" ["MODE-04"] "Sends a vehicle whose battery is low to charge, whatever its mode.";
+    VersionOfTheVehicle "version-of-the-vehicle" ["HDR-04"] "Copies the version of the last state into its own header.";
+    MissingPausedIsPaused "missing-paused-is-paused" ["ORD-UPD-02", "STATE-17"] "Takes a vehicle that does not say whether it is paused for paused.";
+    ZeroRequiredOmitted "zero-required-omitted" ["OPT-05"] "Leaves out what a vehicle requires where its value is zero.";
 }
 
 /// The fault of that name.

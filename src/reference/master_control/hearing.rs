@@ -48,6 +48,8 @@ impl MasterControl {
                 }
                 vehicle.r4_state_header = number.or(vehicle.r4_state_header);
                 vehicle.r2_state_time.clone_from(&header.timestamp);
+                let version = message.get("version").and_then(Value::as_str);
+                vehicle.slips.version = version.map(str::to_owned);
                 if let Ok(state) = serde_json::from_value::<State>(message) {
                     self.site.state_heard(vehicle, state);
                 }
@@ -329,8 +331,14 @@ impl Site {
             vehicle.r1_enabled.extend(enabled.map(|map| map.map_id.clone()));
         }
         vehicle.absolved &= !state.is_fit(self.config.low_battery);
+        let enabled = state.maps.iter().flatten().filter(|map| map.map_status == "ENABLED");
+        let serial = &vehicle.config.serial_number;
+        self.slips
+            .enabled
+            .extend(enabled.map(|map| (map.map_id.clone(), serial.clone())));
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
+        self.charge_anyway(vehicle);
         if self.faults.has(F::R1LowScoreRelocated) {
             self.relocate(vehicle);
         }

@@ -27,7 +27,9 @@ impl Site {
         if !self.offers(vehicle.factsheet.as_ref(), kind, "INSTANT") {
             return None;
         }
+        self.slips.instant = true;
         let mut action = self.action(vehicle, kind, given);
+        self.slips.instant = false;
         let offers = vehicle.factsheet.as_ref().and_then(|sheet| sheet.actions.as_ref());
         let listed = offers.and_then(|offers| offers.get(kind)?.blocking_types.as_ref());
         let nothing = listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE"));

@@ -45,6 +45,11 @@ pub const LAPSES: &[(&str, &str)] = &[
     ),
     ("base-extended-late", "It breaks a recommendation only."),
     ("new-base-request-ignored", "It breaks a recommendation only."),
+    (
+        "lost-update-not-resent",
+        "To send an update again is allowed, not demanded.",
+    ),
+    ("missing-paused-is-paused", "It breaks a recommendation only."),
     ("map-not-preloaded", "It breaks a recommendation only."),
     (
         "orders-to-offline",

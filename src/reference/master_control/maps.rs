@@ -203,6 +203,9 @@ impl Site {
             if !absent && self.faults.has(F::R3MapOnBoardIsEnough) {
                 continue;
             }
+            if self.enabled_elsewhere(vehicle, map_id) {
+                continue;
+            }
             if vehicle.r1_enabled.contains(map_id) || (absent && self.faults.has(F::R1AbsentMapUsed)) {
                 continue;
             }

@@ -29,6 +29,7 @@ mod publish;
 mod repeating;
 mod rerouting;
 mod seen;
+mod slips;
 #[cfg(test)]
 mod tests;
 pub mod tolerances;
@@ -96,6 +97,8 @@ struct Site {
     r4_beat_at: Option<Moment>,
     /// The serial number of the vehicle that got the last order (`r5-header-of-other-vehicle`).
     r5_ordered: Option<String>,
+    /// What a forgetful master control keeps of its fleet.
+    slips: slips::FleetSlips,
 }
 
 impl Site {
@@ -124,6 +127,9 @@ impl Site {
         if restarts && what == "action" {
             self.r1_actions += 1;
             count = self.r1_actions;
+        }
+        if self.faults.has(FaultName::InstantsCountedApart) && what == "action" {
+            count = self.number_apart();
         }
         if self.faults.has(FaultName::R4OrderIdsFromTheStartAfterReconnect) && what == "order" {
             self.r4_orders += 1;
@@ -235,6 +241,7 @@ impl MasterControl {
                 r4_first_sheet: None,
                 r4_beat_at: None,
                 r5_ordered: None,
+                slips: slips::FleetSlips::default(),
             },
             fleet,
             by_topic,

@@ -110,6 +110,7 @@ impl Site {
             })
             .collect();
         self.r3_nodes(running, window, &mut nodes);
+        self.numbered_by_node(running, &mut nodes);
         if self.faults.has(F::R2LoopReleasedById) {
             released_by_id(&mut nodes);
         }
@@ -546,7 +547,13 @@ impl Site {
             let harmless = name.starts_with("order.nodes") || name == "order.edges.maxSpeed" || everywhere;
             return value.filter(|_| harmless);
         };
+        if self.faults.has(F::EmptyListMeansAll) && sheet.optional.is_empty() {
+            return value.or(Some(default));
+        }
         match sheet.support(name) {
+            Some("REQUIRED") if self.faults.has(F::ZeroRequiredOmitted) => {
+                value.or(Some(default)).filter(super::slips::counts)
+            }
             Some("REQUIRED") if name.starts_with("order.nodes") && self.faults.has(F::R3RequiredNodeFieldsLeftOut) => {
                 value
             }

@@ -125,6 +125,7 @@ impl Site {
         if name == "order" && self.r1_resending && self.faults.has(F::R2SerialNumberMissingInResend) {
             message.shift_remove("serialNumber");
         }
+        self.slips_header(vehicle, name, body, &mut message);
         let cancels = holds(name, body, &["cancelOrder"]);
         if cancels && self.faults.has(F::R1HeaderIdMissingInCancel) {
             message.shift_remove("headerId");

@@ -339,6 +339,8 @@ pub(super) struct Vehicle {
     pub(super) r5_repeat: bool,
     /// No order is begun before, after one was called off (`r5-pause-after-cancel-before-next-order`).
     pub(super) r5_rest: Option<Moment>,
+    /// What a forgetful master control keeps of it.
+    pub(super) slips: super::slips::Slips,
     /// It has not driven since it came back (`r5-stops-pause-after-reconnect-only-by-operator`).
     pub(super) r5_back: bool,
 }
