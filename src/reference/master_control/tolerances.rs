@@ -157,12 +157,13 @@ R2ReconnectsLater "r2-reconnects-later" ["MQTT-10"] "It waits four times as long
 
 /// A set of tolerances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tolerances(u128);
+pub struct Tolerances([u128; 2]);
 
 impl Tolerances {
     /// Whether the master control takes this liberty.
     pub(super) fn has(self, tolerance: ToleranceName) -> bool {
-        self.0 & (1 << (tolerance as u128)) != 0
+        let index = tolerance as usize;
+        self.0[index / 128] & (1 << (index % 128)) != 0
     }
 }
 
@@ -176,7 +177,8 @@ impl MasterControlConfig {
         let position = all.position(|tolerance| tolerance.name == name);
         let tolerance = position.and_then(|at| ALL.get(at)).copied();
         let tolerance = tolerance.ok_or_else(|| UnknownTolerance(name.to_owned()))?;
-        self.tolerances.0 |= 1 << (tolerance as u128);
+        let index = tolerance as usize;
+        self.tolerances.0[index / 128] |= 1 << (index % 128);
         match tolerance {
             ToleranceName::AnswersSlowly => self.answers_after = Duration::from_millis(500),
             ToleranceName::NoHorizon => self.horizon_length = 0,
