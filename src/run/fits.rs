@@ -118,8 +118,6 @@ fn sizes(send: &Send) -> Vec<(&'static str, u64)> {
         // What the vehicle is to list of it.
         all.push(("state.nodeStates", count(nodes)));
         all.push(("state.edgeStates", count(nodes.saturating_sub(1))));
-        let actions = route.actions.iter().map(|(_, actions)| actions.len()).sum();
-        all.push(("state.actionStates", count(actions)));
         for (place, actions) in &route.actions {
             let name = match place {
                 RoutePlace::Node(_) => "node.actions",

@@ -148,7 +148,6 @@ impl Agv {
 
     fn protocol_limits(&self) -> Value {
         let nodes = self.config.max_nodes;
-        let reported = if self.faults.has(F::OwnLimitExceeded) { 1 } else { nodes };
         let min_state_interval = match self.config.min_state_interval.as_secs_f64() {
             _ if self.faults.has(F::MinStateIntervalIgnored) => 5.0,
             seconds => seconds,
@@ -166,8 +165,8 @@ impl Agv {
                 "node.actions": self.config.max_actions,
                 "edge.actions": self.config.max_actions,
                 "instantActions": self.config.max_instant_actions,
-                "state.nodeStates": reported,
-                "state.edgeStates": reported,
+                "state.nodeStates": nodes,
+                "state.edgeStates": nodes,
                 "state.loads": 1,
                 "state.errors": MAX_ERRORS,
             },
@@ -186,7 +185,7 @@ impl Agv {
                     .for_each(|limit| *limit = json!(0));
             }
         }
-        if self.faults.has(F::R1ActionStatesLimitExceeded) {
+        if self.faults.has(F::OwnLimitExceeded) || self.faults.has(F::R1ActionStatesLimitExceeded) {
             limits["maxArrayLens"]["state.actionStates"] = json!(1);
         }
         if self.faults.has(F::R1ArrayLimitsNested) {

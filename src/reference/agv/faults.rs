@@ -114,7 +114,7 @@ with_blind_faults! { faults!
     LoadSetTwice "load-set-twice" ["FACT-09"] "Uses one name for two load sets.";
     ParameterTypeUnknown "parameter-type-unknown" ["BP-05", "FACT-07", "JSON-02"] "Calls the type of its parameters DOUBLE.";
     VersionsNumeric "versions-numeric" ["FACT-10", "JSON-06"] "Gives its software version as a number.";
-    OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one node in its states and sends more.";
+    OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one action in its states and sends more.";
     MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
     PickAsInstantAction "pick-as-instant-action" ["ACT-09"] "Declares pick as an instant action.";
     PositioningAsInstantAction "positioning-as-instant-action" ["ACT-09"] "Declares finePositioning as an instant action.";

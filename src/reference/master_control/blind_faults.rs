@@ -8,6 +8,27 @@ macro_rules! with_blind_faults {
     ($registry:ident! $($own:tt)*) => {
         $registry! {
             blind {
+R6LocalTimeMarkedAsUtc "r6-local-time-marked-as-utc" ["HDR-03"] "It writes its local time into the timestamp and puts a Z behind it.";
+R6InstantTimestampWithOffset "r6-instant-timestamp-with-offset" ["HDR-03"] "It writes the timestamp of instantActions with +00:00 in place of the Z, whilst orders are right.";
+R6LostStateStopsProgress "r6-lost-state-stops-progress" ["MQTT-10", "ORD-UPD-02"] "It follows the vehicle node by node and sends no further base once the state of one node was lost.";
+R6OrderIdFromRoute "r6-order-id-from-route" ["ORD-MSG-02"] "It forms the orderId from start and destination, so that the same transport on another day has the same orderId.";
+R6OrderIdKeptAfterCancel "r6-order-id-kept-after-cancel" ["ORD-MSG-02"] "It sends the order after a cancellation under the orderId of the cancelled one, with orderUpdateId 0.";
+R6OrderIdWithBlankAndSlash "r6-order-id-with-blank-and-slash" ["JSON-04"] "It forms the orderId with a blank and a slash, such as \"Transport 12/1\".";
+R6ThetaNotNormalisedOnReverse "r6-theta-not-normalised-on-reverse" ["ORD-MSG-09", "MAP-02"] "It adds pi to the theta of a node that is approached against the drawn direction and does not bring it back below pi.";
+R6ParameterValuesAsStrings "r6-parameter-values-as-strings" ["BP-05", "FACT-15"] "It sends all values of action parameters as strings, also numbers and Booleans.";
+R6EdgeIntoLastBaseNodeUnreleased "r6-edge-into-last-base-node-unreleased" ["ORD-09"] "It leaves the edge into the last base node of an update unreleased, although the node is released.";
+R6LoopNodeKeepsFirstSequenceId "r6-loop-node-keeps-first-sequence-id" ["ORD-UPD-11"] "It gives a node that the route visits twice the sequenceId of its first visit.";
+R6StitchingThetaDropped "r6-stitching-theta-dropped" ["ORD-UPD-06"] "It leaves the theta of the stitching node out of an update, as the vehicle no longer stops there.";
+R6UpdateIdRaisedOnlyWithBase "r6-update-id-raised-only-with-base" ["ORD-UPD-04"] "It leaves the orderUpdateId as it is when only the horizon changes.";
+R6RedirectTakesBarredEdge "r6-redirect-takes-barred-edge" ["ORD-12"] "It leads a vehicle across an edge barred for it when it plans anew after a cancellation; only first plans look at the bars.";
+R6ResumeRepeatsBase "r6-resume-repeats-base" ["ORD-UPD-05", "ORD-UPD-03"] "It sends the order once more from its first node, with the next orderUpdateId, when a pause ends.";
+R6QueuedUpdateAfterCancel "r6-queued-update-after-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends an update that waited for minOrderInterval after the cancelOrder that came in between.";
+R6AfterCancelStartsAtOldBaseEnd "r6-after-cancel-starts-at-old-base-end" ["ORD-CANCEL-14", "ORD-03"] "It begins the order after a cancellation at the end of the cancelled base and not at the node where the vehicle stopped.";
+R6MapRememberedOverReconnect "r6-map-remembered-over-reconnect" ["MAP-09"] "It remembers a map as ENABLED over a reconnect of the vehicle and does not look at maps again.";
+R6DeleteMapUnderRunningOrder "r6-delete-map-under-running-order" ["IACT-02"] "It sends deleteMap for the old version of a map whilst the vehicle still drives an order on it.";
+R6TriggerTimeoutWithoutCancel "r6-trigger-timeout-without-cancel" ["ACT-39", "ORD-CANCEL-01"] "It sends the next order when waitForTrigger has timed out, without cancelOrder.";
+R6OptionsCheckedOnFirstOrderOnly "r6-options-checked-on-first-order-only" ["OPT-03"] "It leaves unsupported optional fields out of new orders but not out of updates.";
+R6NumericalIdsForOrdersOnly "r6-numerical-ids-for-orders-only" ["FACT-12"] "It respects idNumericalOnly for orderId, nodeId and edgeId but not for actionId.";
 R5WholeOrderAgainAfterReconnect "r5-whole-order-again-after-reconnect" ["ORD-UPD-05", "ORD-UPD-03"] "It sends the whole order from its first node on as an update, with the next orderUpdateId, when a vehicle with a running order comes ONLINE again.";
 R5StitchingNodeDeviationReset "r5-stitching-node-deviation-reset" ["ORD-UPD-06"] "It sends the stitching node of an update with the deviation of a stop (zero), although it was first sent with the deviation of a pass-through node.";
 R5BaseTakenBackOnDestinationChange "r5-base-taken-back-on-destination-change" ["ORD-UPD-03"] "It sends the stitching node as not released in the update that changes the destination.";

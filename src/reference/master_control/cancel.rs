@@ -101,6 +101,10 @@ impl Site {
             }
             return;
         }
+        if let Some(running) = &mut vehicle.running {
+            // Only a faulty master control has made one.
+            vehicle.r6_late = running.r6_waiting.take();
+        }
         vehicle.cancel = Some(Cancel { action_id, then });
     }
 }

@@ -169,6 +169,8 @@ impl MasterControl {
             }
             if returning {
                 self.site.r1_returned(vehicle);
+            } else if self.site.takes(T::R6ClearsRetainedOrderTopics) {
+                self.site.r6_clear(vehicle);
             }
         }
         if returning {

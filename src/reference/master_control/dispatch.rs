@@ -76,6 +76,9 @@ impl Site {
             vehicle.at(due);
             return;
         }
+        if self.faults.has(F::R6RedirectTakesBarredEdge) {
+            vehicle.r1_blind = vehicle.r1_cancelled;
+        }
         let Some(way) = self.planned(vehicle, &transport) else {
             // There is no way, or the vehicle cannot be told it.
             vehicle.queue.pop_front();
@@ -102,6 +105,14 @@ impl Site {
             if running.transport.begun > 0 {
                 running.id = format!("{}-{}", running.id, running.transport.begun);
             }
+        }
+        if self.faults.has(F::R6OrderIdFromRoute) {
+            running.id = super::sixth::route_id(&running);
+        }
+        if self.faults.has(F::R6OrderIdKeptAfterCancel)
+            && let Some((id, _)) = &vehicle.r1_kept
+        {
+            running.id.clone_from(id);
         }
         if self.faults.has(F::R1OrderIdKeptAfterCancel)
             && let Some((id, update)) = &vehicle.r1_kept
@@ -157,6 +168,15 @@ impl Site {
             } else {
                 end.min(released.saturating_add(self.horizon_length()))
             },
+        };
+        let window = if self.takes(T::R6OneNodeFirst) {
+            Window {
+                first: 0,
+                released: 1,
+                end: 1,
+            }
+        } else {
+            window
         };
         if let Some(map_id) = maps.first().filter(|_| self.takes(T::R3EnablesMapBeforeEachOrder)) {
             let seen = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
@@ -215,6 +235,7 @@ impl Site {
         running.resends = 0;
         running.confirmed = false;
         running.changed = false;
+        running.r6_waiting = None;
         vehicle.last_order_at = Some(now);
         vehicle.at(self.lost_after(now));
         if !self.faults.has(F::OrdersNotSent) {

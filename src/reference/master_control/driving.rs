@@ -116,6 +116,7 @@ impl Site {
         if let Some(running) = &mut vehicle.running {
             running.r3_paused |= paused && running.accepted;
         }
+        self.r6_cancel_on_fatal(vehicle);
         if informs
             && vehicle.running.is_some()
             && vehicle.cancel.is_none()
@@ -146,6 +147,9 @@ impl Site {
 
     fn fate(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
         let shown = state.order_id == running.id;
+        // The state from before the order names the order called off, under the same id.
+        let older = !running.accepted && vehicle.state_at <= running.sent_at;
+        let shown = shown && !(older && self.faults.has(F::R6OrderIdKeptAfterCancel));
         if shown {
             running.accepted = true;
             running.confirmed |= state.order_update_id >= running.update_id;
@@ -270,7 +274,10 @@ impl Site {
             vehicle.at(due);
             return;
         }
-        if running.r3_held || self.r5_left_paused(vehicle) {
+        if running.r3_held || running.r6_skipped || self.r5_left_paused(vehicle) {
+            return;
+        }
+        if state.is_paused() && self.takes(T::R6NoUpdateWhilePaused) {
             return;
         }
         let stopped = !matches!(state.safety_state.e_stop.as_str(), "NONE" | "");
@@ -329,12 +336,16 @@ impl Site {
         } else {
             1
         };
+        let urgent = ahead <= enough || asked || eager;
+        if self.takes(T::R6HorizonWithdrawnAndGivenAgain) && !urgent {
+            super::sixth::withdraw_horizon(vehicle, running);
+        }
         let wanted = if withdraws || showing || short || running.r4_drops_horizon {
             false
         } else if self.faults.has(F::BaseExtendedLate) || spent {
             ahead == 0 && !state.driving
         } else {
-            ahead <= enough || asked || eager
+            urgent
         };
         if !(wanted || running.changed) || self.localization_shunned(vehicle) {
             return;
@@ -356,6 +367,15 @@ impl Site {
         let at_once = at_once || (asked && self.faults.has(F::R3IntervalNotWhenBaseAsked));
         if let Some(due) = self.next_order_at(vehicle).filter(|_| !at_once) {
             vehicle.slips.held = true;
+            if self.faults.has(F::R6QueuedUpdateAfterCancel) {
+                let released = target.max(running.released);
+                let window = Window {
+                    first: running.released.saturating_sub(1),
+                    released,
+                    end: free.min(released.saturating_add(self.horizon_length())),
+                };
+                self.r6_queue(vehicle, running, window);
+            }
             vehicle.at(due);
             return;
         }
@@ -411,6 +431,8 @@ impl Site {
         let stuck = (running.update_id > 0 && self.faults.has(F::SecondUpdateRepeats))
             || (running.changed && self.faults.has(F::R1UpdateIdKeptOnReroute));
         let stuck = stuck || (running.resends > 0 && self.faults.has(F::R3UpdateIdKeptAfterResend));
+        let shown_only = running.changed && target <= running.released;
+        let stuck = stuck || (shown_only && self.faults.has(F::R6UpdateIdRaisedOnlyWithBase));
         let before = running.update_id;
         running.update_id += u32::from(!(stuck || running.update_id == 10 && self.faults.has(F::UpdateIdStopsAtTen)));
         if self.faults.has(F::R4CountsUpdatesFromTheReportedState) {
@@ -480,6 +502,10 @@ impl Site {
             vehicle.at(now + self.config.trigger_timeout);
             self.instant(vehicle, "startPause", &Value::Null);
             return Fate::Runs;
+        }
+        if due <= now && self.faults.has(F::R6TriggerTimeoutWithoutCancel) {
+            vehicle.r1_hasty = true;
+            return Fate::Over;
         }
         if due <= now && self.faults.has(F::R5TriggerTimeoutOnlyDropsTransport) {
             return Fate::Over;

@@ -187,6 +187,7 @@ impl Site {
             vehicle.r2_stale = true;
             vehicle.r4_returned = vehicle.running.is_some();
             self.r5_returned(vehicle);
+            self.r6_returned(vehicle);
             if let Some(running) = &mut vehicle.running
                 && self.faults.has(F::R2UpdateIdsRestartWithVehicle)
             {
@@ -200,6 +201,9 @@ impl Site {
             vehicle.give_time(self.now.moment);
             vehicle.absolved = self.faults.has(F::OnlineIsHealthy);
             self.forget_on_return(vehicle);
+            if self.takes(T::R6FactsheetRequestAtEachOnline) && self.config.has("factsheetRequest") {
+                self.instant(vehicle, "factsheetRequest", &Value::Null);
+            }
             if self.takes(T::R5StateRequestAfterOnline) {
                 self.instant(vehicle, "stateRequest", &Value::Null);
             }
@@ -336,6 +340,7 @@ impl Site {
         self.slips
             .enabled
             .extend(enabled.map(|map| (map.map_id.clone(), serial.clone())));
+        self.r6_state(vehicle, &state);
         vehicle.state = Some(state);
         vehicle.state_at = self.now.moment;
         self.charge_anyway(vehicle);

@@ -120,6 +120,10 @@ impl Site {
             if actions.is_empty() {
                 break;
             }
+            let asks = self.takes(T::R6SeveralInstantActionsInOneMessage) && actions.len() < limit.min(10);
+            if asks && !actions.iter().any(|action| action["actionType"] == "stateRequest") {
+                actions.extend(self.r6_question(vehicle));
+            }
             self.publish(vehicle, "instantActions", &json!({ "actions": actions }));
             vehicle.at(self.lost_after(now));
         }

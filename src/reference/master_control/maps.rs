@@ -129,6 +129,12 @@ impl Site {
                     }
                     id
                 }
+                (Stage::Download | Stage::DownloadAgain, true)
+                    if vehicle.running.is_some() && self.faults.has(F::R6DeleteMapUnderRunningOrder) =>
+                {
+                    self.r6_tidy_up(vehicle, &job.map);
+                    None
+                }
                 (Stage::Download | Stage::DownloadAgain, true) if self.takes(T::R2EnablesAfterDownload) => {
                     self.enable_after_download(vehicle, &job.map);
                     None
@@ -203,7 +209,7 @@ impl Site {
             if !absent && self.faults.has(F::R3MapOnBoardIsEnough) {
                 continue;
             }
-            if self.enabled_elsewhere(vehicle, map_id) {
+            if self.enabled_elsewhere(vehicle, map_id) || vehicle.r6_enabled.contains(map_id) {
                 continue;
             }
             if vehicle.r1_enabled.contains(map_id) || (absent && self.faults.has(F::R1AbsentMapUsed)) {
@@ -341,7 +347,7 @@ fn other_version(vehicle: &Vehicle, map: &SiteMap) -> String {
 }
 
 /// `r5-duplicate-deletes-enabled-version`: the version of a map that is enabled, if there is one.
-fn enabled_version(vehicle: &Vehicle, map: &SiteMap) -> String {
+pub(super) fn enabled_version(vehicle: &Vehicle, map: &SiteMap) -> String {
     let maps = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
     let mut maps = maps.into_iter().flatten();
     let enabled = maps.find(|seen| seen.map_id == map.map_id && seen.map_status == "ENABLED");

@@ -29,6 +29,7 @@ mod publish;
 mod repeating;
 mod rerouting;
 mod seen;
+mod sixth;
 mod slips;
 #[cfg(test)]
 mod tests;
@@ -118,6 +119,9 @@ impl Site {
         if self.faults.has(FaultName::R3OrderIdOfTheMinute) && what == "order" {
             return self.now.utc.as_second().div_euclid(60).to_string();
         }
+        if self.faults.has(FaultName::R6OrderIdWithBlankAndSlash) && what == "order" {
+            return format!("Transport {}/{}", self.session, self.ids);
+        }
         if self.faults.has(FaultName::IdLimitIgnored) {
             return format!("{what}-{}-{:064}", self.session, self.ids);
         }
@@ -139,6 +143,8 @@ impl Site {
         let sheet = vehicle.factsheet.as_ref();
         let numerical =
             sheet.is_some_and(|sheet| sheet.ids_numerical) && !self.faults.has(FaultName::NumericalIdsIgnored);
+        let lettered = what == "action" && self.faults.has(FaultName::R6NumericalIdsForOrdersOnly);
+        let numerical = numerical && !lettered;
         let heedless = what == "action" && self.faults.has(FaultName::R2ActionIdLimitIgnored);
         let longest = sheet
             .and_then(|sheet| sheet.id_length)
@@ -289,6 +295,7 @@ impl Site {
         self.r4_call_off(vehicle);
         self.r5_declare_silent(vehicle);
         self.r5_repeat(vehicle);
+        self.r6_send_late(vehicle);
         self.miss_factsheet(vehicle);
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);

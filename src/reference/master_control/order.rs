@@ -78,11 +78,15 @@ impl Site {
         let forgetful = self.faults.has(F::R1RequiredOnlyInFirstMessage) && window.first > 0;
         let led = running.r1_rerouted && self.faults.has(F::R2RequiredMissingAfterReroute);
         let forgetful = forgetful || (led && window.first > 0);
+        let open = sheet.filter(|_| window.first > 0 && self.faults.has(F::R6OptionsCheckedOnFirstOrderOnly));
+        let open = open.map(super::sixth::open);
         let mut nodes: Vec<Value> = (window.first..window.end)
             .filter_map(|index| {
                 let stop = running.stops.get(index)?;
                 let without = hurried && index >= window.released || forgetful && index > window.first;
                 let sheet = if without { lax.as_ref() } else { sheet };
+                // The stitching node stays as it was.
+                let sheet = open.as_ref().filter(|_| index > window.first).or(sheet);
                 let goal = index + 1 == running.stops.len();
                 let passed = index > 0 && !goal && stop.actions.is_empty();
                 let unlimited = (passed && self.faults.has(F::R4NegativeDeviationForNoLimit)).then(|| Stop {
@@ -111,6 +115,7 @@ impl Site {
             .collect();
         self.r3_nodes(running, window, &mut nodes);
         self.numbered_by_node(running, &mut nodes);
+        self.r6_nodes(running, window, &mut nodes);
         if self.faults.has(F::R2LoopReleasedById) {
             released_by_id(&mut nodes);
         }
@@ -124,11 +129,13 @@ impl Site {
                 let leg = running.legs.get(index)?;
                 let without = hurried && index + 1 >= window.released || forgetful;
                 let sheet = if without { lax.as_ref() } else { sheet };
+                let sheet = open.as_ref().or(sheet);
                 let mut edge = self.edge(sheet, leg, ends, index, index + 1 < window.released);
                 edge["sequenceId"] = json!(running.r1_number(2 * index + 1));
                 self.r1_edge(running, leg, window, index, &mut edge);
                 self.r2_edge(vehicle, window, index, &mut edge);
                 self.r3_edge(vehicle, running, window, index, &mut edge);
+                self.r6_edge(vehicle, running, window, index, &mut edge);
                 Some(edge)
             })
             .collect();

@@ -307,6 +307,12 @@ impl Site {
             {
                 time = json!(text.trim_end_matches('Z'));
             }
+            if name == "instantActions"
+                && sends(F::R6InstantTimestampWithOffset)
+                && let Some(text) = time.as_str()
+            {
+                time = json!(text.replace('Z', "+00:00"));
+            }
             header.insert("timestamp".into(), time);
         }
         let version = &self.config.version;
@@ -374,6 +380,10 @@ impl Site {
         let seconds = jiff::Timestamp::from_second(utc.as_second()).unwrap_or(utc);
         match () {
             () if self.takes(T::R3WholeSecondTimestamps) => json!(format!("{seconds:.2}")),
+            () if self.faults.has(F::R6LocalTimeMarkedAsUtc) => {
+                let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);
+                json!(format!("{local:.2}"))
+            }
             () if self.faults.has(F::R3TimestampWithComma) => json!(text.replace('.', ",")),
             () if self.faults.has(F::TimestampLocal) => {
                 let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);

@@ -32,6 +32,14 @@ macro_rules! tolerances {
 tolerances! {
     // Of blind rounds: the suites may still accuse or miss something with them.
     blind {
+R6FactsheetRequestAtEachOnline "r6-factsheet-request-at-each-online" ["IACT-02", "ORD-MSG-17"] "It requests the factsheet each time that a vehicle comes ONLINE.";
+R6SeveralInstantActionsInOneMessage "r6-several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message.";
+R6HorizonWithdrawnAndGivenAgain "r6-horizon-withdrawn-and-given-again" ["ORD-UPD-12", "ORD-UPD-03"] "It takes the horizon back by an update with the stitching node only and gives it again by the next update.";
+R6NoUpdateWhilePaused "r6-no-update-while-paused" ["STATE-17", "ORD-UPD-02"] "It sends no further base as long as the vehicle is paused.";
+R6OneNodeFirst "r6-one-node-first" ["ORD-02", "ORD-MSG-06"] "It first sends an order with only the node where the vehicle stands and adds the way by an update.";
+R6CorridorWithOneSideZero "r6-corridor-with-one-side-zero" ["CORR-05", "CORR-09"] "It sends a corridor with width only to the left where there is no room to the right.";
+R6ClearsRetainedOrderTopics "r6-clears-retained-order-topics" ["MQTT-02", "TOPIC-13"] "It publishes an empty retained message on order and instantActions when it starts, to clear leftovers.";
+R6CancelsOnFatal "r6-cancels-on-fatal" ["IACT-02", "CONN-14"] "It cancels the order of a vehicle that reports a FATAL error.";
 R5HorizonActionsGetNewIds "r5-horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update.";
 R5RepeatsOrderAfterOnline "r5-repeats-order-after-online" ["ORD-REJ-18", "ORD-UPD-04", "ORD-UPD-05"] "It repeats the last order message with the same content when the vehicle comes ONLINE again.";
 R5StateRequestAfterOnline "r5-state-request-after-online" ["TOPIC-13", "IACT-01"] "It asks for a state by stateRequest whenever a vehicle comes ONLINE.";

@@ -132,6 +132,16 @@ pub(super) struct Running {
     pub(super) r5_asked: bool,
     /// Its horizon is deleted as long as the vehicle is paused (`r5-horizon-deleted-on-pause`).
     pub(super) r5_short: bool,
+    /// Index of the last node a state has shown as reached (`r6-lost-state-stops-progress`).
+    pub(super) r6_reached: usize,
+    /// A node was passed that no state has shown (`r6-lost-state-stops-progress`).
+    pub(super) r6_skipped: bool,
+    /// The update that waits for minOrderInterval (`r6-queued-update-after-cancel`).
+    pub(super) r6_waiting: Option<Value>,
+    /// Its horizon was withdrawn once (`r6-horizon-withdrawn-and-given-again`).
+    pub(super) r6_withdrawn: bool,
+    /// It was called off because of a FATAL error (`r6-cancels-on-fatal`).
+    pub(super) r6_fatal: bool,
 }
 
 impl Running {
@@ -343,6 +353,10 @@ pub(super) struct Vehicle {
     pub(super) slips: super::slips::Slips,
     /// It has not driven since it came back (`r5-stops-pause-after-reconnect-only-by-operator`).
     pub(super) r5_back: bool,
+    /// An update that is still to be sent although its order was called off (`r6-queued-update-after-cancel`).
+    pub(super) r6_late: Option<Value>,
+    /// Maps that were enabled when its connection went away (`r6-map-remembered-over-reconnect`).
+    pub(super) r6_enabled: BTreeSet<String>,
 }
 
 impl Vehicle {

@@ -77,6 +77,12 @@ impl Site {
         {
             return alone(node);
         }
+        let base_end = called_off.and_then(|order| order.stops.get(order.released.checked_sub(1)?));
+        if self.faults.has(F::R6AfterCancelStartsAtOldBaseEnd)
+            && let Some(node) = base_end.and_then(|stop| self.config.node(&stop.id))
+        {
+            return alone(node);
+        }
         let Some(position) = &state.agv_position else {
             let tagged =
                 last.filter(|_| vehicle.r1_cancelled && self.faults.has(F::R5NodeBoundVehicleGetsTemporaryNode));

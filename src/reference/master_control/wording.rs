@@ -295,6 +295,11 @@ fn stitching(faults: Faults, message: &mut Value) {
         {
             position.insert("allowedDeviationXY".into(), json!(1.0));
         }
+        if faults.has(F::R6StitchingThetaDropped)
+            && let Some(position) = node.get_mut("nodePosition")
+        {
+            remove(position, "theta");
+        }
         if faults.has(F::R5StitchingNodeDeviationReset)
             && let Some(deviation) = node.pointer_mut("/nodePosition/allowedDeviationXY")
         {

@@ -192,6 +192,10 @@ pub(super) fn parameter(faults: Faults, kind: &str, parameter: &mut Value) {
     if matches!(kind, "pick" | "drop") && parameter["value"].is_number() && faults.has(F::R5PickHeightAsString) {
         parameter["value"] = json!(parameter["value"].to_string());
     }
+    let plain = parameter["value"].is_number() || parameter["value"].is_boolean();
+    if plain && faults.has(F::R6ParameterValuesAsStrings) {
+        parameter["value"] = json!(parameter["value"].to_string());
+    }
     if faults.has(F::DeviceUnknown) && key == "lhd" {
         parameter["value"] = json!("1");
     }
