@@ -368,13 +368,7 @@ impl Site {
         if let Some(due) = self.next_order_at(vehicle).filter(|_| !at_once) {
             vehicle.slips.held = true;
             if self.faults.has(F::R6QueuedUpdateAfterCancel) {
-                let released = target.max(running.released);
-                let window = Window {
-                    first: running.released.saturating_sub(1),
-                    released,
-                    end: free.min(released.saturating_add(self.horizon_length())),
-                };
-                self.r6_queue(vehicle, running, window);
+                self.r6_queue(vehicle, running, (target, free));
             }
             vehicle.at(due);
             return;

@@ -63,7 +63,13 @@ impl Site {
     }
 
     /// `r6-queued-update-after-cancel`: makes the update that is sent as soon as minOrderInterval has passed.
-    pub(super) fn r6_queue(&self, vehicle: &Vehicle, running: &mut Running, window: Window) {
+    pub(super) fn r6_queue(&self, vehicle: &Vehicle, running: &mut Running, (target, free): (usize, usize)) {
+        let released = target.max(running.released);
+        let window = Window {
+            first: running.released.saturating_sub(1),
+            released,
+            end: free.min(released.saturating_add(self.horizon_length())),
+        };
         let mut next = running.clone();
         next.update_id += 1;
         running.r6_waiting = self.order_message(vehicle, &next, window).map(|(message, _)| message);
