@@ -144,13 +144,8 @@ fn fresh_names(test: &Test) -> BTreeSet<String> {
     names
 }
 
-/// The nearest whole number, which JSON writes without a point.
-fn whole(number: f64) -> Option<i64> {
-    format!("{number:.0}").parse().ok()
-}
-
 /// `course.a.x` beside `course.nodes.a.x`, and `course.a-b.heading` beside `course.edges.a-b.heading`: suites name
-/// a node or an edge and its members in one breath. `course.a.wholeX` and `wholeY` are the coordinates in whole metres.
+/// a node or an edge and its members in one breath.
 fn flat(mut course: Value) -> Value {
     let mut short = Map::new();
     let groups = ["nodes", "edges"]
@@ -159,10 +154,6 @@ fn flat(mut course: Value) -> Value {
     for (name, node) in groups.flatten() {
         for (member, value) in node.as_object().into_iter().flatten() {
             short.insert(format!("{name}.{member}"), value.clone());
-        }
-        for (member, beside) in [("x", "wholeX"), ("y", "wholeY")] {
-            let whole = node.get(member).and_then(Value::as_f64).and_then(whole);
-            short.extend(whole.map(|number| (format!("{name}.{beside}"), Value::from(number))));
         }
     }
     if let Value::Object(members) = &mut course {
