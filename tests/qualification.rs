@@ -215,7 +215,7 @@ fn lapses_and_faults(
     (named(false), named(true))
 }
 
-/// A fault of a blind round, the requirement that is found broken, and the tests it takes.
+/// A fault of a blind round, the requirement that is found broken, and the tests it takes: `*` for all of them.
 struct Found<'t> {
     fault: &'t str,
     requirement: &'t str,
@@ -230,8 +230,11 @@ impl Found<'_> {
                 device,
                 ..VirtualRun::of_role(role, library, pack)
             };
-            request.tests.retain(|test| self.tests.contains(&test.id.as_str()));
-            request.draw = None;
+            // What shows only behind other tests is found by all of them together.
+            if self.tests != ["*"] {
+                request.tests.retain(|test| self.tests.contains(&test.id.as_str()));
+                request.draw = None;
+            }
             request.complete = false;
             request.faults = vec![self.fault.to_owned()];
             if request.tests.is_empty() {
