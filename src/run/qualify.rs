@@ -339,7 +339,7 @@ const FEW: usize = 5;
 /// So many faults are tried before it is looked again what is still unproven.
 const CHUNK: usize = 12;
 
-/// Tries the faults of blind rounds on the tests that decide what they break and are not proven yet.
+/// Tries the faults of blind rounds on the tests that decide what they break, where something in them is not proven yet.
 fn try_the_late(
     library: &Library,
     pack: &Pack,
@@ -350,13 +350,10 @@ fn try_the_late(
 ) -> Result<(), EngineError> {
     for some in late.chunks(CHUNK) {
         let open = unproven_of(deciders, kills);
+        let places: BTreeSet<&str> = open.iter().filter_map(|one| one.place.split(' ').next()).collect();
         let more = each(some, |fault| {
-            let about = open
-                .iter()
-                .filter(|one| fault.breaks.contains(&one.requirement.as_str()));
-            let places: BTreeSet<&str> = about.filter_map(|one| one.place.split(' ').next()).collect();
             kill(library, pack, vehicles, fault, DRAWN, &|test| {
-                places.contains(test.table())
+                places.contains(test.table()) && concerns(fault, test)
             })
         })?;
         kills.extend(more);
