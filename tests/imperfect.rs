@@ -12,7 +12,7 @@ use vda5050_tck::report::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
-/// Mistakes that show in every state from some moment on.
+/// Mistakes that show in every state from some moment on, or that a test leaves behind in the vehicle.
 const LASTING: [&str; 20] = [
     "cancel-leaves-nodes",
     "cancel-leaves-waiting",

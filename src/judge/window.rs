@@ -233,8 +233,8 @@ mod tests {
         }
     }
 
-    fn sorted(told: Vec<CheckFinding>) -> Option<Vec<Option<(u64, Said)>>> {
-        let window = CheckWindow {
+    fn window(told: Vec<CheckFinding>) -> CheckWindow {
+        CheckWindow {
             running: Box::new(Silent),
             shared: Shared::default(),
             with: Map::new(),
@@ -244,13 +244,38 @@ mod tests {
             mends: Mends::default(),
             told,
             seen: 0,
-        };
+        }
+    }
+
+    fn sorted(told: Vec<CheckFinding>) -> Option<Vec<Option<(u64, Said)>>> {
         let source = Source::new("test", "");
         let bindings = ["BLOCK-01", "BLOCK-05"].map(|id| Binding {
             requirement: RequirementId::from(id),
             span: Span::new(&source, 0, 0),
         });
-        window.sorted(&bindings)
+        window(told).sorted(&bindings)
+    }
+
+    #[test]
+    fn what_names_another_requirement_than_the_clause_does_not_count_there() {
+        let clause = |decides: &'static [&'static str]| {
+            let source = Source::new("test", "");
+            let binding = Binding {
+                requirement: RequirementId::from("BLOCK-01"),
+                span: Span::new(&source, 0, 0),
+            };
+            let window = CheckWindow {
+                decides,
+                ..window(Vec::new())
+            };
+            window.about(&[binding])
+        };
+        let named = clause(&["BLOCK-01", "BLOCK-05"]);
+        assert!(named.counts(&finding(Some("BLOCK-01"), None, 3)));
+        assert!(named.counts(&finding(None, None, 3)));
+        assert!(!named.counts(&finding(Some("BLOCK-05"), None, 3)));
+        // A check that never names what the clause is about is used for all that it finds.
+        assert!(clause(&["BLOCK-05"]).counts(&finding(Some("BLOCK-05"), None, 3)));
     }
 
     #[test]

@@ -71,6 +71,8 @@ impl Kill {
 pub struct Qualification {
     /// The side whose reference device it is.
     pub role: Role,
+    /// Faults of blind rounds were tried only on what the proven ones leave without proof.
+    pub late: bool,
     /// What is not a pass on the faultless device: decider and verdict.
     pub blemishes: Vec<(Decider, Verdict)>,
     /// Everything that passes on the faultless device.
@@ -135,8 +137,7 @@ impl Qualification {
         use std::fmt::Write as _;
         let mut text = String::new();
         // Beside the proven faults, those of blind rounds were tried on what was left to prove only.
-        let are_late = self.kills.iter().any(|kill| !self.is_of_blind_round(&kill.fault));
-        let is_shown = |kill: &&Kill| !are_late || !self.is_of_blind_round(&kill.fault);
+        let is_shown = |kill: &&Kill| !self.late || !self.is_of_blind_round(&kill.fault);
         for kill in self.kills.iter().filter(is_shown) {
             let verdict = kill.verdict.map_or("nothing", Verdict::word);
             let _ = writeln!(text, "{} ({verdict})", kill.fault.name);
@@ -275,6 +276,7 @@ pub fn qualify_tests(
         });
         deciders.extend(own);
     }
+    let whole = is_whole(role, faults);
     // What breaks only obligations that this version does not have cannot show; whoever asks for it gets it tried.
     let in_version = |id: &str| {
         let requirement = library.rules.catalogue.get(id);
@@ -285,7 +287,7 @@ pub fn qualify_tests(
     // Those of blind rounds need not be found here: they are tried on what the others leave unproven.
     let is_blind = |fault: &Fault| BuiltIn::blind_faults(role).iter().any(|one| one.name == fault.name);
     let (mut early, mut late): (Vec<Fault>, Vec<Fault>) = faults.iter().copied().partition(|fault| !is_blind(fault));
-    if early.is_empty() || faults.len() <= FEW {
+    if !whole {
         early.clone_from(&faults);
         late.clear();
     }
@@ -319,6 +321,7 @@ pub fn qualify_tests(
     let excused = library.rules.suites.unproven.iter();
     Ok(Qualification {
         role,
+        late: whole,
         blemishes,
         deciders,
         kills,
@@ -375,6 +378,12 @@ fn try_the_late(
         merge(kills, more);
     }
     Ok(())
+}
+
+/// Whether all proven faults are among these. Who asks for some by name has each of them tried.
+fn is_whole(role: Role, faults: &[Fault]) -> bool {
+    let mut proven = BuiltIn::faults(role).iter();
+    proven.all(|fault| faults.iter().any(|one| one.name == fault.name))
 }
 
 /// What none of these kills proves.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::weigh::convinces;
 use super::{
     Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
-    limit, seconds, shown_path, sort_out,
+    limit, seconds, shown_path,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -229,9 +229,7 @@ impl Holding {
             .and_then(|violation| violation.near.as_ref()?.span.clone());
         let span = span.unwrap_or_else(|| self.selector.span.clone());
         let mut bound = bound_clauses(&self.verb.checks, "checks", &span, &holds, witness, &message);
-        let fine = format!("all {} {} messages match", self.seen, self.verb.topic);
-        let ended = (self.violated.is_some(), cut_short);
-        sort_out(self.check.as_ref(), &self.verb.checks, &mut bound, ended, &fine);
+        self.sort_out(&mut bound, cut_short);
         for mut clause in bound {
             clause.expected = self.selector.expected();
             clause.nearest = self
@@ -259,6 +257,33 @@ impl Holding {
             seen: self.seen,
             allowances: Vec::new(),
             timing: None,
+        }
+    }
+
+    /// A check that names the requirement it found broken decides the clause of that requirement; of the others
+    /// nothing was wrong until then.
+    fn sort_out(&self, clauses: &mut [Clause], cut_short: Option<&str>) {
+        let Some(sorted) = self.check.as_ref().and_then(|check| check.sorted(&self.verb.checks)) else {
+            return;
+        };
+        let ended = self.violated.is_some();
+        for (clause, found) in clauses.iter_mut().zip(sorted) {
+            match found {
+                Some((seq, Said::Wrong(holds, message))) => {
+                    clause.holds = holds;
+                    clause.witness = Some(seq).filter(|seq| *seq > 0);
+                    clause.message = format!("#{seq}: {message}");
+                }
+                _ if ended || cut_short.is_some() => {
+                    let why = cut_short.unwrap_or("the step ended with what was found about another requirement");
+                    clause.holds = Holds::Unseen(why.to_owned());
+                    why.clone_into(&mut clause.message);
+                }
+                _ => {
+                    clause.holds = Holds::Yes;
+                    clause.message = format!("all {} {} messages match", self.seen, self.verb.topic);
+                }
+            }
         }
     }
 

@@ -446,38 +446,6 @@ pub(super) fn bound_clauses(
         .collect()
 }
 
-/// A check that names the requirement it found broken decides the clause of that requirement; of the others nothing was
-/// wrong until then, and `fine` says so.
-pub(super) fn sort_out(
-    check: Option<&CheckWindow>,
-    bindings: &[Binding],
-    clauses: &mut [Clause],
-    (ended, cut_short): (bool, Option<&str>),
-    fine: &str,
-) {
-    let Some(sorted) = check.and_then(|check| check.sorted(bindings)) else {
-        return;
-    };
-    for (clause, found) in clauses.iter_mut().zip(sorted) {
-        match found {
-            Some((seq, Said::Wrong(holds, message))) => {
-                clause.holds = holds;
-                clause.witness = Some(seq).filter(|seq| *seq > 0);
-                clause.message = format!("#{seq}: {message}");
-            }
-            _ if ended || cut_short.is_some() => {
-                let why = cut_short.unwrap_or("the step ended with what was found about another requirement");
-                clause.holds = Holds::Unseen(why.to_owned());
-                why.clone_into(&mut clause.message);
-            }
-            _ => {
-                clause.holds = Holds::Yes;
-                fine.clone_into(&mut clause.message);
-            }
-        }
-    }
-}
-
 /// An assertion judged on the message that was picked.
 pub(super) fn assertion_clause(
     assertion: &Assertion,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, limit, seconds, sort_out};
+use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, limit, seconds};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
@@ -124,8 +124,6 @@ impl Forbidding {
         if let Some((holds, found)) = last.filter(|_| self.violated.is_none()) {
             self.found(0, holds, found);
         }
-        // What else the check found may stand in messages that are not meant.
-        let sorted = self.violated.is_some() && self.verb.checks.len() > 1;
         let (holds, message, witness) = match (self.violated, cut_short) {
             (Some((seq, message)), _) => (Holds::No, message, Some(seq).filter(|seq| *seq > 0)),
             (None, None) if self.alive && self.remarked.is_some() => {
@@ -153,10 +151,6 @@ impl Forbidding {
             witness,
             &message,
         );
-        if sorted {
-            let check = self.check.as_ref();
-            sort_out(check, &self.verb.checks, &mut clauses, (true, cut_short), "");
-        }
         for clause in &mut clauses {
             clause.label = witness.map_or_else(String::new, |seq| format!("#{seq} matches this"));
             clause.expected = self

@@ -1,8 +1,8 @@
 //! Faults of blind rounds that the suites need not find yet.
 //!
 //! Somebody who has not seen suites, checks and fault lists wrote them from the standard and the catalogue alone. What was
-//! found of them before anything was changed stands in `suites/qualification/rounds.md`. A fault moves to the registry
-//! above, with a name without its round, when a requirement it names finds it; not all of them have been moved yet.
+//! found of them before anything was changed stands in `suites/qualification/rounds.md`. Those that are
+//! found by now stand in a table below `tests/qualification/`, with the tests that find them.
 
 macro_rules! with_blind_faults {
     ($registry:ident! $($own:tt)*) => {
