@@ -243,6 +243,9 @@ impl Agv {
                 self.actions.push(action);
             }
         }
+        if rule == Rule::Unable && self.faults.has(F::R6RejectedUpdateLeavesActions) {
+            self.list_actions_of_refused_update(message);
+        }
         if rule == Rule::OtherOrderActive && self.faults.has(F::R3BusyRefusalFailsActions) {
             let of_order = self.actions.iter_mut().filter(|action| action.of_order());
             of_order

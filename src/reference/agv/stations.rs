@@ -144,6 +144,10 @@ impl Agv {
             let problem = Problem::new(Area::Charging, action, "the vehicle cannot leave the charger");
             return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
         }
+        let idle = !self.charging && self.third.charging_at.is_none();
+        if idle && self.faults.has(F::R6SecondStopChargingFails) {
+            return Err(Problem::new(Area::Charging, action, "the vehicle does not charge"));
+        }
         if self.charging && self.faults.has(F::ChargingEndsEarly) {
             self.undocking = Some(self.moment() + Duration::from_secs(40));
         }
