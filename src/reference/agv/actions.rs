@@ -274,8 +274,9 @@ impl Actions {
             let hard = next.iter().any(|id| self.blocking(id) == Some(Blocking::Hard));
             let occupied = self.all.iter().any(|action| {
                 let elsewhere = action.origin != list.origin && faults.has(F::R2HardIgnoresEarlierNode);
-                let on_node = matches!((list.origin, action.origin), (Origin::Edge(_), Origin::Node(_)));
-                let elsewhere = elsewhere || on_node && faults.has(F::R6EdgeActionStartsBeforeLeaving);
+                let of_node = |origin: Origin| matches!(origin, Origin::Node(_));
+                let apart = of_node(action.origin) != of_node(list.origin);
+                let elsewhere = elsewhere || apart && faults.has(F::R6EdgeActionStartsBeforeLeaving);
                 action.occupies()
                     && !elsewhere
                     && !unawaited(action)

@@ -24,7 +24,7 @@ R6InitPositionKeepsMap "r6-init-position-keeps-map" ["ACT-23"] "It takes x, y an
 R6OnlyLastActionBlocks "r6-only-last-action-blocks" ["BLOCK-03", "BLOCK-04"] "It drives on as soon as the last action of the list has ended, although an earlier SOFT action of the same node still runs.";
 R6EdgeActionStartsBeforeLeaving "r6-edge-action-starts-before-leaving" ["NODE-07"] "It starts the edge action on arrival at the start node although a HARD node action still holds it there.";
 R6EdgeActionsDoNotBlock "r6-edge-actions-do-not-block" ["BLOCK-04", "BLOCK-03"] "It goes on driving during SOFT and HARD actions of an edge.";
-R6ManualLeavesActionsWaiting "r6-manual-leaves-actions-waiting" ["MODE-05", "ORD-UPD-10"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING.";
+R6ManualLeavesActionsWaiting "r6-manual-leaves-actions-waiting" ["MODE-05"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING.";
 R6VisualizationTheta0To2pi "r6-visualization-theta-0-to-2pi" ["VIS-01", "MAP-02"] "It gives theta between 0 and 2 pi in visualization and properly in the state.";
 R6NoPositionAtStandstill "r6-no-position-at-standstill" ["STATE-MSG-05"] "It leaves agvPosition out of the state while it stands still without an order.";
 R6FailedActionErrorLevelError "r6-failed-action-error-level-error" ["ERR-02"] "It reports the error of a failed action with errorLevel ERROR.";

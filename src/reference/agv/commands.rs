@@ -220,7 +220,8 @@ impl Agv {
             } else {
                 let waiting = self.waiting_order_actions();
                 self.give_up_order();
-                if mode == Mode::Manual && self.faults.has(F::R6ManualLeavesActionsWaiting) {
+                let manual = mode == Mode::Manual || self.mode == Mode::Manual;
+                if manual && self.faults.has(F::R6ManualLeavesActionsWaiting) {
                     self.leave_waiting(&waiting);
                 }
             }

@@ -82,9 +82,8 @@ impl Maps {
 
     /// `r6-reconnect-loses-downloaded-maps`: forgets what was not there from the beginning.
     pub(super) fn keep_only(&mut self, factory: &[OnboardMap]) {
-        let same = |map: &OnboardMap, other: &OnboardMap| {
-            map.map_id == other.map_id && map.map_version == other.map_version
-        };
+        let same =
+            |map: &OnboardMap, other: &OnboardMap| map.map_id == other.map_id && map.map_version == other.map_version;
         self.all.retain(|map| factory.iter().any(|other| same(map, other)));
     }
 

@@ -341,7 +341,9 @@ impl Agv {
         let wanted = edge.filter(|_| !self.faults.has(F::EdgeOrientationIgnored));
         let tangential = self.faults.has(F::R1GlobalAsTangential);
         let forwards = |edge: &&Edge| {
-            let turned = edge.orientation.is_some_and(|angle| motion::wrapped(angle).abs() > FRAC_PI_2);
+            let turned = edge
+                .orientation
+                .is_some_and(|angle| motion::wrapped(angle).abs() > FRAC_PI_2);
             turned && !edge.global && self.faults.has(F::R6BackwardsEdgeDrivenForwards)
         };
         let wanted = wanted.filter(|edge| !forwards(edge));

@@ -128,7 +128,8 @@ impl Agv {
             let waits = action.origin == here && action.status == Status::Waiting;
             waits && action.request.blocking == Blocking::Hard
         };
-        self.faults.has(F::R6EdgeActionStartsBeforeLeaving) && self.actions.iter().any(hard)
+        let released = self.book.edge_ahead().is_some_and(|edge| edge.released);
+        released && self.faults.has(F::R6EdgeActionStartsBeforeLeaving) && self.actions.iter().any(hard)
     }
 
     /// Actions of the order that have not begun.
@@ -140,7 +141,11 @@ impl Agv {
 
     /// `r6-manual-leaves-actions-waiting`: they wait although their order is gone.
     pub(super) fn leave_waiting(&mut self, ids: &[String]) {
-        for action in self.actions.iter_mut().filter(|action| ids.contains(&action.request.id)) {
+        for action in self
+            .actions
+            .iter_mut()
+            .filter(|action| ids.contains(&action.request.id))
+        {
             action.status = Status::Waiting;
         }
     }
@@ -148,8 +153,14 @@ impl Agv {
     /// How far before a node on its way it may report it, and does so.
     pub(super) fn early_by(&self, stop: &Stop) -> Option<f64> {
         let passes = stop.node.sequence_id < self.book.base_end.1 && self.book.cancel.is_none();
-        let position = stop.node.position.as_ref().filter(|_| passes && self.takes(T::R6LibEarlyTraversal))?;
-        let allowed = position.allowed_deviation.filter(|allowed| *allowed > self.config.tolerance)?;
+        let position = stop
+            .node
+            .position
+            .as_ref()
+            .filter(|_| passes && self.takes(T::R6LibEarlyTraversal))?;
+        let allowed = position
+            .allowed_deviation
+            .filter(|allowed| *allowed > self.config.tolerance)?;
         // It has to look where it should when it reports the node, and does so only on the node itself.
         position.theta.is_none().then_some(allowed * EARLY)
     }
