@@ -8,6 +8,11 @@ macro_rules! with_blind_faults {
     ($registry:ident! $($own:tt)*) => {
         $registry! {
             blind {
+R6InstantActionWaitsForHardAction "r6-instant-action-waits-for-hard-action" ["IACT-05", "IACT-04"] "It holds instant actions back until a running HARD node action has ended.";
+R6ChargingFlagLags "r6-charging-flag-lags" ["ACT-19"] "It reports startCharging FINISHED one state before charging becomes true.";
+R6DropFinishedBeforeLoadGone "r6-drop-finished-before-load-gone" ["ACT-28"] "It reports drop FINISHED while loads still lists the load, which goes one state later.";
+R6InitPositionAnyMap "r6-init-position-any-map" ["ACT-25"] "It reports initPosition FINISHED for a map that it does not have.";
+R6OutdatedUpdateNamesCurrentId "r6-outdated-update-names-current-id" ["ORD-REJ-14", "BP-01"] "It puts the orderUpdateId it has, not the rejected one, into the references of the rejection.";
 R6FailedActionBlocksNextOrder "r6-failed-action-blocks-next-order" ["ORD-FLOW-06", "ORD-FLOW-02"] "It counts a FAILED action of the completed order as unfinished and refuses every following new order.";
 R6ContinuationClearsActionStates "r6-continuation-clears-action-states" ["STATE-MSG-10", "STATE-MSG-09"] "It empties actionStates, as for a new order, when an update continues a completed order.";
 R6OldHorizonEdgeActionsLinger "r6-old-horizon-edge-actions-linger" ["ORD-UPD-10"] "It removes the node actions of a replaced horizon but leaves its edge actions WAITING, so that the next new order is refused.";

@@ -61,6 +61,10 @@ impl Agv {
             self.book.edges.clear();
         }
         let moment = self.moment();
+        if to_node && self.takes(T::R6LibEarlyTraversal) {
+            // It ends on the node now and not before it: the rest of the way is planned anew.
+            self.motion.halt(moment);
+        }
         self.persona.cancel_begins(moment);
         if self.takes(T::R1CancelTakesTime) && self.persona.cancel_held_until.is_none() {
             self.persona.cancel_held_until = Some(moment + CANCELLING);

@@ -488,7 +488,8 @@ impl Agv {
             return invalid("the pose is on no map");
         }
         let map_id = action.text("mapId");
-        if !unchecked && !self.maps.on_board(map_id) {
+        let any_map = unchecked || self.faults.has(F::R6InitPositionAnyMap);
+        if !any_map && !self.maps.on_board(map_id) {
             self.take_map_anyway(action);
             return invalid("the map is not on board");
         }

@@ -142,6 +142,11 @@ impl Agv {
                 }
             }
         }
+        let of_update = message.get("orderId").and_then(Value::as_str) == Some(self.book.order_id.as_str());
+        if of_update && self.book.has_order() && self.faults.has(F::R6OutdatedUpdateNamesCurrentId) {
+            let ids = references.iter_mut().filter(|(key, _)| key == "orderUpdateId");
+            ids.for_each(|(_, value)| *value = self.book.update_id.to_string());
+        }
         if !(refusal.rule == Rule::Unable && self.faults.has(F::R1CulpritUnnamed)) {
             references.extend(refusal.culprits);
         }

@@ -151,18 +151,18 @@ impl Agv {
     }
 
     /// How far before a node on its way it may report it, and does so.
+    ///
+    /// Not where it has something to do or to look somewhere, nor where a corridor begins (NODE-02): then it has to be
+    /// on the node itself.
     pub(super) fn early_by(&self, stop: &Stop) -> Option<f64> {
-        let passes = stop.node.sequence_id < self.book.base_end.1 && self.book.cancel.is_none();
-        let position = stop
-            .node
-            .position
-            .as_ref()
-            .filter(|_| passes && self.takes(T::R6LibEarlyTraversal))?;
-        let allowed = position
-            .allowed_deviation
-            .filter(|allowed| *allowed > self.config.tolerance)?;
-        // It has to look where it should when it reports the node, and does so only on the node itself.
-        position.theta.is_none().then_some(allowed * EARLY)
+        let sequence_id = stop.node.sequence_id;
+        let passes = sequence_id < self.book.base_end.1 && self.book.cancel.is_none();
+        let mut ahead = self.book.edges.iter().filter(|edge| edge.sequence_id > sequence_id);
+        let free = stop.node.actions.is_empty() && ahead.next().is_none_or(|edge| edge.corridor.is_none());
+        let position = stop.node.position.as_ref().filter(|_| passes && free);
+        let position = position.filter(|position| position.theta.is_none() && self.takes(T::R6LibEarlyTraversal))?;
+        let allowed = position.allowed_deviation?;
+        (allowed > self.config.tolerance).then_some(allowed * EARLY)
     }
 
     /// Asks for a file, now or when it is its turn.
