@@ -231,6 +231,8 @@ impl Agv {
                         | action_kinds::Deed::LogReport
                 );
             let of_edge = scope == Scope::Edge && self.faults.has(F::R4EdgeScopeNotChecked);
+            let charges = scope == Scope::Edge && kind.deed == action_kinds::Deed::StartCharging;
+            let of_edge = of_edge || charges && self.faults.has(F::R6ChargingOnEdgeAccepted);
             if listed_refused
                 || (!request_taken && !of_edge && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked))
             {

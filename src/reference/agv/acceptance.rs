@@ -122,6 +122,9 @@ impl Agv {
             };
             unchecked
                 || (self.faults.has(F::GraphUnchecked) && !order.nodes.is_empty())
+                || (self.faults.has(F::R6UpdateGraphUnchecked)
+                    && order.id == self.book.order_id
+                    && !order.nodes.is_empty())
                 || (self.faults.has(F::R1SplitBaseTaken) && defect.reason == "is true behind the horizon's begin")
                 || (self.faults.has(F::R4CountsCheckedInBaseOnly)
                     && defect.reason.ends_with("one less than the nodes")
@@ -281,6 +284,12 @@ impl Agv {
         if self.is_busy() && !replaced {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
         }
+        if self.faults.has(F::R6FailedActionBlocksNextOrder) && self.order_has_failed_action() {
+            return Err(Refusal::new(
+                Rule::OtherOrderActive,
+                "an action of the order before is not finished",
+            ));
+        }
         if self.faults.has(F::DeadAfterCancel) && self.book.cancelled {
             return Err(Refusal::new(
                 Rule::OtherOrderActive,
@@ -320,6 +329,7 @@ impl Agv {
                 .is_some_and(|kind| kind.deed == action_kinds::Deed::WaitForTrigger);
             self.faults.has(F::FreeActionIgnored) && action.request.blocking == super::order_message::Blocking::None
                 || left && self.faults.has(F::R3CancelLeavesHorizonWaiting)
+                || left && self.faults.has(F::R6ManualLeavesActionsWaiting)
                 || trigger && self.faults.has(F::R3TriggerNotCounted)
         };
         let open = |action: &Action| action.of_order() && !action.status.is_terminal() && !free(action);
@@ -422,6 +432,7 @@ impl Agv {
         self.append(order.nodes, order.edges);
         self.book.first_end = self.book.nodes.back().map_or(0, |stop| stop.node.sequence_id);
         self.fourth.new_order(self.book.base_end.1);
+        self.sixth.new_order();
         if self.faults.has(F::R4HeaderIdRestartsWithOrder) {
             self.connection.restart_header_id();
         }
@@ -439,6 +450,9 @@ impl Agv {
         self.linger_on_first_node();
         if self.takes(T::R1SetsOutLate) {
             self.lingers_until = Some(self.moment() + std::time::Duration::from_millis(700));
+        }
+        if self.takes(T::R6LibThinksBeforeDriving) {
+            self.lingers_until = Some(self.moment() + super::sixth::PLANNING);
         }
         if self.takes(T::R2AdoptsBeforeDriving) {
             self.flush();

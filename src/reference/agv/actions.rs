@@ -122,6 +122,9 @@ impl Action {
         if faults.has(F::R1PausedActionsFail) && self.held.is_some() {
             self.end(Status::Failed);
         }
+        if self.of_order() && self.held.is_some() && faults.has(F::R6ResumedActionWaitsAgain) {
+            self.end(Status::Waiting);
+        }
         if let Some((status, left)) = self.held.take() {
             self.status = status;
             self.due = left.map(|left| now + left);
@@ -188,6 +191,12 @@ impl Actions {
     /// Forgets what was triggered and not begun.
     pub(super) fn drop_lists(&mut self) {
         self.lists.clear();
+    }
+
+    /// Triggers what waits at a place once more (`r6-resumed-action-waits-again` only).
+    pub(super) fn trigger_again(&mut self, origin: Origin, faults: Faults) {
+        self.lists.retain(|list| list.origin != origin);
+        self.trigger(origin, faults);
     }
 
     /// Forgets everything.
@@ -265,6 +274,9 @@ impl Actions {
             let hard = next.iter().any(|id| self.blocking(id) == Some(Blocking::Hard));
             let occupied = self.all.iter().any(|action| {
                 let elsewhere = action.origin != list.origin && faults.has(F::R2HardIgnoresEarlierNode);
+                let of_node = |origin: Origin| matches!(origin, Origin::Node(_));
+                let apart = of_node(action.origin) != of_node(list.origin);
+                let elsewhere = elsewhere || apart && faults.has(F::R6EdgeActionStartsBeforeLeaving);
                 action.occupies()
                     && !elsewhere
                     && !unawaited(action)
@@ -289,6 +301,12 @@ impl Actions {
         last.is_some_and(|action| action.request.blocking == Blocking::None)
     }
 
+    /// `r6-only-last-action-blocks`: when the last action of a node has ended, all of them are taken for ended.
+    fn last_has_ended(&self, origin: Origin) -> bool {
+        let last = self.all.iter().rev().find(|action| action.origin == origin);
+        matches!(origin, Origin::Node(_)) && last.is_some_and(|action| action.status.is_terminal())
+    }
+
     fn blocking(&self, id: &str) -> Option<Blocking> {
         self.get(id).map(|action| action.request.blocking)
     }
@@ -298,6 +316,8 @@ impl Actions {
         let stops = |action: &Action| match action.request.blocking {
             _ if action.status == Status::Initializing && faults.has(F::R1PreparesWhileDriving) => false,
             Blocking::None => false,
+            _ if matches!(action.origin, Origin::Edge(_)) && faults.has(F::R6EdgeActionsDoNotBlock) => false,
+            _ if faults.has(F::R6OnlyLastActionBlocks) && self.last_has_ended(action.origin) => false,
             Blocking::Soft if matches!(action.origin, Origin::Edge(_)) && faults.has(F::R3SoftEdgeActionDrives) => {
                 false
             }
@@ -326,6 +346,9 @@ impl Actions {
             .all
             .iter()
             .filter(|action| action.origin == Origin::Edge(sequence_id));
+        if faults.has(F::R6EdgeActionsDoNotBlock) {
+            return false;
+        }
         let heeded = |blocking: Blocking| blocking == Blocking::Hard || !faults.has(F::R3SoftEdgeActionDrives);
         actions.any(|action| {
             let blocking = action.request.blocking;

@@ -8,6 +8,43 @@ macro_rules! with_blind_faults {
     ($registry:ident! $($own:tt)*) => {
         $registry! {
             blind {
+R6InstantActionWaitsForHardAction "r6-instant-action-waits-for-hard-action" ["IACT-05", "IACT-04"] "It holds instant actions back until a running HARD node action has ended.";
+R6ChargingFlagLags "r6-charging-flag-lags" ["ACT-19"] "It reports startCharging FINISHED one state before charging becomes true.";
+R6DropFinishedBeforeLoadGone "r6-drop-finished-before-load-gone" ["ACT-28"] "It reports drop FINISHED while loads still lists the load, which goes one state later.";
+R6InitPositionAnyMap "r6-init-position-any-map" ["ACT-25"] "It reports initPosition FINISHED for a map that it does not have.";
+R6OutdatedUpdateNamesCurrentId "r6-outdated-update-names-current-id" ["ORD-REJ-14", "BP-01"] "It puts the orderUpdateId it has, not the rejected one, into the references of the rejection.";
+R6FailedActionBlocksNextOrder "r6-failed-action-blocks-next-order" ["ORD-FLOW-06", "ORD-FLOW-02"] "It counts a FAILED action of the completed order as unfinished and refuses every following new order.";
+R6ContinuationClearsActionStates "r6-continuation-clears-action-states" ["STATE-MSG-10", "STATE-MSG-09"] "It empties actionStates, as for a new order, when an update continues a completed order.";
+R6OldHorizonEdgeActionsLinger "r6-old-horizon-edge-actions-linger" ["ORD-UPD-10"] "It removes the node actions of a replaced horizon but leaves its edge actions WAITING, so that the next new order is refused.";
+R6UpdateOfHorizonOnlyRefused "r6-update-of-horizon-only-refused" ["ORD-UPD-08"] "It refuses an update that changes only the horizon and releases nothing new.";
+R6CancelClearsOrderWarnings "r6-cancel-clears-order-warnings" ["ORD-REJ-03", "ORD-REJ-08"] "It empties errors when cancelOrder is finished, so that a validationError or orderError ends before a new order is accepted.";
+R6RejectedUpdateLeavesActions "r6-rejected-update-leaves-actions" ["ORD-REJ-09", "ORD-REJ-04", "ORD-FLOW-12"] "It lists the actions of an update before it checks them, so that the actions of a rejected update stay in actionStates as WAITING.";
+R6UpdateGraphUnchecked "r6-update-graph-unchecked" ["ORD-11"] "It checks node and edge counts and release flags only in new orders and adopts an update that breaks them.";
+R6LoopClearsBothVisits "r6-loop-clears-both-visits" ["ORD-UPD-13", "STATE-12"] "It removes reached nodes from nodeStates by nodeId, so that the first visit of a loop node removes the later one as well.";
+R6NoOrderToCancelKeepsFirstId "r6-no-order-to-cancel-keeps-first-id" ["ORD-CANCEL-20"] "It does not raise noOrderToCancel twice: at a second useless cancelOrder the error still names the first actionId.";
+R6ResumedActionWaitsAgain "r6-resumed-action-waits-again" ["ASTATE-05", "ACT-18"] "It sends an action that was PAUSED back to WAITING on stopPause and starts it anew.";
+R6SecondStartPauseResumes "r6-second-start-pause-resumes" ["ACT-11", "ACT-13"] "It treats startPause as a toggle: a second startPause ends the pause.";
+R6SecondStopChargingFails "r6-second-stop-charging-fails" ["ACT-11"] "It reports stopCharging FAILED when it is not charging.";
+R6InitPositionKeepsMap "r6-init-position-keeps-map" ["ACT-23"] "It takes x, y and theta from initPosition but keeps the old mapId in agvPosition.";
+R6OnlyLastActionBlocks "r6-only-last-action-blocks" ["BLOCK-03", "BLOCK-04"] "It drives on as soon as the last action of the list has ended, although an earlier SOFT action of the same node still runs.";
+R6EdgeActionStartsBeforeLeaving "r6-edge-action-starts-before-leaving" ["NODE-07"] "It starts the edge action on arrival at the start node although a HARD node action still holds it there.";
+R6EdgeActionsDoNotBlock "r6-edge-actions-do-not-block" ["BLOCK-04", "BLOCK-03"] "It goes on driving during SOFT and HARD actions of an edge.";
+R6ManualLeavesActionsWaiting "r6-manual-leaves-actions-waiting" ["MODE-05"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING.";
+R6VisualizationTheta0To2pi "r6-visualization-theta-0-to-2pi" ["VIS-01", "MAP-02"] "It gives theta between 0 and 2 pi in visualization and properly in the state.";
+R6NoPositionAtStandstill "r6-no-position-at-standstill" ["STATE-MSG-05"] "It leaves agvPosition out of the state while it stands still without an order.";
+R6FailedActionErrorLevelError "r6-failed-action-error-level-error" ["ERR-02"] "It reports the error of a failed action with errorLevel ERROR.";
+R6ActionErrorsNeverClear "r6-action-errors-never-clear" ["ERR-01"] "It never removes the error of a failed action, also not after the next orders were accepted and completed.";
+R6FirstVersionEnabledAtOnce "r6-first-version-enabled-at-once" ["MAP-20"] "It enables a downloaded map at once when no other version of this mapId is on board.";
+R6ReconnectLosesDownloadedMaps "r6-reconnect-loses-downloaded-maps" ["MAP-31", "MAP-15"] "It reports only its factory maps after a reconnect; downloaded maps are gone without deleteMap.";
+R6StaticFactsheetHeader "r6-static-factsheet-header" ["HDR-02", "FACT-02"] "It sends the factsheet from a file: the headerId is the same in every factsheet.";
+R6OfflineRepeatsHeaderId "r6-offline-repeats-header-id" ["HDR-02"] "It sends OFFLINE with the headerId of the ONLINE before it.";
+R6FactsheetTimesInMilliseconds "r6-factsheet-times-in-milliseconds" ["FACT-14", "FACT-05"] "It gives minOrderInterval and minStateInterval in milliseconds, so that its states come far more often than it promises.";
+R6FactsheetAllScopesForAll "r6-factsheet-all-scopes-for-all" ["ACT-09"] "It lists every action in the factsheet with the scopes INSTANT, NODE and EDGE.";
+R6FactsheetParameterTypeFloat "r6-factsheet-parameter-type-float" ["FACT-07"] "It gives the numeric parameters in the factsheet the valueDataType FLOAT64.";
+R6TrajectoryOfUpdateIgnored "r6-trajectory-of-update-ignored" ["ORD-MSG-26", "OPT-01"] "It follows the trajectories of a new order but drives straight on the edges that came by an update.";
+R6BackwardsEdgeDrivenForwards "r6-backwards-edge-driven-forwards" ["ORD-MSG-22"] "It drives an edge with TANGENTIAL orientation pi forwards.";
+R6ChargingOnEdgeAccepted "r6-charging-on-edge-accepted" ["ACT-10"] "It accepts startCharging as an edge action.";
+R6CorridorIsSymmetric "r6-corridor-is-symmetric" ["CORR-01"] "It takes the greater of leftWidth and rightWidth for both sides when it goes round an obstacle.";
 R4OrderIdCutAt32 "r4-order-id-cut-at-32" ["ORD-FLOW-06", "STATE-MSG-02"] "It keeps an orderId in a buffer of 32 characters, so that a longer one (such as a UUID) is reported cut off.";
 R4NodeStatesShowTenAtMost "r4-node-states-show-ten-at-most" ["STATE-12", "ORD-FLOW-06"] "It lists at most the next ten nodes in nodeStates, although the accepted order has more.";
 R4SecondExtensionRefused "r4-second-extension-refused" ["ORD-FLOW-09", "ORD-UPD-08"] "It rejects a second order update that arrives before it has reached the last base node of the first order message, because it compares with that old decision point.";

@@ -61,6 +61,10 @@ impl Agv {
             self.book.edges.clear();
         }
         let moment = self.moment();
+        if to_node && self.takes(T::R6LibEarlyTraversal) {
+            // It ends on the node now and not before it: the rest of the way is planned anew.
+            self.motion.halt(moment);
+        }
         self.persona.cancel_begins(moment);
         if self.takes(T::R1CancelTakesTime) && self.persona.cancel_held_until.is_none() {
             self.persona.cancel_held_until = Some(moment + CANCELLING);
@@ -106,20 +110,24 @@ impl Agv {
             return;
         }
         let referenced = !self.faults.has(F::IdleCancelUnreferenced);
+        let once = self.faults.has(F::R6NoOrderToCancelKeepsFirstId);
+        let listed = self.errors.references_of(&self.config.errors.no_order_to_cancel);
         let refusal = ActiveError {
             error_type: self.config.errors.no_order_to_cancel.clone(),
             fatal: self.faults.has(F::IdleCancelFatal),
-            references: referenced
-                .then(|| match self.faults.has(F::R1IdleCancelNamesType) {
-                    true => ("actionType".to_owned(), "cancelOrder".to_owned()),
-                    false => ("actionId".to_owned(), action_id.to_owned()),
-                })
-                .into_iter()
-                .collect(),
+            references: listed.filter(|_| once).unwrap_or_else(|| {
+                referenced
+                    .then(|| match self.faults.has(F::R1IdleCancelNamesType) {
+                        true => ("actionType".to_owned(), "cancelOrder".to_owned()),
+                        false => ("actionId".to_owned(), action_id.to_owned()),
+                    })
+                    .into_iter()
+                    .collect()
+            }),
             description: "there is no order to cancel".into(),
             life: match () {
                 () if self.takes(T::R1IdleCancelErrorBrief) => Life::Until(self.moment() + self.brief()),
-                () if self.takes(T::R4NoOrderWarningUntilNextOrder) => Life::UntilNewOrder,
+                () if once || self.takes(T::R4NoOrderWarningUntilNextOrder) => Life::UntilNewOrder,
                 () => Life::Until(self.moment() + self.config.error_duration),
             },
         };
@@ -235,6 +243,9 @@ impl Agv {
         }
         if self.faults.has(F::CancelClearsLastNode) {
             self.book.last_node.clear();
+        }
+        if self.faults.has(F::R6CancelClearsOrderWarnings) {
+            self.errors.new_order();
         }
         if self.faults.has(F::CancelForgetsLoad) {
             self.loads.clear();

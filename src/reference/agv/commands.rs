@@ -151,6 +151,7 @@ impl Agv {
         self.actions.clear();
         self.errors.clear();
         self.downloads.clear();
+        self.sixth = super::sixth::Sixth::default();
         self.holds = super::Holds::default();
         self.strayed = false;
         self.locked = false;
@@ -217,7 +218,12 @@ impl Agv {
                 self.book.drop_route();
                 self.book.cancelled = true;
             } else {
+                let waiting = self.waiting_order_actions();
                 self.give_up_order();
+                let manual = mode == Mode::Manual || self.mode == Mode::Manual;
+                if manual && self.faults.has(F::R6ManualLeavesActionsWaiting) {
+                    self.leave_waiting(&waiting);
+                }
             }
             if mode == Mode::Manual && self.faults.has(F::R3ManualDropsActionStates) {
                 self.actions.retain(|action| !action.of_order());

@@ -86,6 +86,13 @@ impl Connection {
         }
     }
 
+    /// `r6-offline-repeats-header-id`: the next message has the headerId of the one before.
+    fn repeat_header_id(&mut self) {
+        if let Some(next) = self.header_ids.get_mut("connection") {
+            *next = next.wrapping_sub(1);
+        }
+    }
+
     /// Whether it was online before.
     pub(super) fn was_online(&self) -> bool {
         self.returning
@@ -230,6 +237,9 @@ impl Agv {
                 self.maps.store(&id, &version, super::Faults::default());
             }
         }
+        if !first && self.faults.has(F::R6ReconnectLosesDownloadedMaps) {
+            self.maps.keep_only(&self.config.maps);
+        }
         let unsaid = !first && self.is_busy() && self.faults.has(F::R2OnlineNotSaidMidOrder);
         if unsaid {
             // It says nothing on this connection.
@@ -327,6 +337,9 @@ impl Agv {
                 self.flush();
             }
             let mid_order = self.is_busy() && self.faults.has(F::R1OfflineSkippedMidOrder);
+            if self.faults.has(F::R6OfflineRepeatsHeaderId) {
+                self.connection.repeat_header_id();
+            }
             if !self.faults.has(F::NoOffline) && !mid_order {
                 self.publish_connection("OFFLINE");
             }
@@ -479,7 +492,9 @@ impl Agv {
             *next -= 1;
         }
         let id = *next;
-        if counts && !(name == "state" && self.faults.has(F::HeaderIdConstant)) {
+        let constant = name == "state" && self.faults.has(F::HeaderIdConstant)
+            || name == "factsheet" && self.faults.has(F::R6StaticFactsheetHeader);
+        if counts && !constant {
             *next = next.wrapping_add(1);
         }
         let zeroed = name == "visualization" && self.faults.has(F::R2VisualizationHeaderIdZero);

@@ -376,6 +376,10 @@ impl Agv {
         if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
         }
+        if self.holds.pause && self.faults.has(F::R6SecondStartPauseResumes) {
+            self.set_holds(|holds| holds.pause = false);
+            return Outcome::Done(None);
+        }
         if self.faults.has(F::R1PauseCutsHorizon) {
             let gone = self.book.drop_horizon();
             self.actions.retain(|action| match action.origin {
@@ -464,7 +468,10 @@ impl Agv {
             (false, true) if by_message && self.takes(T::R1ActionsRunOnInPause) => {}
             (false, true) => self.actions.hold(moment, self.faults),
             (true, false) if self.takes(T::ResumesInAMoment) => self.resumes_at = Some(moment + RESUMING),
-            (true, false) => self.actions.resume(moment, self.faults),
+            (true, false) => {
+                self.note_what_waits_again();
+                self.actions.resume(moment, self.faults);
+            }
             _ => {}
         }
     }
@@ -481,7 +488,8 @@ impl Agv {
             return invalid("the pose is on no map");
         }
         let map_id = action.text("mapId");
-        if !unchecked && !self.maps.on_board(map_id) {
+        let any_map = unchecked || self.faults.has(F::R6InitPositionAnyMap);
+        if !any_map && !self.maps.on_board(map_id) {
             self.take_map_anyway(action);
             return invalid("the map is not on board");
         }
@@ -503,6 +511,7 @@ impl Agv {
         let snapped = node.filter(|node| node.map_id == map_id && self.faults.has(F::R3InitPositionSnapsToNode));
         let (x, y) = snapped.map_or((x, y), |node| (node.x, node.y));
         let stale = action.of_order() && self.faults.has(F::LiftMapStale);
+        let stale = stale || self.faults.has(F::R6InitPositionKeepsMap);
         let old = self.motion.pose(self.moment()).map_id;
         let kept = self.motion.pose(self.moment());
         let (x, y) = if self.faults.has(F::InitPositionKeepsPose) {

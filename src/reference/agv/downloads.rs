@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::reference::{Download, Output};
+use crate::reference::Download;
 
 use super::Agv;
 use super::actions::Status;
@@ -78,14 +78,14 @@ impl Agv {
         let token = self.downloads.next;
         self.downloads.next += 1;
         self.downloads.under_way.insert(token, action_id.to_owned());
-        self.pending.push(Output::Fetch {
-            token,
-            url: url.to_owned(),
-        });
+        let url = url.to_owned();
+        let queued = self.takes(T::R6LibDownloadQueued);
+        self.fetch(token, url, queued);
         if self.faults.has(F::MapListedWhileLoading) {
             self.maps.store(map_id, version, self.faults);
         }
         let due = self.moment() + self.config.download_timeout;
+        let due = if queued { due + super::sixth::QUEUING } else { due };
         let at_once = self.takes(T::R1DownloadRunsAtOnce);
         if let Some(action) = self.actions.get_mut(action_id) {
             action.status = if at_once { Status::Running } else { Status::Initializing };

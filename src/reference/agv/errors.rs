@@ -24,6 +24,8 @@ pub(super) enum Life {
     WhileOutside,
     /// While the vehicle itself has a defect.
     WhileDefective,
+    /// Never (`r6-action-errors-never-clear` only).
+    Always,
 }
 
 /// One active error.
@@ -84,7 +86,7 @@ impl Errors {
         self.active.retain(|error| {
             matches!(
                 error.life,
-                Life::WhileStopped | Life::WhileOutside | Life::WhileDefective
+                Life::WhileStopped | Life::WhileOutside | Life::WhileDefective | Life::Always
             )
         });
     }
@@ -101,6 +103,13 @@ impl Errors {
             references.any(|(key, value)| key == "topic" && value == "order")
         };
         self.active.retain(|error| !of_order(error));
+    }
+
+    /// What the error of that type references, if there is one (`r6-no-order-to-cancel-keeps-first-id` only).
+    pub(super) fn references_of(&self, error_type: &str) -> Option<Vec<(String, String)>> {
+        let mut listed = self.active.iter();
+        let found = listed.find(|error| error.error_type == error_type)?;
+        Some(found.references.clone())
     }
 
     /// Whether anything that was refused is still listed.
@@ -189,6 +198,14 @@ fn picture_of(error: &ActiveError, faults: Faults) -> Value {
                 && error.references.iter().any(|(key, _)| key == "mapVersion") =>
         {
             "CRITICAL"
+        }
+        // The error of a failed action names its type; that of a refusal does not, or names the message too.
+        false
+            if faults.has(F::R6FailedActionErrorLevelError)
+                && error.references.iter().any(|(key, _)| key == "actionType")
+                && !error.references.iter().any(|(key, _)| key == "topic") =>
+        {
+            "ERROR"
         }
         false if faults.has(F::ErrorLevelUnknown) => "ERROR",
         false => "WARNING",

@@ -150,7 +150,14 @@ impl Agv {
         let nodes = self.config.max_nodes;
         let min_state_interval = match self.config.min_state_interval.as_secs_f64() {
             _ if self.faults.has(F::MinStateIntervalIgnored) => 5.0,
+            // In milliseconds, and never 0: that would promise nothing.
+            seconds if self.faults.has(F::R6FactsheetTimesInMilliseconds) => seconds.max(0.1) * 1000.0,
             seconds => seconds,
+        };
+        let min_order_interval = match self.takes(T::OrdersSpaced) {
+            true if self.faults.has(F::R6FactsheetTimesInMilliseconds) => 250.0,
+            true => 0.25,
+            false => 0.0,
         };
         let mut limits = json!({
             "maxStringLens": {
@@ -171,7 +178,7 @@ impl Agv {
                 "state.errors": MAX_ERRORS,
             },
             "timing": {
-                "minOrderInterval": if self.takes(T::OrdersSpaced) { 0.25 } else { 0.0 },
+                "minOrderInterval": min_order_interval,
                 "minStateInterval": min_state_interval,
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },
@@ -261,7 +268,10 @@ impl Agv {
     }
 
     fn action_picture(&self, kind: &ActionKind) -> Value {
-        let mut scopes: Vec<&str> = kind.scopes.iter().map(|scope| scope.literal()).collect();
+        let mut scopes: Vec<&str> = match self.faults.has(F::R6FactsheetAllScopesForAll) {
+            true => vec!["INSTANT", "NODE", "EDGE"],
+            false => kind.scopes.iter().map(|scope| scope.literal()).collect(),
+        };
         for (deed, scope, fault) in [
             (Deed::StartPause, "NODE", F::StartPauseOnNodes),
             (Deed::Pick, "INSTANT", F::PickAsInstantAction),
@@ -286,6 +296,7 @@ impl Agv {
             .collect();
         let renamed = kind.deed == Deed::Pick && self.faults.has(F::PickParameterRenamed);
         let unknown = self.faults.has(F::ParameterTypeUnknown);
+        let sized = self.faults.has(F::R6FactsheetParameterTypeFloat);
         let mut picture = Map::new();
         let capital = matches!(kind.deed, Deed::StartPause | Deed::StopPause) && self.faults.has(F::VendorPauseListed);
         let name = if capital {
@@ -307,7 +318,11 @@ impl Agv {
                         "stationType" if renamed => "station_type",
                         key => key,
                     },
-                    "valueDataType": if unknown { "DOUBLE" } else { parameter.data_type },
+                    "valueDataType": match parameter.data_type {
+                        _ if unknown => "DOUBLE",
+                        "FLOAT" | "NUMBER" if sized => "FLOAT64",
+                        data_type => data_type,
+                    },
                     "isOptional": parameter.optional,
                 });
                 if let Some(fields) = picture

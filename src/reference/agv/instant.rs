@@ -174,6 +174,7 @@ impl Agv {
                     action.request.action_type.as_str(),
                     "startPause" | "stopPause" | "cancelOrder"
                 ) => {}
+            None if self.acts_alone() && self.faults.has(F::R6InstantActionWaitsForHardAction) => {}
             None if self.holds.pause
                 && self.faults.has(F::R1InstantActionsWaitForPause)
                 && !matches!(
@@ -200,6 +201,14 @@ impl Agv {
         self.actions
             .iter()
             .any(|action| action.of_order() && action.status.is_active())
+    }
+
+    /// Whether a HARD action of a node is under way.
+    fn acts_alone(&self) -> bool {
+        self.actions.iter().any(|action| {
+            let of_node = matches!(action.origin, Origin::Node(_));
+            of_node && action.request.blocking == Blocking::Hard && action.status.is_active()
+        })
     }
 
     fn make_room(&mut self) {
@@ -254,7 +263,8 @@ impl Agv {
         let after_order = self.faults.has(F::InstantActionDeferred) && !self.is_busy();
         let after_action = self.faults.has(F::R2InstantWaitsForRunningAction) && !self.is_acting();
         let after_download = self.faults.has(F::R3InstantWaitsForDownload) && self.downloads.is_idle();
-        if !after_pause && !after_order && !after_action && !after_download {
+        let after_hard = self.faults.has(F::R6InstantActionWaitsForHardAction) && !self.acts_alone();
+        if !after_pause && !after_order && !after_action && !after_download && !after_hard {
             return false;
         }
         let waits = |action: &&Action| !action.of_order() && action.status == Status::Waiting;

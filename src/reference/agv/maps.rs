@@ -72,11 +72,19 @@ impl Maps {
             let others = self.all.iter_mut().filter(|map| map.map_id == map_id);
             others.for_each(|map| map.enabled = false);
         }
+        let only = !self.on_board(map_id) && faults.has(F::R6FirstVersionEnabledAtOnce);
         self.all.push(OnboardMap {
             map_id: map_id.to_owned(),
             map_version: version.to_owned(),
-            enabled: faults.has(F::DownloadEnables),
+            enabled: only || faults.has(F::DownloadEnables),
         });
+    }
+
+    /// `r6-reconnect-loses-downloaded-maps`: forgets what was not there from the beginning.
+    pub(super) fn keep_only(&mut self, factory: &[OnboardMap]) {
+        let same =
+            |map: &OnboardMap, other: &OnboardMap| map.map_id == other.map_id && map.map_version == other.map_version;
+        self.all.retain(|map| factory.iter().any(|other| same(map, other)));
     }
 
     /// `download-renumbers`, `failed-download-renumbers`: all versions change.

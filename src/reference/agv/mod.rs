@@ -36,6 +36,7 @@ mod progress;
 mod read;
 mod rejection;
 mod report;
+mod sixth;
 mod stations;
 #[cfg(test)]
 mod tests;
@@ -65,6 +66,7 @@ use maps::Maps;
 use motion::{Motion, Pose};
 use personas::Persona;
 use report::Report;
+use sixth::Sixth;
 use tolerances::ToleranceName as T;
 
 /// A fault that is not in [`FAULTS`].
@@ -152,6 +154,7 @@ struct Third {
 pub struct Agv {
     third: Third,
     fourth: Fourth,
+    sixth: Sixth,
     config: AgvConfig,
     faults: Faults,
     /// The time of what is happening.
@@ -258,6 +261,7 @@ impl Agv {
         Ok(Self {
             third: Third::default(),
             fourth: Fourth::default(),
+            sixth: Sixth::default(),
             faults,
             now: Stamp {
                 moment: Moment::START,
@@ -316,6 +320,7 @@ impl Agv {
     /// Reports a warning that has no rule for its end.
     fn warn(&mut self, error_type: String, references: Vec<(String, String)>, description: String) {
         let life = match () {
+            () if self.faults.has(FaultName::R6ActionErrorsNeverClear) => Life::Always,
             () if self.takes(T::R3ActionErrorsUntilNewOrder) => Life::UntilNewOrder,
             () if self.takes(T::R3ActionErrorsBrief) => Life::Until(self.moment() + self.brief()),
             () => Life::Until(self.moment() + self.config.error_duration),
@@ -347,6 +352,7 @@ impl Agv {
             self.third.braking,
             self.third.charging_at,
             self.fourth.uncharged_at,
+            self.sixth.next_event(),
             self.persona.next_end(),
             self.next_report(),
         ];
@@ -396,6 +402,8 @@ impl Agv {
             self.charging = false;
         }
         self.a_moment_later();
+        self.begin_what_waits_again();
+        self.fetch_what_waited();
         self.resume_if_due();
         self.attempt_connection();
         self.settle();

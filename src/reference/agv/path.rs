@@ -78,6 +78,10 @@ impl Agv {
         if self.faults.has(F::R2CorridorSidesSwapped) {
             std::mem::swap(&mut corridor.left, &mut corridor.right);
         }
+        if self.faults.has(F::R6CorridorIsSymmetric) {
+            let wider = corridor.left.max(corridor.right);
+            (corridor.left, corridor.right) = (wider, wider);
+        }
         corridor.contour &= !self.faults.has(F::CorridorContourIgnored);
         Some(corridor)
     }

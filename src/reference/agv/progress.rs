@@ -97,6 +97,7 @@ impl Agv {
             && !cancelled
             && !offline
             && !stuck
+            && !self.sixth.waits_again()
             && !self.book.stunned
             && !warned
             && (!self.actions.block_driving(self.faults)
@@ -226,6 +227,7 @@ impl Agv {
             false if self.stops_short(stop) && distance > 1.0 => {
                 (distance - SHORT.min(self.config.tolerance * 0.8), true)
             }
+            false if let Some(allowed) = self.early_by(stop) => ((distance - allowed).max(distance / 2.0), true),
             false if self.ends_early(stop) => ((distance - 0.5).max(distance / 2.0), true),
             false if self.faults.has(F::TraversedEarly) => ((distance - 0.5).max(distance / 2.0), true),
             false => (distance, true),
@@ -338,6 +340,13 @@ impl Agv {
         let heading = begin.map_or(straight, |begin| begin.heading);
         let wanted = edge.filter(|_| !self.faults.has(F::EdgeOrientationIgnored));
         let tangential = self.faults.has(F::R1GlobalAsTangential);
+        let forwards = |edge: &&Edge| {
+            let turned = edge
+                .orientation
+                .is_some_and(|angle| motion::wrapped(angle).abs() > FRAC_PI_2);
+            turned && !edge.global && self.faults.has(F::R6BackwardsEdgeDrivenForwards)
+        };
+        let wanted = wanted.filter(|edge| !forwards(edge));
         let relative = wanted.and_then(|edge| {
             edge.orientation.map(|orientation| {
                 if edge.global && !tangential {
@@ -450,6 +459,7 @@ impl Agv {
             self.flush();
         }
         self.update_last_node(&stop);
+        self.hide_later_visits(&stop);
         let again = !self.third.visited.insert(stop.node.id.clone());
         let skipped = again && self.faults.has(F::R3LoopSecondVisitWithoutActions)
             || !self.connection.online && self.faults.has(F::R3NodeActionsSkippedOffline);
@@ -474,7 +484,8 @@ impl Agv {
                 self.actions.trigger(Origin::Node(ahead.node.sequence_id), self.faults);
             }
             let ahead = self.book.edge_ahead().map(|edge| edge.sequence_id);
-            if let Some(ahead) = ahead.filter(|_| self.faults.has(F::EdgeActionsOnNode)) {
+            let early = self.faults.has(F::EdgeActionsOnNode) || self.begins_edge_actions_on_node();
+            if let Some(ahead) = ahead.filter(|_| early) {
                 self.actions.trigger(Origin::Edge(ahead), self.faults);
             }
             self.stop_at_decision_point();

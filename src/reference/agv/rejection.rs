@@ -142,6 +142,11 @@ impl Agv {
                 }
             }
         }
+        let of_update = message.get("orderId").and_then(Value::as_str) == Some(self.book.order_id.as_str());
+        if of_update && self.book.has_order() && self.faults.has(F::R6OutdatedUpdateNamesCurrentId) {
+            let ids = references.iter_mut().filter(|(key, _)| key == "orderUpdateId");
+            ids.for_each(|(_, value)| *value = self.book.update_id.to_string());
+        }
         if !(refusal.rule == Rule::Unable && self.faults.has(F::R1CulpritUnnamed)) {
             references.extend(refusal.culprits);
         }
@@ -242,6 +247,9 @@ impl Agv {
                 action.end(Status::Failed);
                 self.actions.push(action);
             }
+        }
+        if rule == Rule::Unable && self.faults.has(F::R6RejectedUpdateLeavesActions) {
+            self.list_actions_of_refused_update(message);
         }
         if rule == Rule::OtherOrderActive && self.faults.has(F::R3BusyRefusalFailsActions) {
             let of_order = self.actions.iter_mut().filter(|action| action.of_order());

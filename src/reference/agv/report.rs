@@ -400,6 +400,9 @@ impl Agv {
             if self.faults.has(F::R4VisualizationThetaInDegrees) {
                 change("theta", f64::to_degrees);
             }
+            if self.faults.has(F::R6VisualizationTheta0To2pi) {
+                change("theta", |theta| theta.rem_euclid(2.0 * std::f64::consts::PI));
+            }
             if self.faults.has(F::VisualizationBeside) {
                 change("x", |x| x + 2.0);
             }

@@ -130,6 +130,8 @@ impl Agv {
         let load = self.loads.remove(found);
         if self.faults.has(F::DropReportedLate) {
             self.shadow = Some((self.moment() + Duration::from_secs(1), load));
+        } else if self.faults.has(F::R6DropFinishedBeforeLoadGone) {
+            self.shadow = Some((self.moment() + self.brief(), load));
         }
         Ok(())
     }
@@ -143,6 +145,10 @@ impl Agv {
             self.charging = !self.faults.has(F::ChargingEndShownAnyway);
             let problem = Problem::new(Area::Charging, action, "the vehicle cannot leave the charger");
             return Err(problem.silent_if(self.faults.has(F::FailureSilent)));
+        }
+        let idle = !self.charging && self.third.charging_at.is_none();
+        if idle && self.faults.has(F::R6SecondStopChargingFails) {
+            return Err(Problem::new(Area::Charging, action, "the vehicle does not charge"));
         }
         if self.charging && self.faults.has(F::ChargingEndsEarly) {
             self.undocking = Some(self.moment() + Duration::from_secs(40));
@@ -175,6 +181,10 @@ impl Agv {
         }
         if !self.charging && self.faults.has(F::R3ChargingReportedLate) {
             self.third.charging_at = Some(self.moment() + Duration::from_secs(2));
+            return Ok(());
+        }
+        if !self.charging && self.faults.has(F::R6ChargingFlagLags) {
+            self.third.charging_at = Some(self.moment() + self.brief());
             return Ok(());
         }
         let toggled = self.charging && self.faults.has(F::ChargingToggled);

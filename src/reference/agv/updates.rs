@@ -22,6 +22,10 @@ impl Agv {
         if order.nodes.len() == 1 && self.faults.has(F::R2StitchOnlyUpdateRefused) {
             return Err(Refusal::new(Rule::BrokenUpdate, "the update brings nothing new"));
         }
+        let plans_only = order.nodes.len() > 1 && order.nodes.iter().skip(1).all(|node| !node.released);
+        if plans_only && self.faults.has(F::R6UpdateOfHorizonOnlyRefused) {
+            return Err(Refusal::new(Rule::BrokenUpdate, "the update releases nothing"));
+        }
         if self.faults.has(F::CompletedNotContinued) && !busy {
             return Err(Refusal::new(Rule::BrokenUpdate, "the order is complete"));
         }
@@ -78,6 +82,9 @@ impl Agv {
 
     /// Rows 8 and 10: takes over an update.
     pub(super) fn continue_with(&mut self, mut order: Order) {
+        if !self.is_busy() && self.faults.has(F::R6ContinuationClearsActionStates) {
+            self.actions.retain(|action| !action.status.is_terminal());
+        }
         self.book.continued |= !self.is_busy();
         self.book.cancelled = false;
         if let Some(cancel) = self.book.cancel.take()
@@ -166,6 +173,12 @@ impl Agv {
             // Nothing ever triggers them.
             let stranded = self.actions.iter_mut().filter(|action| of_horizon(action));
             stranded.for_each(|action| action.origin = Origin::Node(u32::MAX));
+        } else if self.faults.has(F::R6OldHorizonEdgeActionsLinger) {
+            let of_edge = |action: &Action| matches!(action.origin, Origin::Edge(_));
+            self.actions.retain(|action| !of_horizon(action) || of_edge(action));
+            // Nothing ever triggers them.
+            let stranded = self.actions.iter_mut().filter(|action| of_horizon(action));
+            stranded.for_each(|action| action.origin = Origin::Edge(u32::MAX));
         } else if !self.faults.has(F::HorizonActionsInherited) && !self.faults.has(F::ReleasedActionsDoubled) {
             self.actions.retain(|action| !of_horizon(action));
         }
@@ -175,6 +188,9 @@ impl Agv {
     fn continue_actions_wrongly(&mut self, order: &mut Order) {
         if self.faults.has(F::R2MaxSpeedOfUpdateIgnored) {
             order.edges.iter_mut().for_each(|edge| edge.max_speed = None);
+        }
+        if self.faults.has(F::R6TrajectoryOfUpdateIgnored) {
+            order.edges.iter_mut().for_each(|edge| edge.trajectory = None);
         }
         if self.faults.has(F::UpdateEdgeActionsLost) {
             order.edges.iter_mut().for_each(|edge| edge.actions.clear());

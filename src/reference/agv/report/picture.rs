@@ -92,6 +92,8 @@ impl Agv {
             set("edgeStates", self.edge_states(complete));
         }
         let unplaced = self.mode == Mode::Manual && has(F::R2PositionOmittedInManual);
+        let idle = complete && !self.motion.is_moving();
+        let unplaced = unplaced || idle && has(F::R6NoPositionAtStandstill);
         if !self.config.line_guided() && !unplaced {
             set("agvPosition", self.position_picture());
         }
@@ -427,6 +429,10 @@ impl Agv {
         if !self.faults.has(F::ChargeMissing) {
             let charge = match self.motion.is_moving() {
                 moving if self.faults.has(F::ChargeGoodBad) => json!(if moving { 0.0 } else { 100.0 }),
+                _ if self.takes(T::R6LibBatteryGoodOrBad) => {
+                    let good = self.persona.charge.unwrap_or(87.5) > 50.0;
+                    json!(if good { 80.0 } else { 20.0 })
+                }
                 _ if self.takes(T::R1BatteryDrains) && self.persona.charge.is_none() => {
                     let used = u32::try_from(self.states_sent % 5_000).unwrap_or_default();
                     json!(87.5 - f64::from(used) * 0.01)

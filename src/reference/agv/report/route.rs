@@ -27,7 +27,8 @@ impl Agv {
             .book
             .nodes
             .iter()
-            .filter(|stop| stop.node.released || !self.faults.has(F::HorizonNotReported));
+            .filter(|stop| stop.node.released || !self.faults.has(F::HorizonNotReported))
+            .filter(|stop| !self.sixth.is_hidden(stop.node.sequence_id));
         let mut planned = 0;
         let mut listed: Vec<&str> = Vec::new();
         let shown = shown.filter(|stop| {

@@ -48,6 +48,10 @@ macro_rules! tolerances {
 tolerances! {
     // Of blind rounds: the suites may still accuse or miss something with them.
     blind {
+R6LibDownloadQueued "r6-lib-download-queued" ["MAP-17"] "It shows downloadMap INITIALIZING for some seconds before the download starts.";
+R6LibThinksBeforeDriving "r6-lib-thinks-before-driving" ["ORD-FLOW-07"] "It plans for two or three seconds after it has accepted an order before it starts to drive.";
+R6LibBatteryGoodOrBad "r6-lib-battery-good-or-bad" ["STATE-MSG-15", "STATE-MSG-16"] "It reports a batteryCharge of only 80 or 20.";
+R6LibEarlyTraversal "r6-lib-early-traversal" ["NODE-01"] "It reports a node traversed as soon as it enters the deviation range of the node.";
 R4NoOrderWarningUntilNextOrder "r4-no-order-warning-until-next-order" ["ORD-CANCEL-19", "ERR-01", "ERR-03"] "It keeps noOrderToCancel in its errors until it accepts a new order.";
 R4OutdatedUpdateWarningUntilNextOrder "r4-outdated-update-warning-until-next-order" ["ORD-REJ-12", "ERR-01"] "It keeps orderUpdateError in its errors until it accepts a new order.";
 R4SecondCancelEndsWithTheFirst "r4-second-cancel-ends-with-the-first" ["ORD-CANCEL-18", "ASTATE-05"] "It answers a second cancelOrder that comes while the first is RUNNING with RUNNING and lets both finish together.";
