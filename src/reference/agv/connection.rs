@@ -25,7 +25,7 @@ pub(super) struct Connection {
     /// How often it was online.
     sessions: u32,
     /// The next headerId by topic name (HDR-02).
-    header_ids: BTreeMap<&'static str, u32>,
+    pub(super) header_ids: BTreeMap<&'static str, u32>,
     /// The factsheet that is published now was asked for.
     pub(super) factsheet_asked: bool,
     /// It has answered a factsheetRequest (`r2-factsheet-only-once` only).
@@ -86,21 +86,9 @@ impl Connection {
         }
     }
 
-    /// `r6-offline-repeats-header-id`: the next message has the headerId of the one before.
-    fn repeat_header_id(&mut self) {
-        if let Some(next) = self.header_ids.get_mut("connection") {
-            *next = next.wrapping_sub(1);
-        }
-    }
-
     /// Whether it was online before.
     pub(super) fn was_online(&self) -> bool {
         self.returning
-    }
-
-    /// `r4-header-id-restarts-with-order`: counts its states from 0 again.
-    pub(super) fn restart_header_id(&mut self) {
-        self.header_ids.insert("state", 0);
     }
 
     /// Somebody wants the vehicle connected.

@@ -9,6 +9,7 @@ use super::Agv;
 use super::action_kinds;
 use super::actions::{Action, Origin, Status};
 use super::book::Stop;
+use super::connection::Connection;
 use super::faults::FaultName as F;
 use super::order_message::{Blocking, Order};
 use super::tolerances::ToleranceName as T;
@@ -61,6 +62,20 @@ impl Sixth {
     pub(super) fn next_event(&self) -> Option<Moment> {
         let fetches = self.fetches.iter().map(|(due, ..)| *due);
         fetches.chain(self.again_at).min()
+    }
+}
+
+impl Connection {
+    /// `r6-offline-repeats-header-id`: the next message has the headerId of the one before.
+    pub(super) fn repeat_header_id(&mut self) {
+        if let Some(next) = self.header_ids.get_mut("connection") {
+            *next = next.wrapping_sub(1);
+        }
+    }
+
+    /// `r4-header-id-restarts-with-order`: counts its states from 0 again.
+    pub(super) fn restart_header_id(&mut self) {
+        self.header_ids.insert("state", 0);
     }
 }
 

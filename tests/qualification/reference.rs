@@ -1,22 +1,11 @@
 //! Proof of every check, in virtual time: the faultless reference device of each side passes everything without a
 //! warning, and every clause and monitor is failed by a named fault. The kill matrices are snapshots.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    clippy::unwrap_used,
-    reason = "a test may fail by panicking"
-)]
-
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vda5050_tck::pack::{Pack, Role};
 use vda5050_tck::run::{BuiltIn, Decider, Library, Qualification, VirtualRun, decided, qualify, run_silently};
 use vda5050_tck::verdict::Verdict;
-
-/// The allocator of the program: a qualification is a million small trees.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 /// What is excused on one side of the interface.
 struct Side {
@@ -33,17 +22,17 @@ struct Side {
 
 const AGV: Side = Side {
     role: Role::Agv,
-    unfound: include_str!("qualification/unfound.tsv"),
-    first: include_str!("qualification/first.tsv"),
-    found: include_str!("qualification/found.tsv"),
+    unfound: include_str!("unfound.tsv"),
+    first: include_str!("first.tsv"),
+    found: include_str!("found.tsv"),
     matrix: "kill_matrix",
 };
 
 const MASTER_CONTROL: Side = Side {
     role: Role::MasterControl,
-    unfound: include_str!("qualification/master-control-unfound.tsv"),
-    first: include_str!("qualification/master-control-first.tsv"),
-    found: include_str!("qualification/master-control-found.tsv"),
+    unfound: include_str!("master-control-unfound.tsv"),
+    first: include_str!("master-control-first.tsv"),
+    found: include_str!("master-control-found.tsv"),
     matrix: "master_control_kill_matrix",
 };
 
@@ -81,6 +70,7 @@ fn every_check_of_a_master_control_passes_without_a_fault_and_is_failed_by_one()
 
 /// Every version is proven by itself: what holds in the newest one says nothing about the others.
 fn prove(side: &Side) {
+    super::stand_back();
     let library = library();
     for pack in library.rules.packs.all() {
         prove_version(side, &library, pack);
@@ -251,6 +241,7 @@ impl Found<'_> {
 /// What was found of a blind round stays found, each fault by the tests that found it.
 #[test]
 fn what_was_found_of_blind_rounds_is_found_again() {
+    super::stand_back();
     let library = library();
     let pack = library.rules.packs.latest();
     let mut all = Vec::new();
@@ -305,6 +296,7 @@ fn what_was_found_of_blind_rounds_is_found_again() {
 
 #[test]
 fn the_older_version_passes_without_a_fault_too() {
+    super::stand_back();
     let library = library();
     for (role, pack) in [Role::Agv, Role::MasterControl]
         .into_iter()

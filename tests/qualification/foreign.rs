@@ -2,15 +2,12 @@
 //! shipped and with one obstacle removed. The harness must find exactly what stands in their lists of expected findings,
 //! each traced to a place in the library, and must accuse them of nothing else.
 //!
-//! Both variants of a device are run at once, each on several benches (`--shard`), because most of the time is waiting.
-
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+//! Both variants of both devices are run at once, each on several benches (`--shard`), because most of the time is waiting.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 
@@ -37,9 +34,6 @@ const MASTER_CONTROL: Device = Device {
         ("translated", "device-translated.toml", 6),
     ],
 };
-
-/// One device at a time: more benches than these make a machine too busy for their limits of time.
-static TURN: Mutex<()> = Mutex::new(());
 
 /// Verdict by requirement.
 type Verdicts = BTreeMap<String, String>;
@@ -223,8 +217,8 @@ fn differences(expected: &[toml::Table], found: &Found) -> String {
     report
 }
 
-/// Runs both variants of a device, and holds that they are found to be what is listed.
-fn is_found_as_listed(device: &Device) {
+/// The benches of both variants of a device, where it is installed.
+fn start(device: &Device) -> Option<[(&'static str, Vec<Bench>); 2]> {
     let folder = device.folder;
     if !Path::new(folder)
         .join("node_modules/vda-5050-lib/package.json")
@@ -233,17 +227,19 @@ fn is_found_as_listed(device: &Device) {
         let missing = format!("the foreign device is not installed: run `npm ci` in {folder}");
         assert!(std::env::var_os("CI").is_none(), "{missing}");
         eprintln!("skipped: {missing}");
-        return;
+        return None;
     }
-    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    let benches = device.variants.map(|(variant, profile, of)| {
-        let benches: Vec<Bench> = (1..=of)
-            .map(|shard| Bench::start(folder, variant, profile, shard, of))
-            .collect();
-        (variant, benches)
-    });
+    Some(device.variants.map(|(variant, profile, of)| {
+        let benches = (1..=of).map(|shard| Bench::start(folder, variant, profile, shard, of));
+        (variant, benches.collect())
+    }))
+}
+
+/// What differs from the list of a device; empty when nothing does.
+fn read(device: &Device, variants: [(&str, Vec<Bench>); 2]) -> String {
+    let folder = device.folder;
     let mut report = String::new();
-    for (variant, benches) in benches {
+    for (variant, benches) in variants {
         let mut found = Found::default();
         for mut bench in benches {
             // Every bench is waited for, so that none is left behind.
@@ -254,23 +250,21 @@ fn is_found_as_listed(device: &Device) {
         }
         let differences = differences(&expected(folder, variant), &found);
         if !differences.is_empty() {
-            let _ = writeln!(report, "{variant}:\n{differences}");
+            let _ = writeln!(
+                report,
+                "{variant}: the findings differ from {folder}/expected-findings.toml\n{differences}"
+            );
         }
     }
-    assert!(
-        report.is_empty(),
-        "the findings differ from {folder}/expected-findings.toml\n{report}"
-    );
+    report
 }
 
 #[test]
-fn the_harness_finds_in_a_foreign_vehicle_what_is_listed_and_nothing_else() {
-    is_found_as_listed(&AGV);
-}
-
-#[test]
-fn the_harness_finds_in_a_foreign_master_control_what_is_listed_and_nothing_else() {
-    is_found_as_listed(&MASTER_CONTROL);
+fn the_harness_finds_in_foreign_devices_what_is_listed_and_nothing_else() {
+    let started = [AGV, MASTER_CONTROL].map(|device| (start(&device), device));
+    let reports = started.map(|(benches, device)| benches.map(|benches| read(&device, benches)));
+    let report: String = reports.into_iter().flatten().collect();
+    assert!(report.is_empty(), "{report}");
 }
 
 #[test]
