@@ -186,6 +186,7 @@ impl Running for OwnLimits {
                 let interval = value
                     .pointer("/protocolLimits/timing/minStateInterval")
                     .and_then(Value::as_f64);
+                // What no Duration can hold says nothing; what cannot be meant, such as milliseconds, is still judged.
                 self.interval = interval
                     .filter(|seconds| (0.0..=1e6).contains(seconds))
                     .map(Duration::from_secs_f64);
