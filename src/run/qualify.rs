@@ -4,6 +4,8 @@
 //! fault breaks, and draws up the kill matrix: which clause and which monitor is failed by which fault. What is still
 //! unproven is tried with every fault. A clause no fault can fail is said so by name.
 
+mod rest;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -307,6 +309,7 @@ pub fn qualify_tests(
             kill(library, pack, &vehicles, fault, None, &|test| drawn(fault, test))
         })?,
     );
+    let excused: Vec<Unproven> = excused_of(library, pack, role);
     if faults.len() > FEW {
         // What no test it names has found is tried on everything.
         let missed = kills.iter().filter(|kill| !kill.named());
@@ -315,21 +318,22 @@ pub fn qualify_tests(
             &mut kills,
             each(&missed, |fault| kill(library, pack, &vehicles, fault, DRAWN, &|_| true))?,
         );
-        try_the_late(library, pack, &vehicles, &late, &deciders, &mut kills)?;
-        prove_the_rest(library, pack, &vehicles, &faults, &deciders, &mut kills)?;
+        let rest = rest::Rest {
+            library,
+            pack,
+            vehicles: &vehicles,
+            deciders: &deciders,
+            excused: &excused,
+        };
+        rest.prove(&faults, &late, &mut kills)?;
     }
-    let excused = library.rules.suites.unproven.iter();
     Ok(Qualification {
         role,
         late: whole,
         blemishes,
         deciders,
         kills,
-        excused: excused
-            .filter(|one| one.role == role)
-            .filter(|one| one.spec.as_ref().is_none_or(|spec| spec.contains(pack.version)))
-            .cloned()
-            .collect(),
+        excused,
     })
 }
 
@@ -339,143 +343,17 @@ const DRAWN: Option<u64> = Some(1);
 /// So many faults are tried on every test.
 const FEW: usize = 5;
 
-/// So many faults are tried before it is looked again what is still unproven.
-const CHUNK: usize = 12;
-
-/// Tries the faults of blind rounds on the tests that decide what they break, where something in them is not proven yet.
-fn try_the_late(
-    library: &Library,
-    pack: &Pack,
-    vehicles: &[Vehicle],
-    late: &[Fault],
-    deciders: &BTreeSet<Decider>,
-    kills: &mut Vec<Kill>,
-) -> Result<(), EngineError> {
-    for some in late.chunks(CHUNK) {
-        let open = unproven_of(deciders, kills);
-        let places: BTreeSet<&str> = open.iter().filter_map(|one| one.place.split(' ').next()).collect();
-        let more = each(some, |fault| {
-            kill(library, pack, vehicles, fault, DRAWN, &|test| {
-                places.contains(test.table()) && concerns(fault, test)
-            })
-        })?;
-        kills.extend(more);
-    }
-    // What only some members show is tried on all that is drawn from.
-    for some in late.chunks(CHUNK) {
-        let open: BTreeSet<String> = unproven_of(deciders, kills)
-            .into_iter()
-            .map(|one| one.requirement)
-            .collect();
-        let about = |fault: &&Fault| fault.breaks.iter().any(|id| open.contains(*id));
-        let some: Vec<Fault> = some.iter().filter(about).copied().collect();
-        let more = each(&some, |fault| {
-            kill(library, pack, vehicles, fault, None, &|test| {
-                let decides = test.requirements().into_iter().any(|id| open.contains(id.as_str()));
-                test.drawn.is_some() && decides && concerns(fault, test)
-            })
-        })?;
-        merge(kills, more);
-    }
-    Ok(())
+/// What the suites say no fault of this side is known to fail in this version.
+fn excused_of(library: &Library, pack: &Pack, role: Role) -> Vec<Unproven> {
+    let all = library.rules.suites.unproven.iter().filter(|one| one.role == role);
+    let of_version = |one: &&Unproven| one.spec.as_ref().is_none_or(|spec| spec.contains(pack.version));
+    all.filter(of_version).cloned().collect()
 }
 
 /// Whether all proven faults are among these. Who asks for some by name has each of them tried.
 fn is_whole(role: Role, faults: &[Fault]) -> bool {
     let mut proven = BuiltIn::faults(role).iter();
     proven.all(|fault| faults.iter().any(|one| one.name == fault.name))
-}
-
-/// What none of these kills proves.
-fn unproven_of(deciders: &BTreeSet<Decider>, kills: &[Kill]) -> Vec<Decider> {
-    let killed: BTreeSet<&Decider> = kills.iter().flat_map(|kill| &kill.deciders).collect();
-    let open = deciders.iter().filter(|decider| !killed.contains(decider));
-    open.cloned().collect()
-}
-
-/// What is still unproven may be failed by a fault that is about something else: the tests that decide it are tried
-/// with every fault, those about similar requirements first, until all of it is proven.
-fn prove_the_rest(
-    library: &Library,
-    pack: &Pack,
-    vehicles: &[Vehicle],
-    faults: &[Fault],
-    deciders: &BTreeSet<Decider>,
-    kills: &mut [Kill],
-) -> Result<(), EngineError> {
-    let unproven = |kills: &[Kill]| unproven_of(deciders, kills);
-    // A monitor may need other tests than those that decide the same: the faults that are about its requirement, or
-    // failed it elsewhere, are tried on everything.
-    let tests = &vehicles.first().map_or(&[][..], |vehicle| &vehicle.request.tests);
-    let is_monitor =
-        |decider: &&Decider| !decider.place.contains(' ') && !tests.iter().any(|test| test.table() == decider.place);
-    let monitored = |kills: &[Kill]| -> BTreeSet<String> {
-        let open = unproven(kills);
-        open.iter()
-            .filter(is_monitor)
-            .map(|decider| decider.requirement.clone())
-            .collect()
-    };
-    let related: Vec<Fault> = {
-        let open = monitored(kills);
-        let about = |kill: &&Kill| {
-            let named = kill.fault.breaks.iter().any(|id| open.contains(*id));
-            named || kill.requirements.iter().any(|id| open.contains(id))
-        };
-        kills.iter().filter(about).map(|kill| kill.fault).collect()
-    };
-    for some in related.chunks(CHUNK) {
-        let open = monitored(kills);
-        let about = |fault: &&Fault| {
-            let kill = kills.iter().find(|kill| kill.fault == **fault);
-            let found = kill.is_some_and(|kill| kill.requirements.iter().any(|id| open.contains(id)));
-            found || fault.breaks.iter().any(|id| open.contains(*id))
-        };
-        let some: Vec<Fault> = some.iter().filter(about).copied().collect();
-        let more = each(&some, |fault| kill(library, pack, vehicles, fault, DRAWN, &|_| true))?;
-        merge(kills, more);
-    }
-    let group = |id: &str| id.rsplit_once('-').map_or(id, |(group, _)| group).to_owned();
-    let groups: BTreeSet<String> = unproven(kills)
-        .iter()
-        .map(|decider| group(&decider.requirement))
-        .collect();
-    let mut order = faults.to_vec();
-    order.sort_by_key(|fault| !fault.breaks.iter().any(|id| groups.contains(&group(id))));
-    for some in order.chunks(CHUNK) {
-        let open = unproven(kills);
-        let places: BTreeSet<&str> = open
-            .iter()
-            .filter_map(|decider| decider.place.split(' ').next())
-            .collect();
-        let is_open = |test: &Test| places.contains(test.table());
-        if !vehicles
-            .iter()
-            .any(|vehicle| vehicle.request.tests.iter().any(|test| is_open(test)))
-        {
-            break;
-        }
-        let more = each(some, |fault| {
-            // What it breaks was tried before.
-            kill(library, pack, vehicles, fault, DRAWN, &|test| {
-                is_open(test) && !concerns(fault, test)
-            })
-        })?;
-        merge(kills, more);
-    }
-    // A test may not have come to its end for what a fault did to the vehicle in another one: it is tried by itself.
-    for decider in unproven(kills) {
-        let place = decider.place.split(' ').next().unwrap_or_default();
-        let about = faults
-            .iter()
-            .filter(|fault| fault.breaks.contains(&decider.requirement.as_str()));
-        let about: Vec<Fault> = about.copied().collect();
-        let more = each(&about, |fault| {
-            kill(library, pack, vehicles, fault, DRAWN, &|test| test.table() == place)
-        })?;
-        merge(kills, more);
-    }
-    Ok(())
 }
 
 /// Whether a test decides something the fault breaks.

@@ -33,7 +33,6 @@ pub const LAPSES: &[(&str, &str)] = &[
         "lost-order-not-resent",
         "To send an order again is allowed, not demanded.",
     ),
-    ("fleet-of-one", "MQTT-11 is a design goal; its result is informative."),
     (
         "first-vehicle-extended-only",
         "It breaks a recommendation only, and MQTT-11 is a design goal.",
