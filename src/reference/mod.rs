@@ -4,6 +4,7 @@
 //! no randomness. Drivers that connect one to a link live in `link::memory` and `cli::simulate`.
 
 pub mod agv;
+pub mod deviations;
 pub mod master_control;
 
 use std::time::Duration;

@@ -1,0 +1,10 @@
+//! Everything a reference device can do otherwise than a conformant one: faults, lapses, liberties and personas.
+//!
+//! A deviation is one record in one place ([`record`]), in the file of its topic below the folder of its role. It takes
+//! hold at the seam of its role only, and is called what it does. What most deviations change is what a message
+//! says; [`words`] makes that short.
+
+pub mod record;
+pub mod words;
+
+pub use record::{Kind, Record};
