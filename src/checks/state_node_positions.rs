@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::orders::number;
 use super::state_route::Shown;
-use super::traffic::{broken, elements, quote, text, to_vehicle};
+use super::traffic::{broken, elements, quote, remark, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
@@ -31,7 +31,8 @@ pub(super) const JOINT_POSITION: Check = Check {
     name: "state/joint-position",
     decides: &["ORD-UPD-07"],
     doc: "A node that was sent twice, at different places, keeps the place of its first transmission where nodeStates give a \
-          nodePosition. Judged when states have shown the order the first one came with.",
+          nodePosition: a warning, as to list a place is not to use it. Judged when states have shown the order the first \
+          one came with.",
     arguments: &[],
     start: |_| {
         Box::new(NodePositions {
@@ -167,7 +168,8 @@ impl Running for NodePositions {
             self.follows = trusted;
             let Some(requirement) = requirement else { continue };
             if self.told.len() < NODES && self.told.insert((id.to_owned(), sequence)) {
-                findings.push(broken(requirement, entry.seq(), text));
+                let found = if self.joint { remark } else { broken };
+                findings.push(found(requirement, entry.seq(), text));
             }
         }
         judged

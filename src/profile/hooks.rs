@@ -52,7 +52,11 @@ pub const HOOKS: &[HookInfo] = &[
         "The vehicle was shut down, or its communication ended, in good order.",
     ),
     agv("start", &[], "The vehicle was started after a shutdown."),
-    agv("set-mode", &["mode"], "The operating mode was switched at the vehicle."),
+    agv(
+        "set-mode",
+        &["mode"],
+        "The operating mode was switched at the vehicle; in SEMIAUTOMATIC its speed is set there, too.",
+    ),
     agv("drive-manually", &[], "The vehicle was driven by hand for a short way."),
     agv(
         "move-to",

@@ -87,7 +87,7 @@ impl Agv {
     fn check_zone_set(&self, order: &Order) -> Result<(), Refusal> {
         let Some(wanted) = &order.zone_set else { return Ok(()) };
         let known = self.config.zone_set.as_ref() == Some(wanted);
-        if known || self.faults.has(F::ZoneSetUnchecked) || self.faults.has(F::UnsupportedFieldIgnored) {
+        if known || self.faults.has(F::ZoneSetUnchecked) {
             return Ok(());
         }
         Err(Refusal::at_field(

@@ -230,6 +230,7 @@ with_blind_faults! { faults!
     EdgeEndsAssumed "edge-ends-assumed" ["ORD-11", "ORD-REJ-01"] "Lets every edge lead from the node before it to the one behind it, whatever it says.";
     EdgeEndsUnchecked "edge-ends-unchecked" ["ORD-11"] "Takes edges that name other nodes than those around them.";
     SequenceUnchecked "sequence-unchecked" ["ORD-11"] "Takes nodes and edges with doubled or missing sequenceIds.";
+    SequenceCountedAnew "sequence-counted-anew" ["ORD-FLOW-06", "ORD-11"] "Numbers nodes and edges itself, from the number of the first node on, whatever they say.";
     MalformedStopsOrder "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema.";
     HeaderUnchecked "header-unchecked" ["ORD-REJ-01"] "Takes over orders whose header is broken.";
     ParametersUnchecked "parameters-unchecked" ["ORD-REJ-04"] "Takes over orders whatever the parameters of their actions are.";

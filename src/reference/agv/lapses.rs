@@ -37,6 +37,11 @@ pub const LAPSES: &[(&str, &str)] = &[
         "Gaps and repetitions of sequenceIds are for the master control to avoid; no vehicle has to refuse them.",
     ),
     (
+        "unsupported-field-ignored",
+        "Whether a vehicle ignores a field that its factsheet does not list, or honours it, cannot be seen; the ruling of \
+         OPT-02 is a warning.",
+    ),
+    (
         "speed-min-above-max",
         "A contradiction within the factsheet is remarked on; no sentence forbids it.",
     ),

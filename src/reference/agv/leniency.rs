@@ -51,6 +51,7 @@ fn any(faults: Faults) -> bool {
         F::NumbersWrapped,
         F::OptionalTypesUnchecked,
         F::EdgeEndsAssumed,
+        F::SequenceCountedAnew,
         F::HeaderUnchecked,
     ]
     .into_iter()
@@ -95,6 +96,24 @@ fn of_message(order: &mut Map<String, Value>, faults: Faults) {
     }
     if faults.has(F::EdgeEndsAssumed) {
         assume_ends(order);
+    }
+    if faults.has(F::SequenceCountedAnew) {
+        count_anew(order);
+    }
+}
+
+/// `sequence-counted-anew`: what has a number gets the one it would have in a right order.
+fn count_anew(order: &mut Map<String, Value>) {
+    let Some(first) = order.get("nodes").and_then(|nodes| nodes[0]["sequenceId"].as_u64()) else {
+        return;
+    };
+    for (list, begin) in [("nodes", 0), ("edges", 1)] {
+        let elements = order.get_mut(list).and_then(Value::as_array_mut);
+        for (number, element) in (first + begin..).step_by(2).zip(elements.into_iter().flatten()) {
+            if let Some(sequence) = element.get_mut("sequenceId").filter(|sequence| sequence.is_u64()) {
+                *sequence = json!(number);
+            }
+        }
     }
 }
 
