@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::weigh::convinces;
+use super::answer::Question;
 use super::{
     Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
     limit, seconds, shown_path,
@@ -121,7 +121,8 @@ impl Holding {
             goal.seen += 1;
             if goal.selector.takes(entry, scene) {
                 let found = Some((entry.seq(), entry.at().moment));
-                if convinces(entry, &goal.until.topic, self.position.mark, &goal.selector, scene) {
+                let question = Question::of_picking(&goal.until.subject(), self.position);
+                if question.is_answered_by(entry, &goal.selector, scene) {
                     goal.reached = found;
                 } else {
                     goal.doubtful = goal.doubtful.or(found);

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::weigh::Weighing;
+use super::answer::FirstAnswer;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
-    limit, seconds, weighed_clause,
+    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, assertion_clause, backlog, bound_clauses,
+    ids, keep_nearest, limit, seconds,
 };
 use crate::clock::Moment;
 use crate::journal::Entry;
@@ -25,7 +25,7 @@ pub(crate) struct Expecting {
     /// When it came, later than it should.
     came: Option<Moment>,
     taken: Option<StepOutcome>,
-    weighing: Weighing,
+    answer: FirstAnswer,
 }
 
 impl Expecting {
@@ -46,7 +46,7 @@ impl Expecting {
             late: None,
             came: None,
             taken: None,
-            weighing: Weighing::of(verb, position, scene),
+            answer: FirstAnswer::of(verb, position, scene),
         };
         if verb.from == From::Latest {
             // What is already known counts, however old it is; after that only what is new.
@@ -114,13 +114,10 @@ impl Expecting {
             clause.expected = self.selector.expected();
         }
         let judged = [("assert", &self.verb.assert), ("prefer", &self.verb.prefer)];
-        let mut shares = vec![1.0; clauses.len()];
         for (word, assertions) in judged {
             for assertion in assertions {
                 let topic = self.verb.subject();
-                let (clause, share) = weighed_clause(assertion, word, entry, &topic, self.position, scene);
-                clauses.push(clause);
-                shares.push(share);
+                clauses.push(assertion_clause(assertion, word, entry, &topic, self.position, scene));
             }
         }
         let message = entry.subject();
@@ -137,7 +134,7 @@ impl Expecting {
             allowances: Vec::new(),
             timing: None,
         };
-        self.taken = self.weighing.weigh(outcome, &shares, entry, &self.selector, scene);
+        self.taken = self.answer.offer(outcome, entry, &self.selector, scene);
     }
 
     pub(super) fn timing(&self) -> Option<Timing> {
@@ -157,7 +154,7 @@ impl Expecting {
     pub(super) fn progress(&self) -> Progress {
         match self.taken {
             Some(_) => Progress::Decided,
-            None if self.weighing.is_settled() => {
+            None if self.answer.is_settled() => {
                 Progress::Pending(self.deadline.min(self.position.base + self.limit.soft))
             }
             None => Progress::Pending(self.deadline),
@@ -168,8 +165,8 @@ impl Expecting {
         if let Some(taken) = self.taken {
             return taken;
         }
-        if let Some(best) = self.weighing.best(self.seen, cut_short) {
-            return best;
+        if let Some(otherwise) = self.answer.otherwise(self.seen, cut_short) {
+            return otherwise;
         }
         let waited = at.since(self.position.base);
         let (holds, message) = match cut_short {

@@ -6,10 +6,10 @@
 
 mod action;
 mod always;
+mod answer;
 mod expect;
 mod never;
 mod retained;
-mod weigh;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -455,18 +455,6 @@ pub(super) fn assertion_clause(
     position: Position,
     scene: &Scene<'_>,
 ) -> Clause {
-    weighed_clause(assertion, word, entry, subject, position, scene).0
-}
-
-/// The same, with how much of the picture the message shows.
-fn weighed_clause(
-    assertion: &Assertion,
-    word: &'static str,
-    entry: &Entry,
-    subject: &str,
-    position: Position,
-    scene: &Scene<'_>,
-) -> (Clause, f64) {
     let mut clause = Clause {
         requirement: assertion.requirement.clone(),
         word,
@@ -483,7 +471,7 @@ fn weighed_clause(
         Err(why) => {
             clause.holds = Holds::Unseen(why.clone());
             clause.message = why;
-            return (clause, 0.0);
+            return clause;
         }
     };
     clause.expected = selector.expected();
@@ -494,13 +482,11 @@ fn weighed_clause(
             clause.holds = Holds::Unseen(why.clone());
             clause.message = why;
         }
-        return (clause, 1.0);
+        return clause;
     }
-    let mut share = 0.0;
     clause.holds = if word == "prefer" { Holds::Softly } else { Holds::No };
     match selector.closeness(entry).filter(|near| near.miss.is_some()) {
         Some(near) => {
-            share = near.share;
             if let Some(span) = near.span {
                 clause.span = span;
             }
@@ -528,7 +514,7 @@ fn weighed_clause(
             clause.message = format!("#{}: {found}", entry.seq());
         }
     }
-    (clause, share)
+    clause
 }
 
 pub(super) fn shown_path(path: &str) -> &str {
