@@ -120,6 +120,7 @@ with_blind_faults! { faults!
     PositioningAsInstantAction "positioning-as-instant-action" ["ACT-09"] "Declares finePositioning as an instant action.";
     ChargingOnEdges "charging-on-edges" ["ACT-09"] "Declares startCharging as an action for edges.";
     StateRequestUnlisted "state-request-unlisted" ["FACT-07"] "Offers stateRequest but does not list it.";
+    StateRequestListedRefused "state-request-listed-refused" ["FACT-07", "ACT-26"] "Does not understand stateRequest although its factsheet lists it.";
     StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
 
     // Order
@@ -531,6 +532,7 @@ with_blind_faults! { faults!
     VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";
     VisualizationBeside "visualization-beside" ["VIS-01"] "Shows itself two metres beside where its states say it is.";
     VisualizationMillimetres "visualization-millimetres" ["MAP-02", "VIS-01"] "Gives its position in the visualization in millimetres.";
+    VisualizationMillimetresUnderWay "visualization-millimetres-under-way" ["MAP-02"] "Gives its position in the visualization in millimetres while it drives.";
     VisualizationWithoutPosition "visualization-without-position" ["VIS-01"] "Leaves the position out of the visualization.";
     VisualizationMissing "visualization-missing" ["VIS-02", "TOPIC-12"] "States a visualization interval and publishes none.";
 }

@@ -135,6 +135,10 @@ impl Agv {
         let fit = fit.filter(|_| !by_hand);
         let fit = fit
             .filter(|kind| kind.deed != action_kinds::Deed::LogReport || !self.faults.has(F::R2LogReportListedRefused));
+        let not_understood = |kind: &&action_kinds::ActionKind| {
+            kind.deed == action_kinds::Deed::StateRequest && self.faults.has(F::StateRequestListedRefused)
+        };
+        let fit = fit.filter(|kind| !not_understood(kind));
         let refusal = match (&defect, fit) {
             (Some(defect), _) => Some(format!("{} {}", defect.path, defect.reason)),
             (None, None) => Some("the vehicle does not offer the action as an instant action".to_owned()),
