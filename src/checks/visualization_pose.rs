@@ -18,6 +18,8 @@ const BESIDE: f64 = 0.5;
 const OVERTAKING: Duration = Duration::from_millis(500);
 /// So many metres from the origin, millimetres cannot be taken for metres.
 const FROM_ORIGIN: f64 = 0.5;
+/// So far, in metres, no vehicle gets and comes back between two states; ten times the way between them is added.
+const OUT_OF_REACH: f64 = 100.0;
 /// How many visualizations wait for the next state.
 const WAITING: usize = 64;
 
@@ -27,7 +29,7 @@ pub(super) const POSITION: Check = Check {
     decides: &["VIS-01", "MAP-02"],
     doc: "A visualization between two states of a vehicle that stood still from one to the other names the position they \
           name, within half a metre and half a radian, on the same map; a thousand times their coordinates are \
-          millimetres. One without a position, although the states have one, is a warning. Judged when it happens twice.",
+          millimetres, also while it drives. One without a position, although the states have one, is a warning. Judged when it happens twice.",
     arguments: &[],
     start: |_| Box::new(Position::default()),
 };
@@ -37,7 +39,10 @@ struct Position {
     traffic: Traffic,
     /// The last state: when it came, where the vehicle stood.
     stood: Option<(Moment, Pose)>,
-    /// Visualizations since: entry and pose.
+    /// The pose of the last state, and the visualizations since.
+    last: Option<Pose>,
+    on_the_way: Vec<(u64, Pose)>,
+    /// Visualizations of a vehicle that stands: entry and pose.
     since: Vec<(u64, Pose)>,
     /// Whether the states have a position, and how many visualizations had none.
     known: bool,
@@ -51,22 +56,11 @@ impl Position {
         let shown = std::mem::take(&mut self.since);
         let judged = !shown.is_empty();
         for (seq, pose) in shown {
-            let (far, turned) = at.apart(&pose);
-            if pose.map == at.map && far <= BESIDE && turned <= BESIDE {
+            if is_in_millimetres(at, at, &pose) {
                 continue;
             }
-            let thousandth = Pose {
-                x: pose.x / 1000.0,
-                y: pose.y / 1000.0,
-                ..pose.clone()
-            };
-            let millimetres = at.x.hypot(at.y) > FROM_ORIGIN && at.apart(&thousandth).0 <= BESIDE / 2.0;
-            if millimetres {
-                self.millimetres += 1;
-                if self.millimetres == 2 {
-                    let text = format!("x {} and y {} of the visualization are millimetres", pose.x, pose.y);
-                    findings.push(broken("MAP-02", seq, text));
-                }
+            let (far, turned) = at.apart(&pose);
+            if pose.map == at.map && far <= BESIDE && turned <= BESIDE {
                 continue;
             }
             self.beside += 1;
@@ -82,24 +76,66 @@ impl Position {
     }
 }
 
+impl Position {
+    /// Looks for millimetres among what was shown between two states, wherever the vehicle was going.
+    fn measure(&mut self, to: Option<&Pose>, findings: &mut Vec<CheckFinding>) -> bool {
+        let shown = std::mem::take(&mut self.on_the_way);
+        let Some((from, to)) = self.last.as_ref().zip(to) else {
+            return false;
+        };
+        let mut found = false;
+        for (seq, pose) in shown {
+            if !is_in_millimetres(from, to, &pose) {
+                continue;
+            }
+            found = true;
+            self.millimetres += 1;
+            if self.millimetres == 2 {
+                let text = format!("x {} and y {} of the visualization are millimetres", pose.x, pose.y);
+                findings.push(broken("MAP-02", seq, text));
+            }
+        }
+        found
+    }
+}
+
+/// Whether what is shown is a thousand times where the vehicle was between two states: nobody gets there in between.
+fn is_in_millimetres(from: &Pose, to: &Pose, shown: &Pose) -> bool {
+    let thousandth = Pose {
+        x: shown.x / 1000.0,
+        y: shown.y / 1000.0,
+        ..shown.clone()
+    };
+    let (way, _) = from.apart(to);
+    let is_out_of_reach = |at: &&Pose| at.apart(shown).0 > OUT_OF_REACH + 10.0 * way;
+    thousandth.x.hypot(thousandth.y) > FROM_ORIGIN
+        && from.apart(&thousandth).0 <= way + BESIDE / 2.0
+        && [from, to].iter().all(is_out_of_reach)
+}
+
 impl Running for Position {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         if is_displaced(entry, context) || self.traffic.disturbed {
             self.stood = None;
+            self.last = None;
             self.since.clear();
+            self.on_the_way.clear();
         }
         let now = entry.at().moment;
         if let Some(state) = state(self.traffic, entry, context) {
             let pose = Pose::of(state).filter(|_| state.get("driving") == Some(&Value::Bool(false)));
-            self.known = Pose::of(state).is_some();
+            let seen = Pose::of(state);
+            self.known = seen.is_some();
+            let measured = self.measure(seen.as_ref(), findings);
+            self.last = seen;
             let before = self.stood.take();
             self.stood = pose.clone().map(|pose| (now, pose));
             return match (before, pose) {
                 (Some((_, before)), Some(pose)) if before.stays(&pose) => self.compare(&pose, findings),
                 _ => {
                     self.since.clear();
-                    false
+                    measured
                 }
             };
         }
@@ -117,6 +153,9 @@ impl Running for Position {
                 findings.push(remark("VIS-01", entry.seq(), text));
             }
             return self.known;
+        }
+        if let Some(pose) = Pose::of(value).filter(|_| self.on_the_way.len() < WAITING) {
+            self.on_the_way.push((entry.seq(), pose));
         }
         let stood = self.stood.as_ref().is_some_and(|(at, _)| now.since(*at) > OVERTAKING);
         if let Some(pose) = Pose::of(value).filter(|_| stood && self.since.len() < WAITING) {
@@ -151,12 +190,17 @@ mod tests {
     fn the_position_of_the_states_is_right() {
         assert!(judge(&at(2.0, 1.01), false).is_empty());
         assert!(judge(&at(9.0, 1.0), true).is_empty(), "it drives");
+        assert!(
+            judge(&at(2000.0, 900.0), true).is_empty(),
+            "elsewhere, and not in millimetres"
+        );
     }
 
     #[test]
     fn another_position_millimetres_and_none_are_found() {
         assert_eq!(judge(&at(4.0, 1.0), false), ["VIS-01"]);
         assert_eq!(judge(&at(2000.0, 1000.0), false), ["MAP-02"]);
+        assert_eq!(judge(&at(2000.0, 1000.0), true), ["MAP-02"], "also while it drives");
         assert_eq!(judge(&json!({}), false), ["VIS-01 warning"]);
     }
 }

@@ -406,7 +406,8 @@ impl Agv {
             if self.faults.has(F::VisualizationBeside) {
                 change("x", |x| x + 2.0);
             }
-            if self.faults.has(F::VisualizationMillimetres) {
+            let under_way = self.motion.is_moving() && self.faults.has(F::VisualizationMillimetresUnderWay);
+            if under_way || self.faults.has(F::VisualizationMillimetres) {
                 change("x", |x| x * 1000.0);
                 change("y", |y| y * 1000.0);
             }
