@@ -43,6 +43,14 @@ pub struct Ground {
     pub waivers: Vec<Waiver>,
 }
 
+/// What is only preferred by a ruling of the catalogue: broken is a warning.
+fn of_preference(holds: Holds) -> Holds {
+    match holds {
+        Holds::No => Holds::Softly,
+        other => other,
+    }
+}
+
 /// How a precondition comes out that is itself an obligation: it is broken when what is seen contradicts it. Coming late is
 /// no matter of it, and nothing at all shows nothing.
 fn of_precondition(holds: Holds, seen: u64) -> Holds {
@@ -322,6 +330,10 @@ impl TestJudge {
                     }
                     _ => None,
                 };
+                if step.prefers && clause.word == "checks" {
+                    clause.word = "prefers";
+                    clause.holds = of_preference(clause.holds);
+                }
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
                 self.open.push(Open {
                     clause,

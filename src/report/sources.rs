@@ -232,6 +232,7 @@ mod tests {
             spec: None,
             verb,
             owes: false,
+            prefers: false,
             verb_span: span.clone(),
             span,
         }

@@ -176,6 +176,8 @@ pub struct Step {
     pub verb: Verb,
     /// Whether its requirements stand under `owes:`: a precondition that is itself an obligation of the device.
     pub owes: bool,
+    /// Whether its requirements stand under `prefers:`: broken is a warning by a ruling of the catalogue.
+    pub prefers: bool,
     /// The whole step.
     pub span: Span,
     /// Key and value of the verb, for carets: `expect: state`.
@@ -187,7 +189,11 @@ impl Step {
     #[must_use]
     pub fn clauses(&self) -> Vec<(RequirementId, String)> {
         let mut all = Vec::new();
-        let word = if self.owes { ".owes" } else { ".checks" };
+        let word = match (self.owes, self.prefers) {
+            (true, _) => ".owes",
+            (_, true) => ".prefers",
+            _ => ".checks",
+        };
         let mut checks = |bindings: &[Binding], suffix: &str| {
             all.extend(
                 bindings

@@ -24,17 +24,19 @@ const VERBS: [(&str, &[&str]); 11] = [
     (
         "expect",
         &[
-            "checks", "owes", "where", "check", "with", "within", "from", "assert", "prefer", "save", "of",
+            "checks", "owes", "prefers", "where", "check", "with", "within", "from", "assert", "prefer", "save", "of",
         ],
     ),
     (
         "never",
-        &["checks", "owes", "where", "check", "with", "during", "from", "of"],
+        &[
+            "checks", "owes", "prefers", "where", "check", "with", "during", "from", "of",
+        ],
     ),
     (
         "always",
         &[
-            "checks", "owes", "where", "check", "with", "from", "during", "until", "of",
+            "checks", "owes", "prefers", "where", "check", "with", "from", "during", "until", "of",
         ],
     ),
     ("action", &["checks", "owes", "through", "tolerated", "within", "save"]),
@@ -133,12 +135,27 @@ impl StepReader<'_> {
                 .hint("what a step of `steps` decides stands under `checks:`"),
             );
         }
+        let prefers = fields.key("prefers");
+        if let Some(prefers) = prefers
+            && (path.starts_with("given[") || fields.has("checks"))
+        {
+            self.problems.add(
+                Diagnostic::new(
+                    "prefers-elsewhere",
+                    prefers.span.clone(),
+                    "a clause is either decided or preferred",
+                    "in `given`, or beside `checks`",
+                )
+                .hint("`prefers:` stands in the place of `checks:` where a ruling asks for a warning only"),
+            );
+        }
         steps.push(Step {
             path,
             title,
             spec,
             verb,
             owes: owes.is_some(),
+            prefers: prefers.is_some(),
             span: node.span.clone(),
             verb_span,
         });
@@ -333,10 +350,13 @@ pub(super) fn version_range(node: &Node, problems: &mut Problems) -> Option<Vers
     }
 }
 
-/// The requirements under `checks`, or under `owes` of a precondition.
+/// The requirements under `checks`, under `owes` of a precondition, or under `prefers`.
 pub(super) fn checks(fields: &Fields<'_>, problems: &mut Problems) -> Vec<Binding> {
     let mut bindings: Vec<Binding> = Vec::new();
-    let key = if fields.has("owes") { "owes" } else { "checks" };
+    let key = ["owes", "prefers"]
+        .into_iter()
+        .find(|key| fields.has(key))
+        .unwrap_or("checks");
     for node in fields.list(key, problems) {
         let Some(text) = text_of(node, problems) else { continue };
         let requirement = RequirementId::from(text);

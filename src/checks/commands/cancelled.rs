@@ -19,8 +19,8 @@ pub(in crate::checks) const BASE_KEPT: Check = Check {
     decides: &["ORD-CANCEL-01"],
     doc: "While the states of the vehicle show released elements or a running action of an order, no other order is sent \
           to it and no update replaces them, unless cancelOrder has come before and the vehicle has reported it done or \
-          shows nothing left of the order. After cancelOrder no update of that order comes, unless cancelOrder has \
-          FAILED. A vehicle that may have given its order up by itself is not judged; where an \
+          shows nothing left of the order. Another order behind a cancelOrder that is not done, or beside nothing but a \
+          running action, is a warning, and so is an update after cancelOrder, unless that has FAILED. A vehicle that may have given its order up by itself is not judged; where an \
           action has failed, what is left tells.",
     arguments: &[],
     start: |_| Box::new(BaseKept::default()),
@@ -90,7 +90,7 @@ impl BaseKept {
             "update {update} of order {} comes after cancelOrder",
             quote(&self.order)
         );
-        found.broken("ORD-CANCEL-01", text);
+        found.remark("ORD-CANCEL-01", text);
         true
     }
 
@@ -144,15 +144,13 @@ impl Running for BaseKept {
             }
             if self.is_busy() {
                 let (new, old) = (quote(&id), quote(&self.order));
-                let why = if self.cancel.is_some() {
-                    "cancelOrder is not done"
-                } else {
-                    "it was not called off"
-                };
-                found.broken(
-                    "ORD-CANCEL-01",
-                    format!("order {new} comes while order {old} is driven: {why}"),
-                );
+                let comes = format!("order {new} comes while order {old} is driven");
+                let on_its_way = self.vehicle.last().is_some_and(|seen| seen.base > 0);
+                match (self.cancel.is_some(), on_its_way) {
+                    (true, _) => found.remark("ORD-CANCEL-01", format!("{comes}: cancelOrder is not done")),
+                    (_, true) => found.broken("ORD-CANCEL-01", format!("{comes}: it was not called off")),
+                    _ => found.remark("ORD-CANCEL-01", format!("{comes}: one of its actions has not ended")),
+                }
                 judged = true;
             }
             judged |= self.cancel.is_some();

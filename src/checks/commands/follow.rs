@@ -21,7 +21,8 @@ pub(in crate::checks) const UPDATES: Check = Check {
     doc: "An update keeps the orderId, raises orderUpdateId, begins with the last released node as it was sent before \
           and repeats nothing else of the base. Steps larger than one, and a stitching node that has lost actions or \
           optional values, are warnings. A message that is sent again unchanged is no update. Where the vehicle has \
-          not taken an update over, the next one may begin where the one before did; where it has refused it, it must.",
+          not taken an update over, the next one may begin where the one before did; where it has refused it, another \
+          beginning at the end of the refused one is a warning.",
     arguments: &[],
     start: |_| Box::new(Follow::new(Focus::Updates)),
 };
@@ -367,6 +368,16 @@ impl Follow {
         let stitching = candidates.filter_map(|sent| sent.end.as_ref()).find(is_end);
         if let Some(end) = stitching {
             stitched(&end.node, first, found);
+            return true;
+        }
+        // The last one that was sent, by the letter, and unknown to the vehicle: by a ruling a warning.
+        let refused_end = order.sent.iter().rev().filter(|sent| refused(sent));
+        if let Some(end) = refused_end.filter_map(|sent| sent.end.as_ref()).find(is_end) {
+            let end = quote(&end.id);
+            found.remark(
+                "ORD-UPD-05",
+                format!("the update begins at {end}, the end of an update that the vehicle has refused"),
+            );
             return true;
         }
         let newest = order.sent.iter().rev().find(|sent| !refused(sent));

@@ -7,6 +7,7 @@ use serde_json::Value;
 use super::sheet::grace;
 use super::vehicle::{Outside, Vehicle};
 use super::{Command, ELEMENTS, Each, Found, in_sequence, parameter, place_of, said, short};
+use crate::checks::orders::number;
 use crate::checks::traffic::{Traffic, elements, quote, show, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
@@ -17,7 +18,8 @@ pub(in crate::checks) const ENABLED: Check = Check {
     name: "commands/map-enabled",
     decides: &["MAP-09"],
     doc: "The nodes of an order are on maps that the states of the vehicle list as ENABLED, that an enableMap which has \
-          FINISHED has enabled, or that an order enables on its way. Judged only for a vehicle that lists maps.",
+          FINISHED has enabled, or that an order enables on its way; of an update it is a warning. Judged only for a vehicle \
+          that lists maps.",
     arguments: &[],
     start: |_| Box::new(Enabled::default()),
 };
@@ -172,6 +174,7 @@ impl Running for Enabled {
         let mut found = Found::new(entry, findings);
         let mut judged = false;
         let mut said = BTreeSet::new();
+        let is_update = number(order, "orderUpdateId").is_some_and(|update| update > 0);
         for node in in_sequence(order, "nodes") {
             let Some((_, _, map)) = place_of(node).filter(|(_, _, map)| !map.is_empty()) else {
                 continue;
@@ -179,10 +182,12 @@ impl Running for Enabled {
             judged = true;
             let known = recent.iter().flatten().any(|enabled| enabled.contains(map)) || self.usable.contains(map);
             if !known && said.insert(map) {
-                found.broken(
-                    "MAP-09",
-                    format!("the order is on map {}, which is not enabled", quote(map)),
-                );
+                let text = format!("the order is on map {}, which is not enabled", quote(map));
+                if is_update {
+                    found.remark("MAP-09", text);
+                } else {
+                    found.broken("MAP-09", text);
+                }
             }
         }
         judged

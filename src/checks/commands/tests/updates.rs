@@ -66,7 +66,16 @@ fn an_update_the_vehicle_did_not_take_may_be_replaced() {
 }
 
 #[test]
-fn an_order_that_replaces_another_one_waits_for_the_cancellation() {
+fn an_order_in_the_place_of_one_that_was_not_called_off_is_found() {
+    let mut trace = begun();
+    trace.commands("order", &order("o1", 0, 0, 2, 4)).wait(2.0);
+    trace.shows(&under_way("o1", 0, 2)).wait(2.0);
+    trace.commands("order", &order("o2", 0, 0, 1, 2));
+    assert_eq!(trace.judge("commands/base-kept").summary(), ["ORD-CANCEL-01"]);
+}
+
+#[test]
+fn an_order_that_replaces_another_one_should_wait_for_the_cancellation() {
     let mut trace = begun();
     trace.commands("order", &order("o1", 0, 0, 2, 4)).wait(2.0);
     trace.shows(&under_way("o1", 0, 2)).wait(2.0);
@@ -75,7 +84,7 @@ fn an_order_that_replaces_another_one_waits_for_the_cancellation() {
         &json!({ "actions": [action("cancelOrder", "c1", &json!([]))] }),
     );
     trace.wait(2.0).commands("order", &order("o2", 0, 0, 1, 2));
-    assert_eq!(trace.judge("commands/base-kept").summary(), ["ORD-CANCEL-01"]);
+    assert_eq!(trace.judge("commands/base-kept").summary(), ["ORD-CANCEL-01 warning"]);
     // Unless the vehicle has given up by itself.
     let mut trace = begun();
     trace.commands("order", &order("o1", 0, 0, 2, 4)).wait(2.0);
@@ -162,7 +171,7 @@ fn the_end_of_a_refused_update_is_no_stitching_node() {
         trace.commands("order", &order("o1", 2, 3, 4, 5));
         trace.judge("commands/updates").summary()
     };
-    assert_eq!(next(true), ["ORD-UPD-05"]);
+    assert_eq!(next(true), ["ORD-UPD-05 warning"]);
     assert_eq!(next(false), Vec::<String>::new());
 }
 
@@ -184,7 +193,7 @@ fn an_order_that_is_called_off_is_not_extended_unless_that_has_failed() {
             .commands("order", &order("o1", 1, 2, 4, 5));
         trace.judge("commands/base-kept").summary()
     };
-    assert_eq!(extended("RUNNING", 1.0), ["ORD-CANCEL-01"]);
+    assert_eq!(extended("RUNNING", 1.0), ["ORD-CANCEL-01 warning"]);
     assert_eq!(extended("FAILED", 1.0), Vec::<String>::new());
     // It was decided before.
     assert_eq!(extended("RUNNING", 0.01), Vec::<String>::new());
@@ -208,7 +217,7 @@ fn an_order_is_not_over_while_one_of_its_actions_runs() {
         trace.commands("order", &order("o2", 0, 2, 3, 4));
         trace.judge("commands/base-kept").summary()
     };
-    assert_eq!(next("RUNNING"), ["ORD-CANCEL-01"]);
+    assert_eq!(next("RUNNING"), ["ORD-CANCEL-01 warning"]);
     assert_eq!(next("FINISHED"), Vec::<String>::new());
 }
 
