@@ -18,7 +18,7 @@ use crate::pack::Role;
 use crate::profile::TimeLimits;
 use crate::reference::Fault;
 use crate::reference::agv::{Agv, Tolerance};
-use crate::reference::master_control::MasterControl;
+use crate::reference::deviations::master_control as deviations;
 
 /// A built-in device under test.
 #[derive(Clone, Debug)]
@@ -122,7 +122,7 @@ impl BuiltIn {
     pub fn faults(role: Role) -> &'static [Fault] {
         match role {
             Role::Agv => crate::reference::agv::FAULTS,
-            Role::MasterControl => crate::reference::master_control::FAULTS,
+            Role::MasterControl => &deviations::FAULTS,
         }
     }
 
@@ -131,7 +131,7 @@ impl BuiltIn {
     pub fn blind_faults(role: Role) -> &'static [Fault] {
         match role {
             Role::Agv => crate::reference::agv::BLIND_FAULTS,
-            Role::MasterControl => crate::reference::master_control::BLIND_FAULTS,
+            Role::MasterControl => &deviations::BLIND_FAULTS,
         }
     }
 
@@ -140,7 +140,7 @@ impl BuiltIn {
     pub fn tolerances(role: Role) -> &'static [Tolerance] {
         match role {
             Role::Agv => crate::reference::agv::TOLERANCES,
-            Role::MasterControl => crate::reference::master_control::TOLERANCES,
+            Role::MasterControl => &deviations::TOLERANCES,
         }
     }
 
@@ -149,7 +149,7 @@ impl BuiltIn {
     pub fn lapse(role: Role, fault: &str) -> Option<&'static str> {
         match role {
             Role::Agv => crate::reference::agv::lapse(fault),
-            Role::MasterControl => crate::reference::master_control::lapse(fault),
+            Role::MasterControl => deviations::lapse(fault),
         }
     }
 
@@ -205,7 +205,7 @@ impl BuiltIn {
                 Box::new(DevicePeer(agv.map_err(|unknown| UnknownName(unknown.to_string()))?))
             }
             Self::MasterControl(device) => {
-                let master_control = MasterControl::new(device.config.clone(), faults);
+                let master_control = deviations::built(device.config.clone(), &device.liberties, faults);
                 Box::new(DevicePeer(
                     master_control.map_err(|unknown| UnknownName(unknown.to_string()))?,
                 ))
@@ -225,7 +225,7 @@ impl BuiltIn {
                 RunningDevice::start(agv, endpoint, clock, None)
             }
             Self::MasterControl(device) => {
-                let master_control = MasterControl::new(device.config.clone(), faults);
+                let master_control = deviations::built(device.config.clone(), &device.liberties, faults);
                 let master_control = master_control.map_err(|unknown| UnknownName(unknown.to_string()))?;
                 RunningDevice::start(master_control, endpoint, clock, None)
             }

@@ -12,6 +12,7 @@ use super::reference_agv::ReferenceAgv;
 use crate::course::{Layout, Node};
 use crate::pack::{Pack, Role};
 use crate::profile::TimeLimits;
+use crate::reference::deviations::master_control as deviations;
 use crate::reference::master_control::{COMMANDS, MasterControlConfig, SiteEdge, SiteNode, VehicleConfig};
 
 /// How many edges a transport of the tests has (`course.d` is so far from `course.a`).
@@ -28,6 +29,8 @@ pub struct ReferenceMasterControl {
     pub layout: Layout,
     /// How it is configured.
     pub config: MasterControlConfig,
+    /// The liberties it takes beside what is configured, by name.
+    pub liberties: Vec<&'static str>,
     /// Its part of the timing contract.
     pub time: TimeLimits,
 }
@@ -92,6 +95,7 @@ impl ReferenceMasterControl {
             layout,
             fleet,
             config,
+            liberties: Vec::new(),
         }
     }
 
@@ -133,8 +137,7 @@ impl ReferenceMasterControl {
     /// When there is none of that name.
     pub fn tolerate(&mut self, name: &str) -> Result<(), UnknownName> {
         let before = self.config.answers_after;
-        self.config
-            .tolerate(name)
+        deviations::tolerate(&mut self.config, &mut self.liberties, name)
             .map_err(|unknown| UnknownName(unknown.to_string()))?;
         let later = self.config.answers_after.saturating_sub(before);
         self.time.quiet += later * 2;

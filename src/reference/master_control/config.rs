@@ -5,8 +5,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use super::tolerances::Tolerances;
-
 /// One vehicle of the fleet.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VehicleConfig {
@@ -112,8 +110,6 @@ pub struct MasterControlConfig {
     pub station_type: String,
     /// loadType where none is asked for.
     pub load_type: String,
-    /// The liberties it takes; see [`MasterControlConfig::tolerate`].
-    pub tolerances: Tolerances,
 }
 
 impl Default for MasterControlConfig {
@@ -139,7 +135,6 @@ impl Default for MasterControlConfig {
             low_battery: 15.0,
             station_type: "floor".into(),
             load_type: "EPAL".into(),
-            tolerances: Tolerances::default(),
         }
     }
 }
@@ -175,12 +170,12 @@ fn floor() -> (Vec<SiteNode>, Vec<SiteEdge>) {
 
 impl MasterControlConfig {
     /// Whether the protocol version has a feature.
-    pub(super) fn has(&self, feature: &str) -> bool {
+    pub(crate) fn has(&self, feature: &str) -> bool {
         self.features.contains(feature)
     }
 
     /// The node of that id in the layout.
-    pub(super) fn node(&self, id: &str) -> Option<&SiteNode> {
+    pub(crate) fn node(&self, id: &str) -> Option<&SiteNode> {
         self.nodes.iter().find(|node| node.id == id)
     }
 }

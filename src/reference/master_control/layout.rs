@@ -6,7 +6,7 @@ use super::config::{MasterControlConfig, SiteEdge, SiteNode};
 
 impl MasterControlConfig {
     /// The shortest way from one node to another without the blocked edges, as edges; empty if they are one.
-    pub(super) fn way(&self, from: &str, to: &str, blocked: &BTreeSet<(String, String)>) -> Option<Vec<&SiteEdge>> {
+    pub(crate) fn way(&self, from: &str, to: &str, blocked: &BTreeSet<(String, String)>) -> Option<Vec<&SiteEdge>> {
         let mut open: BTreeMap<&str, f64> = BTreeMap::from([(self.node(from)?.id.as_str(), 0.0)]);
         let mut closed: BTreeSet<&str> = BTreeSet::new();
         let mut via: BTreeMap<&str, &SiteEdge> = BTreeMap::new();
@@ -43,19 +43,19 @@ impl MasterControlConfig {
     }
 
     /// The same without regard to blocked edges where there is no other way.
-    pub(super) fn any_way(&self, from: &str, to: &str, blocked: &BTreeSet<(String, String)>) -> Option<Vec<&SiteEdge>> {
+    pub(crate) fn any_way(&self, from: &str, to: &str, blocked: &BTreeSet<(String, String)>) -> Option<Vec<&SiteEdge>> {
         self.way(from, to, blocked)
             .or_else(|| self.way(from, to, &BTreeSet::new()))
     }
 
     /// The node of a map next to a place, and how far it is.
-    pub(super) fn nearest(&self, x: f64, y: f64, map_id: &str) -> Option<(&SiteNode, f64)> {
+    pub(crate) fn nearest(&self, x: f64, y: f64, map_id: &str) -> Option<(&SiteNode, f64)> {
         let here = self.nodes.iter().filter(|node| node.map_id == map_id);
         here.map(|node| (node, distance((node.x, node.y), (x, y))))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
-pub(super) fn distance(a: (f64, f64), b: (f64, f64)) -> f64 {
+pub(crate) fn distance(a: (f64, f64), b: (f64, f64)) -> f64 {
     (a.0 - b.0).hypot(a.1 - b.1)
 }

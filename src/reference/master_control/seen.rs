@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 /// A longer message is not looked at.
-pub(super) const MAX_MESSAGE: usize = 4 << 20;
+pub(crate) const MAX_MESSAGE: usize = 4 << 20;
 
 /// A whole number of 32 bits; `5.0` counts as whole.
 fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
@@ -27,38 +27,35 @@ fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
 /// The header, for whom a message is from.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Header {
+pub(crate) struct Header {
     #[serde(default)]
-    pub(super) timestamp: String,
+    pub(crate) manufacturer: Option<String>,
     #[serde(default)]
-    pub(super) manufacturer: Option<String>,
-    #[serde(default)]
-    pub(super) serial_number: Option<String>,
+    pub(crate) serial_number: Option<String>,
 }
 
 /// A node or an edge still to be traversed.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct ElementState {
+pub(crate) struct ElementState {
     #[serde(default)]
-    pub(super) sequence_id: Option<u32>,
+    pub(crate) sequence_id: Option<u32>,
     #[serde(default)]
-    pub(super) released: bool,
+    pub(crate) released: bool,
 }
 
 /// An action and how far it is.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct ActionState {
-    pub(super) action_id: String,
-    /// Looked at by faulty master controls.
+pub(crate) struct ActionState {
+    pub(crate) action_id: String,
     #[serde(default)]
-    pub(super) action_type: String,
-    pub(super) action_status: String,
+    pub(crate) action_type: String,
+    pub(crate) action_status: String,
 }
 
 impl ActionState {
-    pub(super) fn is_terminal(&self) -> bool {
+    pub(crate) fn is_terminal(&self) -> bool {
         matches!(self.action_status.as_str(), "FINISHED" | "FAILED")
     }
 }
@@ -66,36 +63,21 @@ impl ActionState {
 /// agvPosition.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Position {
-    pub(super) x: f64,
-    pub(super) y: f64,
+pub(crate) struct Position {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
     #[serde(default)]
-    pub(super) theta: f64,
+    pub(crate) theta: f64,
     #[serde(default)]
-    pub(super) map_id: String,
+    pub(crate) map_id: String,
     #[serde(default = "yes")]
-    pub(super) position_initialized: bool,
-    /// For logging and visualization only; looked at by faulty master controls.
+    pub(crate) position_initialized: bool,
+    /// For logging and visualization only (INFO-03).
     #[serde(default)]
-    pub(super) localization_score: Option<f64>,
+    pub(crate) localization_score: Option<f64>,
     /// The same.
     #[serde(default)]
-    pub(super) deviation_range: Option<f64>,
-}
-
-impl Position {
-    /// A place, with no more told about it.
-    pub(super) fn of(x: f64, y: f64, map_id: String) -> Self {
-        Self {
-            x,
-            y,
-            theta: 0.0,
-            map_id,
-            position_initialized: true,
-            localization_score: None,
-            deviation_range: None,
-        }
-    }
+    pub(crate) deviation_range: Option<f64>,
 }
 
 fn yes() -> bool {
@@ -104,24 +86,24 @@ fn yes() -> bool {
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Reference {
-    pub(super) reference_key: String,
-    pub(super) reference_value: String,
+pub(crate) struct Reference {
+    pub(crate) reference_key: String,
+    pub(crate) reference_value: String,
 }
 
 /// An error the vehicle reports.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct ErrorSeen {
-    pub(super) error_type: String,
-    pub(super) error_level: String,
+pub(crate) struct ErrorSeen {
+    pub(crate) error_type: String,
+    pub(crate) error_level: String,
     #[serde(default)]
-    pub(super) error_references: Option<Vec<Reference>>,
+    pub(crate) error_references: Option<Vec<Reference>>,
 }
 
 impl ErrorSeen {
     /// The value of a reference.
-    pub(super) fn reference(&self, key: &str) -> Option<&str> {
+    pub(crate) fn reference(&self, key: &str) -> Option<&str> {
         let references = self.error_references.as_deref().unwrap_or_default();
         let found = references.iter().find(|reference| reference.reference_key == key);
         found.map(|reference| reference.reference_value.as_str())
@@ -130,98 +112,97 @@ impl ErrorSeen {
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct MapSeen {
-    pub(super) map_id: String,
-    pub(super) map_version: String,
-    pub(super) map_status: String,
+pub(crate) struct MapSeen {
+    pub(crate) map_id: String,
+    pub(crate) map_version: String,
+    pub(crate) map_status: String,
 }
 
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Battery {
+pub(crate) struct Battery {
     #[serde(default)]
-    pub(super) battery_charge: Option<f64>,
+    pub(crate) battery_charge: Option<f64>,
     #[serde(default)]
-    pub(super) charging: bool,
+    pub(crate) charging: bool,
 }
 
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Safety {
+pub(crate) struct Safety {
     #[serde(default)]
-    pub(super) e_stop: String,
+    pub(crate) e_stop: String,
 }
 
 /// A state.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct State {
-    pub(super) order_id: String,
+pub(crate) struct State {
+    pub(crate) order_id: String,
     #[serde(deserialize_with = "whole")]
-    pub(super) order_update_id: u32,
-    pub(super) last_node_id: String,
+    pub(crate) order_update_id: u32,
+    pub(crate) last_node_id: String,
     #[serde(deserialize_with = "whole")]
-    pub(super) last_node_sequence_id: u32,
-    pub(super) node_states: Vec<ElementState>,
-    pub(super) edge_states: Vec<ElementState>,
+    pub(crate) last_node_sequence_id: u32,
+    pub(crate) node_states: Vec<ElementState>,
+    pub(crate) edge_states: Vec<ElementState>,
     #[serde(default)]
-    pub(super) agv_position: Option<Position>,
+    pub(crate) agv_position: Option<Position>,
     #[serde(default)]
-    pub(super) loads: Option<Vec<Value>>,
-    pub(super) driving: bool,
-    /// Looked at by faulty master controls.
+    pub(crate) loads: Option<Vec<Value>>,
+    pub(crate) driving: bool,
     #[serde(default)]
-    pub(super) paused: Option<Value>,
+    pub(crate) paused: Option<Value>,
     #[serde(default)]
-    pub(super) new_base_request: Option<bool>,
-    pub(super) action_states: Vec<ActionState>,
+    pub(crate) new_base_request: Option<bool>,
+    pub(crate) action_states: Vec<ActionState>,
     #[serde(default)]
-    pub(super) battery_state: Battery,
-    pub(super) operating_mode: String,
-    pub(super) errors: Vec<ErrorSeen>,
-    /// For visualization and debugging only; looked at by faulty master controls.
+    pub(crate) battery_state: Battery,
+    pub(crate) operating_mode: String,
+    pub(crate) errors: Vec<ErrorSeen>,
+    /// For visualization and debugging only (INFO-02).
     #[serde(default)]
-    pub(super) information: Option<Vec<Value>>,
+    pub(crate) information: Option<Vec<Value>>,
     #[serde(default)]
-    pub(super) safety_state: Safety,
+    pub(crate) safety_state: Safety,
     #[serde(default)]
-    pub(super) maps: Option<Vec<MapSeen>>,
+    pub(crate) maps: Option<Vec<MapSeen>>,
 }
 
 impl State {
     /// How far an action is.
-    pub(super) fn action(&self, id: &str) -> Option<&ActionState> {
+    pub(crate) fn action(&self, id: &str) -> Option<&ActionState> {
         self.action_states.iter().find(|action| action.action_id == id)
     }
 
     /// Whether master control may command the vehicle (MODE-04).
-    pub(super) fn takes_orders(&self) -> bool {
+    pub(crate) fn takes_orders(&self) -> bool {
         matches!(self.operating_mode.as_str(), "AUTOMATIC" | "SEMIAUTOMATIC")
     }
 
     /// Whether it is paused.
-    pub(super) fn is_paused(&self) -> bool {
+    pub(crate) fn is_paused(&self) -> bool {
         self.paused == Some(Value::Bool(true))
     }
 
     /// Whether it gives any information.
-    pub(super) fn informs(&self) -> bool {
+    pub(crate) fn informs(&self) -> bool {
         self.information.as_ref().is_some_and(|list| !list.is_empty())
     }
 
     /// Whether nothing is left to be traversed.
-    pub(super) fn route_empty(&self) -> bool {
+    pub(crate) fn route_empty(&self) -> bool {
         self.node_states.is_empty() && self.edge_states.is_empty()
     }
 
     /// The sequenceId of a node that is passed cannot be higher than this.
-    pub(super) fn before_next_node(&self) -> u32 {
+    pub(crate) fn before_next_node(&self) -> u32 {
         let ahead = self.node_states.iter().filter_map(|node| node.sequence_id).min();
         ahead.map_or(u32::MAX, |next| next.saturating_sub(2))
     }
 
     /// Whether something keeps the vehicle from being given new work.
-    pub(super) fn is_fit(&self, low_battery: f64) -> bool {
+    pub(crate) fn is_fit(&self, low_battery: f64) -> bool {
         let fatal = self.errors.iter().any(|error| error.error_level == "FATAL");
         let stopped = !matches!(self.safety_state.e_stop.as_str(), "NONE" | "");
         let lost = self
@@ -234,14 +215,14 @@ impl State {
     }
 
     /// The maps on board that are enabled; `None` if the vehicle does not tell.
-    pub(super) fn map_enabled(&self, map_id: &str) -> bool {
+    pub(crate) fn map_enabled(&self, map_id: &str) -> bool {
         let Some(maps) = &self.maps else { return true };
         maps.iter()
             .any(|map| map.map_id == map_id && map.map_status == "ENABLED")
     }
 
     /// Whether a map version is on board.
-    pub(super) fn has_map(&self, map_id: &str, version: &str) -> bool {
+    pub(crate) fn has_map(&self, map_id: &str, version: &str) -> bool {
         let maps = self.maps.as_deref().unwrap_or_default();
         maps.iter()
             .any(|map| map.map_id == map_id && map.map_version == version)
@@ -251,55 +232,55 @@ impl State {
 /// A parameter of an action in the factsheet.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct ParameterOffer {
-    pub(super) key: String,
+pub(crate) struct ParameterOffer {
+    pub(crate) key: String,
     #[serde(default)]
-    pub(super) value_data_type: String,
+    pub(crate) value_data_type: String,
     #[serde(default)]
-    pub(super) is_optional: Option<bool>,
+    pub(crate) is_optional: Option<bool>,
 }
 
 /// An action in the factsheet.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct ActionOffer {
-    pub(super) action_type: String,
+pub(crate) struct ActionOffer {
+    pub(crate) action_type: String,
     #[serde(default)]
-    pub(super) action_scopes: Vec<String>,
+    pub(crate) action_scopes: Vec<String>,
     #[serde(default)]
-    pub(super) action_parameters: Option<Vec<ParameterOffer>>,
+    pub(crate) action_parameters: Option<Vec<ParameterOffer>>,
     #[serde(default)]
-    pub(super) blocking_types: Option<Vec<String>>,
+    pub(crate) blocking_types: Option<Vec<String>>,
 }
 
 /// The factsheet, as far as master control goes by it.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Factsheet {
+pub(crate) struct Factsheet {
     /// Action by type; `None` if the factsheet lists none at all.
-    pub(super) actions: Option<BTreeMap<String, ActionOffer>>,
+    pub(crate) actions: Option<BTreeMap<String, ActionOffer>>,
     /// Support by optional parameter.
-    pub(super) optional: BTreeMap<String, String>,
+    pub(crate) optional: BTreeMap<String, String>,
     /// Limits of arrays by their name.
-    pub(super) arrays: BTreeMap<String, usize>,
+    pub(crate) arrays: BTreeMap<String, usize>,
     /// Longest message in bytes.
-    pub(super) message: Option<usize>,
+    pub(crate) message: Option<usize>,
     /// Longest id.
-    pub(super) id_length: Option<usize>,
+    pub(crate) id_length: Option<usize>,
     /// Ids consist of digits.
-    pub(super) ids_numerical: bool,
+    pub(crate) ids_numerical: bool,
     /// Seconds between order messages.
-    pub(super) order_interval: f64,
+    pub(crate) order_interval: f64,
     /// Names of load handling devices.
-    pub(super) devices: Vec<String>,
+    pub(crate) devices: Vec<String>,
     /// Types of loads.
-    pub(super) load_types: Vec<String>,
-    /// Whether a limit is 0 (`zero-is-a-limit`).
-    pub(super) has_zeros: bool,
+    pub(crate) load_types: Vec<String>,
+    /// Whether the limit of nodes is 0, which is none.
+    pub(crate) has_zeros: bool,
 }
 
 impl Factsheet {
     /// Reads a factsheet; what is missing or strange limits nothing.
-    pub(super) fn read(message: &Value) -> Self {
+    pub(crate) fn read(message: &Value) -> Self {
         let at = |pointer: &str| message.pointer(pointer);
         let size = |value: &Value| {
             value
@@ -345,17 +326,17 @@ impl Factsheet {
     }
 
     /// What the vehicle says to an optional parameter, such as `order.edges.maxSpeed`.
-    pub(super) fn support(&self, parameter: &str) -> Option<&str> {
+    pub(crate) fn support(&self, parameter: &str) -> Option<&str> {
         self.optional.get(parameter).map(String::as_str)
     }
 
     /// Whether a list of what it supports, if there is one, has the positions of nodes in it.
-    pub(super) fn knows_positions(&self) -> bool {
+    pub(crate) fn knows_positions(&self) -> bool {
         self.optional.is_empty() || self.optional.keys().any(|name| name.contains("nodePosition"))
     }
 
     /// The smaller of the limits of these names.
-    pub(super) fn limit(&self, names: &[&str]) -> usize {
+    pub(crate) fn limit(&self, names: &[&str]) -> usize {
         let limits = names.iter().filter_map(|name| self.arrays.get(*name));
         limits.min().copied().unwrap_or(usize::MAX)
     }

@@ -1,7 +1,6 @@
 //! Behaviour of the reference master control with reference vehicles, in virtual time.
 
 mod driving;
-mod faulty;
 mod hostile;
 mod talking;
 
@@ -19,7 +18,7 @@ use super::{MasterControl, MasterControlConfig, VehicleConfig};
 /// A version no pack has, since versions are data.
 const VERSION: &str = "7.8.9";
 
-fn topics(serial: &str) -> std::collections::BTreeMap<String, String> {
+pub(crate) fn topics(serial: &str) -> std::collections::BTreeMap<String, String> {
     let names = [
         "order",
         "instantActions",
@@ -33,7 +32,7 @@ fn topics(serial: &str) -> std::collections::BTreeMap<String, String> {
         .into()
 }
 
-fn agv_config(serial: &str) -> AgvConfig {
+pub(crate) fn agv_config(serial: &str) -> AgvConfig {
     AgvConfig {
         version: VERSION.into(),
         serial_number: serial.into(),
@@ -45,7 +44,7 @@ fn agv_config(serial: &str) -> AgvConfig {
     }
 }
 
-fn config() -> MasterControlConfig {
+pub(crate) fn config() -> MasterControlConfig {
     let vehicle = |serial: &str| VehicleConfig {
         manufacturer: "Reference".into(),
         serial_number: serial.into(),
@@ -60,30 +59,30 @@ fn config() -> MasterControlConfig {
 
 /// A message that passed, with its time.
 #[derive(Clone, Debug)]
-struct Passed {
-    at: Moment,
-    topic: String,
-    body: Value,
+pub(crate) struct Passed {
+    pub(crate) at: Moment,
+    pub(crate) topic: String,
+    pub(crate) body: Value,
 }
 
 /// A master control, vehicles, and the time around them.
-struct Bench {
-    master: MasterControl,
-    agvs: Vec<Agv>,
-    now: Stamp,
-    passed: Vec<Passed>,
-    outputs: Vec<Output>,
+pub(crate) struct Bench {
+    pub(crate) master: MasterControl,
+    pub(crate) agvs: Vec<Agv>,
+    pub(crate) now: Stamp,
+    pub(crate) passed: Vec<Passed>,
+    pub(crate) outputs: Vec<Output>,
     /// Messages to vehicles get lost.
-    deaf: bool,
+    pub(crate) deaf: bool,
 }
 
 impl Bench {
-    fn new() -> Self {
-        Self::with(config(), agv_config("agv-1"), &[])
+    pub(crate) fn new() -> Self {
+        Self::with(MasterControl::new(config()), agv_config("agv-1"))
     }
 
-    fn with(config: MasterControlConfig, agv: AgvConfig, faults: &[&str]) -> Self {
-        let mut bench = Self::alone(config, faults);
+    pub(crate) fn with(master: MasterControl, agv: AgvConfig) -> Self {
+        let mut bench = Self::alone(master);
         bench.agvs.push(Agv::new(agv, &[]).unwrap());
         bench.agv_gets(0, Input::Connected);
         bench.wait(0.1);
@@ -91,11 +90,11 @@ impl Bench {
     }
 
     /// A connected master control without vehicles.
-    fn alone(config: MasterControlConfig, faults: &[&str]) -> Self {
+    pub(crate) fn alone(master: MasterControl) -> Self {
         let utc = "2026-03-04T05:06:07.89Z".parse().unwrap();
         let moment = Moment::START;
         let mut bench = Self {
-            master: MasterControl::new(config, faults).unwrap(),
+            master,
             agvs: Vec::new(),
             now: Stamp { moment, utc },
             passed: Vec::new(),
@@ -106,7 +105,7 @@ impl Bench {
         bench
     }
 
-    fn master_gets(&mut self, input: Input) {
+    pub(crate) fn master_gets(&mut self, input: Input) {
         let mut out = Vec::new();
         self.master.handle(self.now, input, &mut out);
         let wake = self.master.wake_up();
@@ -129,7 +128,7 @@ impl Bench {
         }
     }
 
-    fn agv_gets(&mut self, index: usize, input: Input) {
+    pub(crate) fn agv_gets(&mut self, index: usize, input: Input) {
         let mut out = Vec::new();
         self.agvs[index].handle(self.now, input, &mut out);
         for output in out {
@@ -144,7 +143,7 @@ impl Bench {
         }
     }
 
-    fn pass(&mut self, topic: &str, payload: &[u8]) {
+    pub(crate) fn pass(&mut self, topic: &str, payload: &[u8]) {
         self.passed.push(Passed {
             at: self.now.moment,
             topic: topic.to_owned(),
@@ -152,17 +151,17 @@ impl Bench {
         });
     }
 
-    fn command(&mut self, name: &str, arguments: Value) {
+    pub(crate) fn command(&mut self, name: &str, arguments: Value) {
         self.master_gets(Input::Command(name.into(), arguments));
     }
 
     /// A person at the vehicle.
-    fn at_agv(&mut self, name: &str, arguments: Value) {
+    pub(crate) fn at_agv(&mut self, name: &str, arguments: Value) {
         self.agv_gets(0, Input::Command(name.into(), arguments));
     }
 
     /// Something is said for a vehicle.
-    fn say(&mut self, topic: &str, body: &Value) {
+    pub(crate) fn say(&mut self, topic: &str, body: &Value) {
         self.master_gets(Input::Message {
             topic: format!("uagv/v7/Reference/agv-1/{topic}"),
             payload: body.to_string().into(),
@@ -170,7 +169,7 @@ impl Bench {
     }
 
     /// Lets time pass, waking everybody exactly when they want.
-    fn wait(&mut self, seconds: f64) {
+    pub(crate) fn wait(&mut self, seconds: f64) {
         let end = self.now.moment + Duration::from_secs_f64(seconds);
         for _ in 0..100_000 {
             let agvs = self.agvs.iter().filter_map(Device::wake_up);
@@ -192,18 +191,18 @@ impl Bench {
     }
 
     /// What passed on a topic.
-    fn seen(&self, name: &str) -> Vec<&Value> {
+    pub(crate) fn seen(&self, name: &str) -> Vec<&Value> {
         let suffix = format!("/{name}");
         let passed = self.passed.iter().filter(|passed| passed.topic.ends_with(&suffix));
         passed.map(|passed| &passed.body).collect()
     }
 
-    fn orders(&self) -> Vec<&Value> {
+    pub(crate) fn orders(&self) -> Vec<&Value> {
         self.seen("order")
     }
 
     /// actionTypes of all instant actions.
-    fn actions(&self) -> Vec<&str> {
+    pub(crate) fn actions(&self) -> Vec<&str> {
         let messages = self.seen("instantActions").into_iter();
         messages
             .flat_map(|message| message["actions"].as_array().unwrap())
@@ -211,18 +210,18 @@ impl Bench {
             .collect()
     }
 
-    fn state(&self) -> &Value {
+    pub(crate) fn state(&self) -> &Value {
         self.seen("state").last().unwrap()
     }
 }
 
-fn ids(order: &Value) -> Vec<&str> {
+pub(crate) fn ids(order: &Value) -> Vec<&str> {
     let nodes = order["nodes"].as_array().unwrap();
     nodes.iter().map(|node| node["nodeId"].as_str().unwrap()).collect()
 }
 
 /// A state of a vehicle no device here makes.
-fn state(changes: &Value) -> Value {
+pub(crate) fn state(changes: &Value) -> Value {
     let mut state = json!({
         "headerId": 1, "timestamp": "2026-03-04T05:06:07.89Z", "version": VERSION,
         "manufacturer": "Reference", "serialNumber": "agv-1",
@@ -238,7 +237,7 @@ fn state(changes: &Value) -> Value {
     state
 }
 
-fn connection(literal: &str) -> Value {
+pub(crate) fn connection(literal: &str) -> Value {
     json!({
         "headerId": 0, "timestamp": "2020-03-04T05:06:07.89Z", "version": VERSION,
         "manufacturer": "Reference", "serialNumber": "agv-1", "connectionState": literal,

@@ -138,7 +138,7 @@ fn a_closed_way_is_not_used() {
 fn a_trigger_that_does_not_come_ends_the_order() {
     let mut config = config();
     config.trigger_timeout = Duration::from_secs(5);
-    let mut bench = Bench::with(config, agv_config("agv-1"), &[]);
+    let mut bench = Bench::with(MasterControl::new(config), agv_config("agv-1"));
     bench.command("dispatch", json!({ "to": "n2", "action": "waitForTrigger" }));
     bench.wait(4.0);
     assert!(bench.actions().is_empty());

@@ -56,7 +56,7 @@ proptest! {
         changes in prop::collection::vec((0..KEYS.len(), any_json(), 0..3_usize), 1..12),
         sequence in any::<u32>(),
     ) {
-        let mut bench = Bench::alone(config(), &[]);
+        let mut bench = Bench::alone(MasterControl::new(config()));
         bench.say("connection", &connection("ONLINE"));
         bench.say("state", &state(&json!({})));
         bench.command("dispatch", json!({ "from": "n2", "to": "n4", "loadType": "EPAL" }));
@@ -73,7 +73,7 @@ proptest! {
 
     #[test]
     fn no_bytes_and_no_command_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..40), arguments in any_json()) {
-        let mut bench = Bench::alone(config(), &[]);
+        let mut bench = Bench::alone(MasterControl::new(config()));
         for topic in ["state", "connection", "factsheet", "visualization"] {
             let topic = format!("uagv/v7/Reference/agv-1/{topic}");
             bench.master_gets(Input::Message { topic, payload: bytes.clone().into() });
@@ -87,7 +87,7 @@ proptest! {
 
 #[test]
 fn a_message_of_another_vehicle_is_ignored() {
-    let mut bench = Bench::alone(config(), &[]);
+    let mut bench = Bench::alone(MasterControl::new(config()));
     let mut online = connection("ONLINE");
     online["serialNumber"] = json!("agv-2");
     bench.say("connection", &online);

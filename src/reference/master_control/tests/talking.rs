@@ -24,7 +24,7 @@ fn an_unseen_order_is_sent_again_unchanged_three_times_at_most() {
 
 #[test]
 fn a_refused_order_is_not_repeated() {
-    let mut bench = Bench::alone(config(), &[]);
+    let mut bench = Bench::alone(MasterControl::new(config()));
     bench.say("connection", &connection("ONLINE"));
     bench.say("state", &state(&json!({})));
     bench.command("dispatch", json!({ "to": "n4" }));
@@ -44,7 +44,7 @@ fn a_refused_order_is_not_repeated() {
 #[test]
 fn nothing_is_sent_to_a_vehicle_that_is_away() {
     for literal in ["CONNECTIONBROKEN", "OFFLINE"] {
-        let mut bench = Bench::alone(config(), &[]);
+        let mut bench = Bench::alone(MasterControl::new(config()));
         bench.say("state", &state(&json!({})));
         bench.say("connection", &connection("ONLINE"));
         bench.say("connection", &connection(literal));
@@ -89,7 +89,7 @@ fn a_lost_connection_is_restored_and_the_order_goes_on() {
 #[test]
 fn a_vehicle_in_other_modes_is_left_alone() {
     for mode in ["MANUAL", "SERVICE", "TEACHIN"] {
-        let mut bench = Bench::alone(config(), &[]);
+        let mut bench = Bench::alone(MasterControl::new(config()));
         bench.say("connection", &connection("ONLINE"));
         bench.say("state", &state(&json!({ "operatingMode": mode })));
         bench.command("dispatch", json!({ "to": "n4" }));
@@ -109,7 +109,7 @@ fn nothing_is_begun_with_an_unfit_vehicle() {
         json!({ "batteryState": { "batteryCharge": 3.0, "charging": false } }),
     ];
     for changes in unfit {
-        let mut bench = Bench::alone(config(), &[]);
+        let mut bench = Bench::alone(MasterControl::new(config()));
         bench.say("connection", &connection("ONLINE"));
         bench.say("state", &state(&changes));
         bench.command("dispatch", json!({ "to": "n4" }));
@@ -123,7 +123,7 @@ fn nothing_is_begun_with_an_unfit_vehicle() {
 
 #[test]
 fn a_map_is_enabled_before_it_is_used() {
-    let mut bench = Bench::alone(config(), &[]);
+    let mut bench = Bench::alone(MasterControl::new(config()));
     bench.say("connection", &connection("ONLINE"));
     let map = |status: &str| json!([{ "mapId": "hall", "mapVersion": "1", "mapStatus": status }]);
     bench.say("state", &state(&json!({ "maps": map("DISABLED") })));
@@ -138,7 +138,7 @@ fn a_map_is_enabled_before_it_is_used() {
 
 #[test]
 fn a_duplicate_is_deleted_before_the_download_is_repeated() {
-    let mut bench = Bench::alone(config(), &[]);
+    let mut bench = Bench::alone(MasterControl::new(config()));
     bench.say("connection", &connection("ONLINE"));
     bench.say("state", &state(&json!({})));
     bench.command(

@@ -2,8 +2,17 @@
 
 use serde_json::json;
 
-use super::*;
-use crate::reference::master_control::{FAULTS, TOLERANCES};
+use serde_json::Value;
+
+use super::{FAULTS, TOLERANCES, built, tolerate};
+use crate::reference::master_control::MasterControl;
+use crate::reference::master_control::tests::{Bench, agv_config, config, connection, state};
+use crate::reference::{Device, Input, Output};
+
+/// A master control with these faults.
+fn faulty(faults: &[&str]) -> MasterControl {
+    built(config(), &[], faults).unwrap()
+}
 
 /// Goes through everything people may ask for.
 fn exercise(bench: &mut Bench) {
@@ -32,7 +41,7 @@ fn curved() -> Bench {
     for edge in &mut config.edges {
         edge.corridor = Some((0.5, 0.5));
     }
-    Bench::with(config, agv, &[])
+    Bench::with(MasterControl::new(config), agv)
 }
 
 /// Everything the master control did under a fault, at several vehicles.
@@ -44,7 +53,7 @@ fn traces(fault: &[&str]) -> Vec<String> {
         traces.extend(bench.outputs.iter().map(|output| format!("{output:?}")));
     };
     let with = |bench: &mut Bench| {
-        bench.master = MasterControl::new(bench.master.site.config.clone(), fault).unwrap();
+        bench.master = built(bench.master.config().clone(), &[], fault).unwrap();
         bench.passed.clear();
         bench.outputs.clear();
         let options = bench.master.connect_options(bench.now);
@@ -111,7 +120,7 @@ fn traces(fault: &[&str]) -> Vec<String> {
 
 /// A vehicle at the begin of its order asks for more base, or is further in the visualization.
 fn asking(fault: &[&str], topic: &str) -> Bench {
-    let mut bench = Bench::alone(config(), fault);
+    let mut bench = Bench::alone(faulty(fault));
     bench.say("connection", &connection("ONLINE"));
     bench.say("state", &state(&json!({})));
     bench.command("dispatch", json!({ "to": "n4" }));
@@ -142,9 +151,9 @@ fn a_vehicle_that_asks_for_more_base_gets_it() {
 
 /// Vehicles that want something else, and say strange things.
 fn strange(fault: &[&str]) -> Bench {
-    let mut bench = Bench::alone(config(), fault);
+    let mut bench = Bench::alone(faulty(fault));
     let fresh = |changes: Value, sheet: Value| {
-        let mut bench = Bench::alone(config(), fault);
+        let mut bench = Bench::alone(faulty(fault));
         bench.say("connection", &connection("ONLINE"));
         if !sheet.is_null() {
             bench.say("factsheet", &sheet);
@@ -281,8 +290,8 @@ fn every_fault_shows() {
 
 #[test]
 fn no_fault_makes_it_flood_or_panic() {
-    for fault in FAULTS {
-        let mut bench = Bench::with(config(), agv_config("agv-1"), &[fault.name]);
+    for fault in FAULTS.iter() {
+        let mut bench = Bench::with(faulty(&[fault.name]), agv_config("agv-1"));
         exercise(&mut bench);
         assert!(bench.passed.len() < 3000, "{}: {}", fault.name, bench.passed.len());
     }
@@ -290,10 +299,10 @@ fn no_fault_makes_it_flood_or_panic() {
 
 #[test]
 fn with_every_tolerance_transports_reach_their_end() {
-    for tolerance in TOLERANCES {
-        let mut config = config();
-        config.tolerate(tolerance.name).unwrap();
-        let mut bench = Bench::with(config, agv_config("agv-1"), &[]);
+    for tolerance in TOLERANCES.iter() {
+        let (mut config, mut liberties) = (config(), Vec::new());
+        tolerate(&mut config, &mut liberties, tolerance.name).unwrap();
+        let mut bench = Bench::with(built(config, &liberties, &[]).unwrap(), agv_config("agv-1"));
         bench.command("dispatch", json!({ "from": "n2", "to": "n4", "loadType": "EPAL" }));
         bench.wait(40.0);
         assert_eq!(bench.state()["lastNodeId"], "n4", "{}", tolerance.name);
@@ -303,4 +312,15 @@ fn with_every_tolerance_transports_reach_their_end() {
             .any(|state| state["errors"] != json!([]));
         assert!(!refused, "{}", tolerance.name);
     }
+}
+
+#[test]
+fn every_name_is_kebab_case_and_unique() {
+    let mut names: Vec<_> = super::records().map(|record| record.name).collect();
+    let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    assert!(names.iter().all(|name| name.chars().all(letters)));
+    names.sort_unstable();
+    let all = names.len();
+    names.dedup();
+    assert_eq!(names.len(), all);
 }
