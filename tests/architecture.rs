@@ -207,6 +207,39 @@ fn incoming_messages_stay_values() {
 }
 
 #[test]
+fn the_reference_master_control_keeps_to_the_standard() {
+    // What can be done otherwise stands below deviations, and takes hold at the seam.
+    let words = ["fault", "tolerance", "libert", "deviation", "persona", "lapse"];
+    // Members of the protocol, and what every language has.
+    let others = [
+        "default",
+        "alloweddeviation",
+        "deviation_xy",
+        "deviation_theta",
+        "deviation_range",
+    ];
+    let mut wrong = Vec::new();
+    let room = |name: &str| name.starts_with("reference/master_control/") && !name.ends_with("/seam.rs");
+    for (path, text) in sources()
+        .iter()
+        .filter(|(path, _)| room(&below_src(path)) && !is_test_file(path))
+    {
+        for (line, content) in text.lines().enumerate() {
+            let plain = others
+                .iter()
+                .fold(content.to_lowercase(), |text, other| text.replace(other, ""));
+            if words.iter().any(|word| plain.contains(word)) {
+                wrong.push(format!("{}:{}: {}", below_src(path), line + 1, content.trim()));
+            }
+        }
+        if text.lines().count() > 400 {
+            wrong.push(format!("{} is longer than 400 lines", below_src(path)));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
 fn every_module_says_what_it_is_for() {
     let silent: Vec<String> = sources()
         .iter()

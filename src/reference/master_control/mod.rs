@@ -22,6 +22,7 @@ pub(crate) mod instant;
 pub(crate) mod layout;
 pub(crate) mod maps;
 pub(crate) mod order;
+mod points;
 mod publish;
 pub(crate) mod rerouting;
 pub(crate) mod seam;
@@ -41,7 +42,7 @@ pub use commands::COMMANDS;
 pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig};
 
 use connecting::Connection;
-use seam::{Deviation, Event, Made, Measure, Permission, Seam};
+use seam::{Event, Hook, Made, Measure, Permission, Seam};
 use vehicle::Vehicle;
 
 /// More messages than this do not lie about unread.
@@ -146,7 +147,7 @@ impl MasterControl {
     }
 
     /// The same, made to behave otherwise at its seam.
-    pub(crate) fn with(config: MasterControlConfig, deviations: Vec<Box<dyn Deviation>>) -> Self {
+    pub(crate) fn with(config: MasterControlConfig, hooks: Vec<Hook>) -> Self {
         let mut site = Site {
             config,
             seam: Seam::default(),
@@ -159,8 +160,8 @@ impl MasterControl {
             ids: 0,
             pending: Vec::new(),
         };
-        for deviation in deviations {
-            site.switch_on(deviation);
+        for hook in hooks {
+            site.switch_on(hook);
         }
         let fleet: Vec<Vehicle> = site.config.vehicles.iter().cloned().map(Vehicle::from).collect();
         let mut by_topic = BTreeMap::new();

@@ -1,8 +1,8 @@
 //! How a transport becomes a way: where it starts, over which nodes it leads, and what is done on it (sections 6.6.1 and
 //! 6.8).
 //!
-//! A vehicle that stands a little off a node begins there with a deviation that covers it; one between nodes begins at a
-//! temporary node (the ruling of ORD-CANCEL-17).
+//! A vehicle that stands a little off a node begins there with an allowedDeviationXY that covers it; one between nodes
+//! begins at a temporary node (the ruling of ORD-CANCEL-17).
 
 use serde_json::{Map, Value, json};
 
@@ -16,7 +16,7 @@ use super::vehicle::{Leg, Stop, Transport, Vehicle};
 
 /// How far from a node a vehicle may be and stand on it, where the layout does not say; metres.
 const REACH: f64 = 0.3;
-/// Closer than this it stands on the node without any deviation.
+/// Closer than this it stands on the node exactly.
 const EXACT: f64 = 0.05;
 /// A vehicle this near to an edge is on it.
 const BESIDE: f64 = 0.5;
@@ -41,7 +41,7 @@ pub(crate) enum Standing {
     Exactly,
     /// Between nodes in any case.
     Between,
-    /// On the node it is near, or else on the last one: with a deviation that covers it, or without.
+    /// On the node it is near, or else on the last one: which covers it by allowedDeviationXY, or not.
     OnLast { covered: bool },
 }
 
@@ -61,9 +61,9 @@ impl Site {
         };
         self.plans(vehicle, Plan::Pose(&mut pose, transport));
         let last = self.config.node(&pose.node);
-        let on = |node: &SiteNode, deviation: Option<f64>| {
+        let on = |node: &SiteNode, covers: Option<f64>| {
             let mut stop = Stop::from(node);
-            if let Some(least) = deviation {
+            if let Some(least) = covers {
                 stop.deviation_xy = Some(stop.deviation_xy.map_or(least, |known| known.max(least)));
             }
             let way = Way {
