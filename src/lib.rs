@@ -23,6 +23,7 @@ pub mod pattern;
 pub mod profile;
 pub mod reference;
 pub mod report;
+pub mod result;
 pub mod run;
 pub mod suite;
 pub mod tap;

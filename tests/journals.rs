@@ -16,7 +16,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 use vda5050_tck::judge::judge;
-use vda5050_tck::report::result::RunResult;
+use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, decided};
 use vda5050_tck::verdict::{Accumulated, Verdict};
 

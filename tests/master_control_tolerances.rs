@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use vda5050_tck::pack::{Pack, Role};
 use vda5050_tck::reference::deviations::master_control::TOLERANCES;
-use vda5050_tck::report::result::RunResult;
+use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, decided, run_silently};
 use vda5050_tck::verdict::Verdict;
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use vda5050_tck::pack::Pack;
 use vda5050_tck::reference::agv::{FAULTS, TOLERANCES};
-use vda5050_tck::report::result::RunResult;
+use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Decider, Library, VirtualRun, decided, run_silently};
 use vda5050_tck::verdict::Verdict;
 

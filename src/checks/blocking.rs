@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use super::orders::{Blocking, Placed};
-use super::state_route::Shown;
+use super::state::route::Shown;
 use super::traffic::{broken, elements, quote, remark, text};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;

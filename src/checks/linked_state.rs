@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::continuity::Continuity;
 use super::orders::sets_position;
-use super::state_driving::Pose;
+use super::state::driving::Pose;
 use super::traffic::{Traffic, actions, broken, elements, quote, show, state, text, to_vehicle};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;

@@ -36,25 +36,7 @@ mod motion;
 mod motion_signs;
 mod mqtt;
 mod orders;
-mod state_action_ids;
-mod state_actions;
-mod state_battery;
-mod state_bursts;
-mod state_driving;
-mod state_known;
-mod state_loads;
-mod state_map_changes;
-mod state_maps;
-mod state_node_positions;
-mod state_order;
-mod state_pause_stands;
-mod state_paused;
-mod state_period;
-mod state_place;
-mod state_predefined;
-mod state_route;
-mod state_triggers;
-mod state_values;
+mod state;
 mod topic;
 mod topic_heard;
 #[cfg(test)]
@@ -208,18 +190,18 @@ static REGISTRY: &[Check] = &[
     connection::VALUES,
     connection_crash::STAYS,
     connection_offline::SAYS_OFFLINE,
-    state_period::PERIOD,
-    state_period::OWN_LIMITS,
-    state_bursts::BURSTS,
-    state_action_ids::ACTION_IDS,
-    state_actions::TRANSITIONS,
-    state_actions::KEPT,
-    state_order::ORDER_KEPT,
-    state_known::ORDER_KNOWN,
-    state_known::UPDATE_ID_RISES,
-    state_known::NOT_REPLACED,
-    state_predefined::STATUSES,
-    state_predefined::RESULTS,
+    state::period::PERIOD,
+    state::period::OWN_LIMITS,
+    state::bursts::BURSTS,
+    state::action_ids::ACTION_IDS,
+    state::actions::TRANSITIONS,
+    state::actions::KEPT,
+    state::order::ORDER_KEPT,
+    state::known::ORDER_KNOWN,
+    state::known::UPDATE_ID_RISES,
+    state::known::NOT_REPLACED,
+    state::predefined::STATUSES,
+    state::predefined::RESULTS,
     linked_state::LINKED_STATE,
     cancel_course::COURSE,
     instant_answers::ANSWERED,
@@ -228,27 +210,27 @@ static REGISTRY: &[Check] = &[
     instant_answers::SCOPE,
     instant_queued::NOT_QUEUED,
     instant_requests::REQUESTS_MET,
-    state_route::REMAINING_ROUTE,
-    state_route::LAST_NODE,
-    state_node_positions::NODE_POSITIONS,
-    state_node_positions::JOINT_POSITION,
-    state_triggers::TRIGGERS,
+    state::route::REMAINING_ROUTE,
+    state::route::LAST_NODE,
+    state::node_positions::NODE_POSITIONS,
+    state::node_positions::JOINT_POSITION,
+    state::triggers::TRIGGERS,
     blocking::BLOCKING,
-    state_paused::PAUSED,
-    state_pause_stands::PAUSE_STANDS,
-    state_place::LAST_NODE_PLACE,
-    state_values::IDLE_EMPTY,
-    state_maps::MAPS,
-    state_map_changes::MAP_CHANGES,
-    state_values::POSITION_RANGE,
-    state_values::IDENTIFIERS,
-    state_driving::DRIVING,
-    state_driving::POSITION_MOVES,
+    state::paused::PAUSED,
+    state::pause_stands::PAUSE_STANDS,
+    state::place::LAST_NODE_PLACE,
+    state::values::IDLE_EMPTY,
+    state::maps::MAPS,
+    state::map_changes::MAP_CHANGES,
+    state::values::POSITION_RANGE,
+    state::values::IDENTIFIERS,
+    state::driving::DRIVING,
+    state::driving::POSITION_MOVES,
     trajectory::TRAJECTORY,
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
-    state_battery::LEVELS,
-    state_loads::LOADS,
+    state::battery::LEVELS,
+    state::loads::LOADS,
     visualization::RATE,
     visualization::PUBLISHED,
     visualization_pose::POSITION,

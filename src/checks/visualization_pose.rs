@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::state_driving::{Pose, is_displaced};
+use super::state::driving::{Pose, is_displaced};
 use super::traffic::{Traffic, broken, remark, state};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;

@@ -58,7 +58,7 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     Ok(Exit::of(result.verdict))
 }
 
-fn rejudge(folder: &Path, result: &crate::report::result::RunResult) -> Result<Exit, Problem> {
+fn rejudge(folder: &Path, result: &crate::result::RunResult) -> Result<Exit, Problem> {
     let path = folder.join("result.json");
     let saved = std::fs::read_to_string(&path).map_err(|error| {
         Problem::from(Diagnostic::whole(

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::engine::Watcher;
 use crate::journal::event::{Gate, Plan};
-use crate::report::result::TestResult;
+use crate::result::TestResult;
 use crate::run;
 use crate::suite::model::{Step, Test, Verb};
 use crate::ui::{Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};

@@ -6,7 +6,7 @@
 
 use crate::diagnostic::Diagnostic;
 use crate::pack::{Catalogue, Mood, Pack, Requirement};
-use crate::report::result::{Decision, Waited};
+use crate::result::{Decision, Waited};
 use crate::verdict::Verdict;
 
 use super::step::{Clause, Holds};

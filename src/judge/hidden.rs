@@ -5,7 +5,7 @@
 //! was told could not be observed. A monitor names the members it speaks for under `hides:`, and what was missed there
 //! is inconclusive in the tests it found something in. Which monitors do so is data.
 
-use crate::report::result::Waited;
+use crate::result::Waited;
 
 use super::step::{Clause, Holds, Timing};
 
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::diagnostic::{Source, Span};
     use crate::pack::RequirementId;
-    use crate::report::result::NearestMiss;
+    use crate::result::NearestMiss;
 
     fn clause(requirement: &str, path: &str) -> Open {
         let nearest = NearestMiss {

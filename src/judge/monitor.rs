@@ -16,7 +16,7 @@ use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
 use crate::pattern::{Bindings, Bound, Unbound};
-use crate::report::result::{MonitorFinding, MonitorResult};
+use crate::result::{MonitorFinding, MonitorResult};
 use crate::suite::model::{Monitor, Need, Rule};
 use crate::verdict::{Accumulated, Verdict};
 

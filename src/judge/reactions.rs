@@ -3,7 +3,7 @@
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
-use crate::report::result::{FleetResult, ReactionTimes};
+use crate::result::{FleetResult, ReactionTimes};
 
 use super::timeline::Place;
 

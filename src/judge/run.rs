@@ -21,7 +21,7 @@ use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, Reading, RunHeader, Waiver};
 use crate::pack::{Catalogue, Decided, Packs, Role};
-use crate::report::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
+use crate::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
 use crate::suite::Suites;
 use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};

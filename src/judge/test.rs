@@ -21,7 +21,7 @@ use crate::journal::Entry;
 use crate::journal::event::{Event, StepEnd, Waiver};
 use crate::pack::{Catalogue, Pack, Role};
 use crate::pattern::Bindings;
-use crate::report::result::{Decision, StepResult, TestResult, Waited};
+use crate::result::{Decision, StepResult, TestResult, Waited};
 use crate::suite::model::{Section, Step, Test, Verb};
 use crate::verdict::{Accumulated, Verdict};
 

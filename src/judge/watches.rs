@@ -17,7 +17,7 @@ use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
 use crate::pattern::Bindings;
-use crate::report::result::MonitorResult;
+use crate::result::MonitorResult;
 use crate::suite::model::Monitor;
 use crate::verdict::{Accumulated, Verdict};
 

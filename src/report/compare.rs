@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::clean::line;
-use super::result::RunResult;
 use super::statement::many;
+use crate::result::RunResult;
 use crate::verdict::Verdict;
 
 /// What changed from one run to another.

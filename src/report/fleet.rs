@@ -2,7 +2,7 @@
 
 use askama::Template;
 
-use super::result::{FleetResult, ReactionTimes};
+use crate::result::{FleetResult, ReactionTimes};
 
 /// Width of the picture, of one bar, and the height bars have at most.
 const WIDTH: usize = 760;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::result::RunResult;
+use crate::result::RunResult;
 
 /// The format this version writes and reads.
 pub const FORMAT: &str = "vda5050-tck.result/1";

@@ -16,8 +16,8 @@ use std::fmt::Write as _;
 use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult as Outcome, TestSuite};
 
 use super::clean;
-use super::result::{Decision, MonitorResult, RunResult, TestResult};
 use super::statement;
+use crate::result::{Decision, MonitorResult, RunResult, TestResult};
 use crate::verdict::Verdict;
 
 /// Why no JUnit file could be made.

@@ -1,6 +1,6 @@
-//! The result model and its renderings; pure functions, no clock, no network.
+//! The renderings of a result; pure functions, no clock, no network.
 //!
-//! Everything shown comes from a [`result::RunResult`], the journal it was judged from, and the
+//! Everything shown comes from a [`crate::result::RunResult`], the journal it was judged from, and the
 //! [`sources::Sources`] it quotes: the same input gives the same bytes. Running tests and judging them is
 //! left to others.
 
@@ -13,7 +13,6 @@ pub mod html;
 pub mod json;
 pub mod junit;
 pub mod manifest;
-pub mod result;
 pub mod sequence;
 pub mod sources;
 pub mod statement;

@@ -4,7 +4,7 @@
 //! than was decided: a pass speaks of the requirements that were decided and names how many were not.
 
 use super::clean::line;
-use super::result::{RequirementResult, RunResult, TestResult};
+use crate::result::{RequirementResult, RunResult, TestResult};
 use crate::verdict::Verdict;
 
 /// How many of something got which verdict.

@@ -10,11 +10,11 @@ use console::{Style, measure_text_width};
 
 use super::clean::{block, line, short};
 use super::headline::reference;
-use super::result::{Decision, MonitorResult, RunResult, TestResult, Waited};
 use super::sources::Sources;
 use super::statement::{self, Counts, many, seconds};
 use super::undecided;
 use crate::journal::Journal;
+use crate::result::{Decision, MonitorResult, RunResult, TestResult, Waited};
 use crate::verdict::Verdict;
 
 /// Width the times at the end of a line are aligned to, in columns.

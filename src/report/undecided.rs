@@ -4,8 +4,8 @@
 //! and ids, does not tell causes apart; the error that the vehicle itself reports, or the step where they stopped, does.
 
 use super::clean::{line, short};
-use super::result::{RunResult, TestResult};
 use super::statement::{self, many};
+use crate::result::{RunResult, TestResult};
 use crate::verdict::Verdict;
 
 /// Shared preconditions stand in this folder of the suites.

@@ -3,9 +3,9 @@
 use super::bundle::{Bundle, BundleError};
 use crate::journal::Journal;
 use crate::pack::{Catalogue, Decided, Pack};
-use crate::report::result::RunResult;
 use crate::report::sources::{HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use crate::report::{html, json, junit, manifest};
+use crate::result::RunResult;
 use crate::suite::Suites;
 
 /// Why the outputs could not be made.

@@ -16,7 +16,7 @@ use super::virtual_run::{Finished, VirtualRun, run_silently};
 use crate::engine::EngineError;
 use crate::pack::{Pack, Role};
 use crate::reference::Fault;
-use crate::report::result::RunResult;
+use crate::result::RunResult;
 use crate::suite::Unproven;
 use crate::suite::model::Test;
 use crate::verdict::Verdict;

@@ -19,7 +19,7 @@ use crate::journal::event::{Event, Gate, Plan, PlannedTest};
 use crate::judge::RunJudge;
 use crate::link::Link;
 use crate::pack::Role;
-use crate::report::result::TestResult;
+use crate::result::TestResult;
 use crate::suite::model::Test;
 
 /// What a run is about.

@@ -21,7 +21,7 @@ use crate::judge::RunJudge;
 use crate::link::memory::{MemoryLink, MemoryOptions};
 use crate::link::{Link, LinkError, Vantage};
 use crate::pack::{Pack, Role};
-use crate::report::result::RunResult;
+use crate::result::RunResult;
 use crate::suite::model::{Step, Test};
 
 /// What is run.
@@ -216,7 +216,7 @@ impl crate::engine::Watcher for Silent {
 impl Progress for Silent {
     fn planned(&mut self, _plan: &crate::journal::event::Plan) {}
     fn test_begun(&mut self, _test: &Test, _number: usize, _of: usize) {}
-    fn test_ended(&mut self, _result: &crate::report::result::TestResult) {}
+    fn test_ended(&mut self, _result: &crate::result::TestResult) {}
     fn note(&mut self, _text: &str) {}
 }
 

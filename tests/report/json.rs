@@ -2,8 +2,9 @@
 
 use proptest::prelude::*;
 use serde_json::Value;
+use vda5050_tck::report::compare;
 use vda5050_tck::report::json::{self, ResultError};
-use vda5050_tck::report::{compare, result::RunResult};
+use vda5050_tck::result::RunResult;
 use vda5050_tck::verdict::Verdict;
 
 use crate::samples;

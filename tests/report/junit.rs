@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use roxmltree::{Document, Node};
 use vda5050_tck::report::junit;
-use vda5050_tck::report::result::RunResult;
+use vda5050_tck::result::RunResult;
 use vda5050_tck::verdict::Verdict;
 
 use crate::samples;

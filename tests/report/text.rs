@@ -3,7 +3,8 @@
 use vda5050_tck::journal::Journal;
 use vda5050_tck::pack::Role;
 use vda5050_tck::report::text::{self, Bundle, Color};
-use vda5050_tck::report::{coverage, result::RunResult, sources::Sources};
+use vda5050_tck::report::{coverage, sources::Sources};
+use vda5050_tck::result::RunResult;
 
 use crate::samples;
 

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::lane::{Demands, Lane, Stop, finite};
 use crate::checks::CheckContext;
 use crate::checks::orders::{number, read_elements};
-use crate::checks::state_route::Shown;
+use crate::checks::state::route::Shown;
 use crate::checks::traffic::{Traffic, elements, text, to_vehicle};
 use crate::clock::Moment;
 use crate::journal::Entry;

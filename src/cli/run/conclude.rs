@@ -5,8 +5,8 @@ use crate::cli::args;
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
 use crate::cli::screen::Screen;
-use crate::report::result::RunResult;
 use crate::report::text;
+use crate::result::RunResult;
 use crate::run::{Bundle, End, Finished, sources, write_all};
 use crate::verdict::Verdict;
 

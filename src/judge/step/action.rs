@@ -12,7 +12,7 @@ use crate::journal::event::Waiver;
 use crate::judge::limit::Limit;
 use crate::judge::mend::{Mends, is_lasting, status_meant};
 use crate::judge::window::Scene;
-use crate::report::result::NearestMiss;
+use crate::result::NearestMiss;
 use crate::suite::model::{ActionWalk, Step, Walk};
 
 /// The topic that reports action states.

@@ -25,7 +25,7 @@ use crate::diagnostic::Span;
 use crate::journal::Entry;
 use crate::pack::RequirementId;
 use crate::pattern::{Bound, Pattern, Unbound};
-use crate::report::result::NearestMiss;
+use crate::result::NearestMiss;
 use crate::suite::model::{Assertion, Binding, From, Selection, Step, Verb};
 
 /// Where the test stands when a step begins.

@@ -2,9 +2,9 @@
 
 use super::Anchors;
 use super::view::Badge;
-use crate::report::result::{RequirementResult, RunResult};
 use crate::report::sources::{HowDecided, RequirementText, Sources};
 use crate::report::statement::Counts;
+use crate::result::{RequirementResult, RunResult};
 use crate::verdict::Verdict;
 
 /// One chapter.

@@ -19,12 +19,12 @@ use askama::Template;
 pub use escape::Escape;
 
 use super::fleet;
-use super::result::{Capability, RunResult};
 use super::sources::Sources;
 use super::statement;
 use super::undecided;
 use crate::journal::event::Setting;
 use crate::journal::{Event, Journal};
+use crate::result::{Capability, RunResult};
 use matrix::ChapterView;
 use messages::{Gallery, MessageView};
 use test_view::TestView;

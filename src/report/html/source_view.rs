@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::test_view::findings;
 use super::view::Badge;
 use crate::report::clean;
-use crate::report::result::TestResult;
 use crate::report::sources::TestSource;
+use crate::result::TestResult;
 
 /// Longest source shown, in lines.
 const SOURCE_LINES: usize = 600;

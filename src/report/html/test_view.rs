@@ -8,10 +8,10 @@ use super::source_view::{SourceView, source_view};
 use super::view::Badge;
 use crate::journal::Event;
 use crate::report::headline::reference;
-use crate::report::result::{Decision, RunResult, TestResult};
 use crate::report::sources::Sources;
 use crate::report::statement::{many, seconds, test_verdict};
 use crate::report::{clean, sequence};
+use crate::result::{Decision, RunResult, TestResult};
 use crate::verdict::Verdict;
 
 /// Most messages shown of one test.

@@ -2,9 +2,9 @@
 
 use super::Anchors;
 use super::messages::Gallery;
-use crate::report::result::{RequirementResult, RunResult};
 use crate::report::sources::Sources;
 use crate::report::statement::{self, Gap, seconds};
+use crate::result::{RequirementResult, RunResult};
 use crate::verdict::Verdict;
 
 /// Most occurrences of a monitor's finding whose messages are shown.

@@ -6,11 +6,11 @@ use serde_json::json;
 use vda5050_tck::journal::event::{Close, LinkFault, StepEnd};
 use vda5050_tck::journal::{Direction, Event, Journal, Packet, Payload};
 use vda5050_tck::pack::Role;
-use vda5050_tck::report::result::{
+use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
+use vda5050_tck::result::{
     Capability, Decision, DeviceIdentity, MonitorFinding, MonitorResult, NearestMiss, RequirementResult, RunResult,
     StepResult, TestResult, Waited,
 };
-use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use vda5050_tck::verdict::Verdict;
 
 use super::parts::{header, run, setting};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use vda5050_tck::journal::Event;
 use vda5050_tck::journal::event::{RunHeader, Setting};
 use vda5050_tck::report::json::FORMAT;
-use vda5050_tck::report::result::{
+use vda5050_tck::result::{
     Capability, Decision, DeviceIdentity, MonitorResult, RequirementResult, RunResult, StepResult, TestResult,
 };
 use vda5050_tck::verdict::{Accumulated, Verdict};

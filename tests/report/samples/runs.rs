@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use vda5050_tck::journal::event::StepEnd;
 use vda5050_tck::journal::{Direction, Event, Journal, Packet, Payload, Will};
-use vda5050_tck::report::result::{Decision, MonitorFinding, MonitorResult, NearestMiss, RunResult, Waited};
+use vda5050_tck::result::{Decision, MonitorFinding, MonitorResult, NearestMiss, RunResult, Waited};
 use vda5050_tck::verdict::Verdict;
 
 use super::parts::{decision, header, run, step, test};

@@ -4,17 +4,17 @@
 
 use std::collections::BTreeSet;
 
-use super::orders::Placed;
-use super::state_route::Shown;
-use super::traffic::{broken, elements, quote, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use super::route::Shown;
+use crate::checks::orders::Placed;
+use crate::checks::traffic::{broken, elements, quote, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// How many actions are kept in mind from one state to the next.
 const ACTIONS: usize = 1024;
 
 /// See the module.
-pub(super) const TRIGGERS: Check = Check {
+pub(in crate::checks) const TRIGGERS: Check = Check {
     name: "state/action-triggers",
     decides: &["ASTATE-02", "ASTATE-03", "ACT-02", "NODE-05"],
     doc: "An action of a node does not begin before the node is the last node, one of an edge not before the node in \
@@ -104,7 +104,7 @@ impl Running for Triggers {
 mod tests {
     use serde_json::json;
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     /// What is found when a vehicle drives from a to b to c and shows these statuses of an action on edge b-c
     /// and one on node b, at a, at b, and twice at c.

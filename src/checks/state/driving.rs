@@ -7,9 +7,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::orders::{last_node, sets_position};
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, show, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::orders::{last_node, sets_position};
+use crate::checks::traffic::{
+    Traffic, actions, broken, elements, outside_influence, quote, show, state, text, to_vehicle,
+};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
@@ -34,7 +36,7 @@ const APART: f64 = 1.0;
 const NODES: usize = 1024;
 
 /// `state/driving`.
-pub(super) const DRIVING: Check = Check {
+pub(in crate::checks) const DRIVING: Check = Check {
     name: "state/driving",
     decides: &["STATE-MSG-08"],
     doc: "A state that reports a velocity well above zero reports driving true; judged only when two states in a row \
@@ -46,7 +48,7 @@ pub(super) const DRIVING: Check = Check {
 };
 
 /// `state/position-moves`.
-pub(super) const POSITION_MOVES: Check = Check {
+pub(in crate::checks) const POSITION_MOVES: Check = Check {
     name: "state/position-moves",
     decides: &["MAP-01"],
     doc: "The position of a vehicle that has come from one node to another, more than a metre away by the positions in \
@@ -58,7 +60,7 @@ pub(super) const POSITION_MOVES: Check = Check {
 
 /// Where a vehicle says it is.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pose {
+pub(in crate::checks) struct Pose {
     pub map: String,
     pub x: f64,
     pub y: f64,
@@ -67,7 +69,7 @@ pub(super) struct Pose {
 
 impl Pose {
     /// The pose of a state or a visualization, where the vehicle knows it.
-    pub(super) fn of(message: &Value) -> Option<Self> {
+    pub(in crate::checks) fn of(message: &Value) -> Option<Self> {
         let position = message.get("agvPosition")?;
         if position.get("positionInitialized").and_then(Value::as_bool) == Some(false) {
             return None;
@@ -82,7 +84,7 @@ impl Pose {
     }
 
     /// How far apart two are: in metres, and in radians.
-    pub(super) fn apart(&self, other: &Self) -> (f64, f64) {
+    pub(in crate::checks) fn apart(&self, other: &Self) -> (f64, f64) {
         let turned = (self.theta - other.theta).rem_euclid(std::f64::consts::TAU);
         let turned = turned.min(std::f64::consts::TAU - turned);
         ((self.x - other.x).hypot(self.y - other.y), turned)
@@ -93,14 +95,14 @@ impl Pose {
         self.map == other.map && (far > MOVED || turned > MOVED)
     }
 
-    pub(super) fn stays(&self, other: &Self) -> bool {
+    pub(in crate::checks) fn stays(&self, other: &Self) -> bool {
         let (far, turned) = self.apart(other);
         self.map == other.map && far < STILL && turned < STILL
     }
 }
 
 /// Whether something else than driving may have changed the position: a person, a hook, another localization.
-pub(super) fn is_displaced(entry: &Entry, context: &CheckContext<'_>) -> bool {
+pub(in crate::checks) fn is_displaced(entry: &Entry, context: &CheckContext<'_>) -> bool {
     let told = to_vehicle("instantActions", entry, context)
         .is_some_and(|message| actions(message).any(|action| sets_position(text(action, "actionType"))));
     let placed = to_vehicle("order", entry, context).is_some_and(|order| {
@@ -326,7 +328,7 @@ impl Running for PositionMoves {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn at(x: f64, theta: f64, driving: bool) -> Value {
         json!({ "driving": driving, "agvPosition": { "x": x, "y": 0.0, "theta": theta, "mapId": "m", "positionInitialized": true } })

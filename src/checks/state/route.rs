@@ -6,15 +6,15 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::orders::{
+use crate::checks::orders::{
     Element, Orders, SentOrder, fatal_errors, last_node, may_abandon_beside, number, read_elements, sets_position,
 };
-use super::traffic::{Traffic, actions, broken, outside_influence, quote, remark, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::traffic::{Traffic, actions, broken, outside_influence, quote, remark, state, text, to_vehicle};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// `state/remaining-route`.
-pub(super) const REMAINING_ROUTE: Check = Check {
+pub(in crate::checks) const REMAINING_ROUTE: Check = Check {
     name: "state/remaining-route",
     decides: &["STATE-12", "STATE-MSG-13", "NODE-03", "ORD-FLOW-09"],
     doc: "nodeStates and edgeStates list, in sequence, exactly what the vehicle has still to traverse of the order \
@@ -25,7 +25,7 @@ pub(super) const REMAINING_ROUTE: Check = Check {
 };
 
 /// `state/last-node`.
-pub(super) const LAST_NODE: Check = Check {
+pub(in crate::checks) const LAST_NODE: Check = Check {
     name: "state/last-node",
     decides: &["STATE-MSG-04", "ORD-01", "ORD-07"],
     doc: "lastNodeId and lastNodeSequenceId move along the order in its sequence, and never onto a node that was not \
@@ -36,7 +36,7 @@ pub(super) const LAST_NODE: Check = Check {
 
 /// The order a vehicle shows in its states, and whether it can still be held against it.
 #[derive(Default)]
-pub(super) struct Shown {
+pub(in crate::checks) struct Shown {
     traffic: Traffic,
     pub orders: Orders,
     /// orderId of the last state.
@@ -350,7 +350,7 @@ impl Running for LastNode {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let seq = entry.seq();
         let Some(state) = self.shown.state(entry, context) else {
-            if super::traffic::state(self.shown.traffic, entry, context).is_some() {
+            if crate::checks::traffic::state(self.shown.traffic, entry, context).is_some() {
                 self.before = None;
             }
             return false;

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, outside_influence, quote, state, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::traffic::{Traffic, broken, elements, outside_influence, quote, state, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 
@@ -16,7 +16,7 @@ const ACTIONS: usize = 256;
 const GOING_ON: Duration = Duration::from_secs(2);
 
 /// See the module.
-pub(super) const PAUSED: Check = Check {
+pub(in crate::checks) const PAUSED: Check = Check {
     name: "state/paused-actions",
     decides: &["ASTATE-04"],
     doc: "An action is PAUSED only while the state says why: paused, a field violation, an emergency stop, a mode in \
@@ -79,7 +79,7 @@ impl Running for PausedActions {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::{Trace, merged};
+    use crate::checks::trace::{Trace, merged};
 
     fn judge(states: &[Value]) -> Vec<String> {
         let mut trace = Trace::subscriber();

@@ -6,10 +6,12 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::orders::number;
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::continuity::Continuity;
+use crate::checks::orders::number;
+use crate::checks::traffic::{
+    Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle,
+};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::pack::Pack;
 
@@ -17,7 +19,7 @@ use crate::pack::Pack;
 const ACTIONS: usize = 4096;
 
 /// `state/action-transitions`.
-pub(super) const TRANSITIONS: Check = Check {
+pub(in crate::checks) const TRANSITIONS: Check = Check {
     name: "state/action-transitions",
     decides: &["ASTATE-05", "ASTATE-06", "STATE-MSG-09"],
     doc: "actionStatus moves only along the legal graph, where statuses may be skipped because states coalesce; \
@@ -32,7 +34,7 @@ pub(super) const TRANSITIONS: Check = Check {
 };
 
 /// `state/action-states-kept`.
-pub(super) const KEPT: Check = Check {
+pub(in crate::checks) const KEPT: Check = Check {
     name: "state/action-states-kept",
     decides: &["STATE-MSG-10", "ORD-CANCEL-12", "STATE-MSG-09"],
     doc: "Action states stay listed until a new order is accepted, also after a cancellation. Where the factsheet \
@@ -249,7 +251,7 @@ impl Kept {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn actions(all: &[(&str, &str)]) -> Value {
         let states: Vec<Value> = all

@@ -1,6 +1,6 @@
 use serde_json::{Value, json};
 
-use super::super::trace::{Trace, merged};
+use crate::checks::trace::{Trace, merged};
 
 /// Nodes and edges over `names` from `from`; the first `base` nodes are released.
 fn route(names: &[&str], from: usize, base: usize) -> (Vec<Value>, Vec<Value>) {

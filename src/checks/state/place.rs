@@ -6,15 +6,15 @@ use std::collections::HashMap;
 
 use serde_json::Value;
 
-use super::orders::sets_position;
-use super::traffic::{
+use crate::checks::orders::sets_position;
+use crate::checks::traffic::{
     Traffic, actions, broken, elements, maybe_restarted, outside_influence, quote, state, text, to_vehicle,
 };
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// See the module.
-pub(super) const LAST_NODE_PLACE: Check = Check {
+pub(in crate::checks) const LAST_NODE_PLACE: Check = Check {
     name: "state/last-node-place",
     decides: &["STATE-MSG-04"],
     doc: "A vehicle that stands after a cancelOrder or a startPause has come nearer to the node that has just become its \
@@ -153,7 +153,7 @@ impl Running for LastNodePlace {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn at(x: f64, node: &str) -> Value {
         json!({

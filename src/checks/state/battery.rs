@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, state};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::traffic::{Traffic, broken, state};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 
 /// See the module.
-pub(super) const LEVELS: Check = Check {
+pub(in crate::checks) const LEVELS: Check = Check {
     name: "state/battery-levels",
     decides: &["STATE-MSG-16"],
     doc: "When a run shows exactly two charges, each more than once and at least 30 points apart, the vehicle knows \
@@ -77,7 +77,7 @@ impl Running for Levels {
 mod tests {
     use serde_json::json;
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn judge(charges: &[f64]) -> Vec<String> {
         let mut trace = Trace::subscriber();

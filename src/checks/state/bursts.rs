@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::traffic::{HEADER, Traffic, broken, is_to_vehicle, lag, outside_influence, state, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::traffic::{HEADER, Traffic, broken, is_to_vehicle, lag, outside_influence, state, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 
 /// See the module.
-pub(super) const BURSTS: Check = Check {
+pub(in crate::checks) const BURSTS: Check = Check {
     name: "state/bursts",
     decides: &["STATE-11"],
     doc: "No more than four states within a quarter of a second say the same but for header, position, velocity and \
@@ -86,7 +86,7 @@ impl Running for Bursts {
 mod tests {
     use serde_json::json;
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn states(gap: f64, changing: bool) -> Trace {
         let mut trace = Trace::subscriber();

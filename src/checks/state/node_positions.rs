@@ -4,10 +4,10 @@ use std::collections::{BTreeSet, VecDeque};
 
 use serde_json::Value;
 
-use super::orders::number;
-use super::state_route::Shown;
-use super::traffic::{broken, elements, quote, remark, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use super::route::Shown;
+use crate::checks::orders::number;
+use crate::checks::traffic::{broken, elements, quote, remark, text, to_vehicle};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// How many order messages, and nodes of one, are kept in mind.
@@ -17,7 +17,7 @@ const NODES: usize = 1024;
 const BESIDE: f64 = 0.1;
 
 /// `state/node-positions`.
-pub(super) const NODE_POSITIONS: Check = Check {
+pub(in crate::checks) const NODE_POSITIONS: Check = Check {
     name: "state/node-positions",
     decides: &["ORD-FLOW-06"],
     doc: "Where nodeStates give a nodePosition, x, y and mapId are those of the order, but for ten centimetres. A vehicle that \
@@ -27,7 +27,7 @@ pub(super) const NODE_POSITIONS: Check = Check {
 };
 
 /// `state/joint-position`.
-pub(super) const JOINT_POSITION: Check = Check {
+pub(in crate::checks) const JOINT_POSITION: Check = Check {
     name: "state/joint-position",
     decides: &["ORD-UPD-07"],
     doc: "A node that was sent twice, at different places, keeps the place of its first transmission where nodeStates give a \
@@ -180,7 +180,7 @@ impl Running for NodePositions {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn node(id: &str, sequence: u64, x: f64) -> Value {
         json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [],

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, actions, broken, elements, quote, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::traffic::{Traffic, actions, broken, elements, quote, state, text, to_vehicle};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// How many actionIds are kept in mind, and how many of one message are looked at.
@@ -16,7 +16,7 @@ const IDS: usize = 8192;
 const BEGINNING: usize = 8;
 
 /// See the module.
-pub(super) const ACTION_IDS: Check = Check {
+pub(in crate::checks) const ACTION_IDS: Check = Check {
     name: "state/action-ids",
     decides: &["STATE-MSG-14"],
     doc: "actionStates list no actionId that was never sent and is the beginning, of at least eight characters, of one that \
@@ -95,7 +95,7 @@ impl Running for ActionIds {
 mod tests {
     use serde_json::json;
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn listed(id: &str) -> Vec<String> {
         let mut trace = Trace::subscriber();

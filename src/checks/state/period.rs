@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::topic::looks_like;
-use super::traffic::{Traffic, broken, device_publish, outside_influence, remark, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::topic::looks_like;
+use crate::checks::traffic::{Traffic, broken, device_publish, outside_influence, remark, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
@@ -19,7 +19,7 @@ use crate::verdict::Verdict;
 const MARGIN: Duration = Duration::from_secs(1);
 
 /// `state/period`.
-pub(super) const PERIOD: Check = Check {
+pub(in crate::checks) const PERIOD: Check = Check {
     name: "state/period",
     decides: &["STATE-02"],
     doc: "While the device is connected, a state follows the last one within time.statePeriod (30 s and a margin). An \
@@ -30,7 +30,7 @@ pub(super) const PERIOD: Check = Check {
 };
 
 /// `state/own-limits`.
-pub(super) const OWN_LIMITS: Check = Check {
+pub(in crate::checks) const OWN_LIMITS: Check = Check {
     name: "state/own-limits",
     decides: &["FACT-11", "FACT-14"],
     doc: "States keep the maxima that the device's own factsheet states for the arrays of a state, and its \
@@ -233,7 +233,7 @@ impl Running for OwnLimits {
 mod tests {
     use serde_json::json;
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
     use crate::journal::event::LinkFault;
 
     const CHECK: &str = "state/period";

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::state_driving::is_displaced;
-use super::traffic::{Traffic, broken, state, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use super::driving::is_displaced;
+use crate::checks::traffic::{Traffic, broken, state, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 
@@ -14,7 +14,7 @@ use crate::journal::Entry;
 const COMING_TO_REST: Duration = Duration::from_secs(10);
 
 /// See the module.
-pub(super) const PAUSE_STANDS: Check = Check {
+pub(in crate::checks) const PAUSE_STANDS: Check = Check {
     name: "state/pause-stands",
     decides: &["ACT-12"],
     doc: "A vehicle that reports paused reports driving false at the latest ten seconds later, and from then on until the \
@@ -71,7 +71,7 @@ impl Running for PauseStands {
 mod tests {
     use serde_json::json;
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn judge(driving: [bool; 4]) -> Vec<String> {
         let mut trace = Trace::subscriber();

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, quote, remark, state, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::traffic::{Traffic, broken, elements, quote, remark, state, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::journal::event::Event;
 
@@ -17,7 +17,7 @@ const ACTIONS: usize = 4096;
 const TYPES: usize = 512;
 
 /// `state/described-statuses`.
-pub(super) const STATUSES: Check = Check {
+pub(in crate::checks) const STATUSES: Check = Check {
     name: "state/described-statuses",
     decides: &["ACT-41"],
     doc: "A predefined action shows only the statuses that the text describes for it. WAITING and FAILED are always \
@@ -27,7 +27,7 @@ pub(super) const STATUSES: Check = Check {
 };
 
 /// `state/described-results`.
-pub(super) const RESULTS: Check = Check {
+pub(in crate::checks) const RESULTS: Check = Check {
     name: "state/described-results",
     decides: &["STATE-MSG-12"],
     doc: "An action whose result the factsheet describes is reported FINISHED with a resultDescription; a missing one \
@@ -138,7 +138,7 @@ impl Running for Results {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn action(kind: &str, status: &str) -> Value {
         json!({ "actionId": "x", "actionType": kind, "actionStatus": status })

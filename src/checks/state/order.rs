@@ -6,17 +6,17 @@ use std::collections::VecDeque;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::orders::number;
-use super::traffic::{Traffic, actions, broken, outside_influence, quote, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::continuity::Continuity;
+use crate::checks::orders::number;
+use crate::checks::traffic::{Traffic, actions, broken, outside_influence, quote, state, text, to_vehicle};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// How many orders on their way are kept in mind.
 const ORDERS: usize = 64;
 
 /// See the module.
-pub(super) const ORDER_KEPT: Check = Check {
+pub(in crate::checks) const ORDER_KEPT: Check = Check {
     name: "state/order-kept",
     decides: &["STATE-MSG-02", "ORD-CANCEL-08"],
     doc: "orderId is not emptied, and orderUpdateId does not go back, as long as no new order was sent, neither after a \
@@ -103,7 +103,7 @@ fn named(message: &Value) -> (String, u64) {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
     use crate::journal::event::LinkFault;
 
     fn shows(id: &str, update: u64, mode: &str) -> Value {

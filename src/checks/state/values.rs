@@ -7,9 +7,9 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
-use super::orders::Malformed;
-use super::traffic::{Traffic, broken, elements, quote, remark, state, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::orders::Malformed;
+use crate::checks::traffic::{Traffic, broken, elements, quote, remark, state, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// Beyond this many metres a coordinate is taken for another unit.
@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1.0e-3;
 const IDENTIFIERS_KEPT: usize = 256;
 
 /// `state/idle-empty`.
-pub(super) const IDLE_EMPTY: Check = Check {
+pub(in crate::checks) const IDLE_EMPTY: Check = Check {
     name: "state/idle-empty",
     decides: &["STATE-13", "STATE-MSG-02"],
     doc: "While there never was an order, nodeStates and edgeStates are empty and orderUpdateId is 0; without \
@@ -30,7 +30,7 @@ pub(super) const IDLE_EMPTY: Check = Check {
 };
 
 /// `state/position-range`.
-pub(super) const POSITION_RANGE: Check = Check {
+pub(in crate::checks) const POSITION_RANGE: Check = Check {
     name: "state/position-range",
     decides: &["MAP-02"],
     doc: "theta lies between minus pi and pi, and coordinates have the magnitude of metres, which is a warning.",
@@ -39,7 +39,7 @@ pub(super) const POSITION_RANGE: Check = Check {
 };
 
 /// `state/identifiers`.
-pub(super) const IDENTIFIERS: Check = Check {
+pub(in crate::checks) const IDENTIFIERS: Check = Check {
     name: "state/identifiers",
     decides: &["JSON-04"],
     doc: "Identifiers that the vehicle chooses itself or takes from its maps keep to the recommended characters.",
@@ -162,7 +162,7 @@ impl Running for Identifiers {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn judged(check: &str, states: &[Value]) -> Vec<String> {
         let mut trace = Trace::subscriber();

@@ -6,15 +6,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// How many maps and how many deleteMap actions are kept in mind.
 const LIMIT: usize = 1024;
 
 /// `state/maps`.
-pub(super) const MAPS: Check = Check {
+pub(in crate::checks) const MAPS: Check = Check {
     name: "state/maps",
     decides: &["MAP-07", "MAP-11", "MAP-14", "MAP-15", "MAP-31"],
     doc: "No pair of mapId and mapVersion is listed twice, at most one version of a mapId is ENABLED, agvPosition.mapId \
@@ -117,7 +117,7 @@ fn parameter(action: &Value, key: &str) -> String {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn maps(all: &[(&str, &str, &str)]) -> Value {
         let maps: Vec<Value> = all

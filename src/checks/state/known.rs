@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::orders::{Element, Malformed, last_node, may_abandon, number, read_elements};
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::continuity::Continuity;
+use crate::checks::orders::{Element, Malformed, last_node, may_abandon, number, read_elements};
+use crate::checks::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 
@@ -23,7 +23,7 @@ const REFUSALS: usize = 64;
 const CROSSING: Duration = Duration::from_secs(2);
 
 /// `state/order-known`.
-pub(super) const ORDER_KNOWN: Check = Check {
+pub(in crate::checks) const ORDER_KNOWN: Check = Check {
     name: "state/order-known",
     decides: &["STATE-MSG-02", "ORD-FLOW-06", "ORD-FLOW-09"],
     doc: "A vehicle that shows another orderId or orderUpdateId than before shows a pair that was sent to it. Judged in modes \
@@ -34,7 +34,7 @@ pub(super) const ORDER_KNOWN: Check = Check {
 };
 
 /// `state/update-id-rises`.
-pub(super) const UPDATE_ID_RISES: Check = Check {
+pub(in crate::checks) const UPDATE_ID_RISES: Check = Check {
     name: "state/update-id-rises",
     decides: &["ORD-REJ-10"],
     doc: "The orderUpdateId of an order that was not cancelled does not fall when an update with a lower one is sent. \
@@ -44,7 +44,7 @@ pub(super) const UPDATE_ID_RISES: Check = Check {
 };
 
 /// `state/order-not-replaced`.
-pub(super) const NOT_REPLACED: Check = Check {
+pub(in crate::checks) const NOT_REPLACED: Check = Check {
     name: "state/order-not-replaced",
     decides: &["ORD-FLOW-01", "ORD-FLOW-03"],
     doc: "An order that comes while the vehicle lists a horizon, or base that it has not come to since, is not shown, unless \
@@ -309,7 +309,7 @@ impl Running for OrderKnown {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::{Trace, merged};
+    use crate::checks::trace::{Trace, merged};
 
     fn order(id: &str, update: u64, nodes: &[(&str, bool)]) -> Value {
         let nodes = nodes.iter().enumerate().map(|(at, (node, released))| {

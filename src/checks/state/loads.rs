@@ -6,16 +6,16 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::traffic::{Delivered, Traffic, broken, elements, outside_influence, quote, state, text};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::continuity::Continuity;
+use crate::checks::traffic::{Delivered, Traffic, broken, elements, outside_influence, quote, state, text};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 
 /// How many loads, places and actions are looked at.
 const MANY: usize = 256;
 
 /// See the module.
-pub(super) const LOADS: Check = Check {
+pub(in crate::checks) const LOADS: Check = Check {
     name: "state/loads",
     decides: &["STATE-MSG-06", "FACT-09"],
     doc: "A vehicle that lists a load does not leave loads out as soon as it is rid of it: found when loads goes with a \
@@ -107,7 +107,7 @@ impl Running for Loads {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn state(load: Option<&[&str]>, drop: &str) -> Value {
         let mut state = json!({ "actionStates": [{ "actionId": "d", "actionStatus": drop }] });

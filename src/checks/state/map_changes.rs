@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::orders::sets_position;
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
-use super::{Check, CheckContext, CheckFinding, Running};
+use crate::checks::continuity::Continuity;
+use crate::checks::orders::sets_position;
+use crate::checks::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
+use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
 
@@ -18,7 +18,7 @@ use crate::journal::Entry;
 const LIMIT: usize = 1024;
 
 /// See the module.
-pub(super) const MAP_CHANGES: Check = Check {
+pub(in crate::checks) const MAP_CHANGES: Check = Check {
     name: "state/map-changes",
     decides: &["MAP-06", "MAP-20", "MAP-22", "MAP-24", "MAP-32"],
     doc: "An entry of maps appears only after a downloadMap of its mapId, and not as ENABLED unless it was asked for. Its \
@@ -232,7 +232,7 @@ impl Running for MapChanges {
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::trace::Trace;
+    use crate::checks::trace::Trace;
 
     fn maps(all: &[(&str, &str, bool)], ended: &[&str]) -> Value {
         let maps: Vec<Value> = all
