@@ -3,6 +3,45 @@
 //! The folder tree is the architecture; dependencies point one way, from the command line down to the
 //! verdict lattice (`tests/architecture.rs` holds them). Start reading at [`verdict`], then [`journal`],
 //! [`suite::model`] and [`judge`].
+//!
+//! # Test a device
+//!
+//! The device of a profile, over real sockets; [`run::SocketRun`] says what can be chosen:
+//!
+//! ```no_run
+//! use std::path::Path;
+//! use vda5050_tck::profile::{self, Surroundings};
+//! use vda5050_tck::run::{Library, Place, RunError, SocketRun};
+//!
+//! # fn main() -> Result<(), RunError> {
+//! let library = Library::load(None)?;
+//! let pack = library.rules.packs.latest();
+//! let surroundings = Surroundings::of_process();
+//! let profile = profile::load(Some(Path::new("device.toml")), &[], &surroundings)?;
+//! let run = SocketRun::of_profile(&profile, &library, pack, &surroundings, Place::default())?;
+//! let finished = run.carry_out_silently(&library, pack)?;
+//! println!("{:?}", finished.result.verdict);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A built-in device in virtual time, with one of its faults:
+//!
+//! ```
+//! use vda5050_tck::run::{Library, RunError, VirtualRun, run_silently};
+//! use vda5050_tck::verdict::Verdict;
+//!
+//! # fn main() -> Result<(), RunError> {
+//! let library = Library::load(None)?;
+//! let pack = library.rules.packs.latest();
+//! let mut run = VirtualRun::of(&library, pack);
+//! run.tests.retain(|test| test.id == "order-rejection/lower-update-id");
+//! run.faults = vec!["outdated-update-taken-over".to_owned()];
+//! let finished = run_silently(&library, pack, run)?;
+//! assert_eq!(finished.result.verdict, Some(Verdict::Fail));
+//! # Ok(())
+//! # }
+//! ```
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::engine::Watcher;
 use crate::journal::event::{Gate, Plan};
+use crate::link::mqtt::BenchInfo;
 use crate::result::TestResult;
 use crate::run;
 use crate::suite::model::{Step, Test, Verb};
@@ -81,5 +82,9 @@ impl run::Progress for Screen {
 
     fn note(&mut self, text: &str) {
         self.terminal.note(text);
+    }
+
+    fn expects_device(&mut self, bench: &BenchInfo) {
+        eprintln!("the device is expected at mqtt://{}", bench.device_address);
     }
 }

@@ -69,6 +69,8 @@ pub struct Engine<L, O> {
     /// Whether the postamble of a test tries to cancel what the test has left. Set to false once the device
     /// is known not to obey and there is another way to get it back.
     pub cancels: bool,
+    /// Map files the device can read; without one, ours are served.
+    pub map_files: Vec<bytes::Bytes>,
     /// When the last order was sent.
     last_order: Option<Moment>,
     interrupt: tokio::sync::watch::Receiver<bool>,
@@ -89,6 +91,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             recorder,
             composer,
             cancels: true,
+            map_files: Vec::new(),
             last_order: None,
             interrupt,
         }
@@ -410,7 +413,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             .current()
             .map(|test| test.bindings().clone())
             .unwrap_or_default();
-        let body = match map_file::content(serve, &bindings) {
+        let body = match map_file::content(serve, &bindings, &self.map_files) {
             Ok(body) => body,
             Err(why) => return Ok(StepEnd::Broken(why)),
         };

@@ -32,6 +32,8 @@ type Offers = Arc<Mutex<HashMap<String, Offer>>>;
 /// A running map server.
 pub struct MapServer {
     address: SocketAddr,
+    /// Host name in links; the address itself unless said.
+    host: Option<String>,
     offers: Offers,
     /// A port that is taken but not listened on, so that connections to it are refused.
     closed: TcpSocket,
@@ -45,11 +47,12 @@ struct Shared {
 }
 
 impl MapServer {
-    /// Opens the port and serves.
+    /// Opens the port and serves. Links name `host`, where the device knows this machine by another name than the one
+    /// listened on.
     ///
     /// # Errors
     /// [`LinkError::Listen`] when the port is taken.
-    pub(crate) async fn start(listen: &str, reporter: Reporter) -> Result<Self, LinkError> {
+    pub(crate) async fn start(listen: &str, host: Option<&str>, reporter: Reporter) -> Result<Self, LinkError> {
         let cannot = |error: io::Error| LinkError::Listen {
             address: listen.to_owned(),
             reason: error.to_string(),
@@ -76,6 +79,7 @@ impl MapServer {
         });
         Ok(Self {
             address,
+            host: host.map(str::to_owned),
             offers,
             closed,
             serving,
@@ -100,7 +104,16 @@ impl MapServer {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .insert(path.clone(), offer);
-        format!("http://{address}{path}")
+        let host = match &self.host {
+            // An IPv6 address stands in brackets.
+            Some(host) if host.contains(':') && !host.starts_with('[') => format!("[{host}]:{}", address.port()),
+            Some(host) => format!("{host}:{}", address.port()),
+            // Whoever asks from this machine reaches it here.
+            None if address.ip().is_unspecified() && address.is_ipv4() => format!("127.0.0.1:{}", address.port()),
+            None if address.ip().is_unspecified() => format!("[::1]:{}", address.port()),
+            None => address.to_string(),
+        };
+        format!("http://{host}{path}")
     }
 
     /// Closes the port.

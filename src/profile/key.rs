@@ -116,10 +116,6 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "At most six more maps fit into the vehicle.",
     },
     Statement {
-        name: "charges",
-        doc: "The vehicle can charge on the course.",
-    },
-    Statement {
         name: "extends-base",
         doc: "The master control releases a way of three edges in parts, and at first not all of it. So it is taken to be \
               unless the profile says otherwise.",
@@ -324,7 +320,6 @@ pub const KEYS: &[Key] = &[
     key("device.carries-load", Kind::Flag),
     key("device.map-hash", Kind::Flag),
     key("device.small-map-storage", Kind::Flag),
-    key("device.charges", Kind::Flag),
     key("device.room-beside-edges", Kind::Flag),
     key("device.extends-base", Kind::Flag),
     key("device.long-action", Kind::Action(Place::Anywhere)),

@@ -13,7 +13,7 @@ use crate::journal::event::{Capability, Gate};
 use crate::link::Vantage;
 use crate::pattern::{Term, TermKind};
 use crate::profile::{SAMPLE_ACTIONS, SampleKind};
-use crate::suite::model::{Need, SendAction, Test, Verb};
+use crate::suite::model::{Need, SendAction, ServeBehaviour, Test, Verb};
 
 /// Found out from the first state, and said by no profile.
 const ACTIVE_MAP: &str = "active-map";
@@ -33,8 +33,10 @@ pub struct Capabilities {
     pub vantage: Vantage,
     /// Names of the hooks that can be run.
     pub hooks: Vec<String>,
-    /// Whether the device can reach the map server.
-    pub maps: bool,
+    /// Whether the device can reach the map server; `Err` says why not.
+    pub maps: Result<(), String>,
+    /// Whether there is a map file that the device can read; `Err` says why not.
+    pub map_file: Result<(), String>,
     /// Whether the vehicle may drive; `Err` says why not.
     pub motion: Result<(), String>,
     /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
@@ -85,6 +87,11 @@ impl Capabilities {
         {
             open.get_or_insert_with(|| why.clone());
         }
+        if serves_a_map_to_read(test)
+            && let Err(why) = &self.map_file
+        {
+            open.get_or_insert_with(|| why.clone());
+        }
         open.map_or(Gate::Runs, Gate::Unobservable)
     }
 
@@ -92,8 +99,10 @@ impl Capabilities {
         match need {
             Need::Tap if self.vantage == Vantage::Tap => Gate::Runs,
             Need::Tap => Gate::Unobservable("it needs the device to connect through the tap".to_owned()),
-            Need::MapServer if self.maps => Gate::Runs,
-            Need::MapServer => Gate::Unobservable("the device cannot reach the map server".to_owned()),
+            Need::MapServer => match &self.maps {
+                Ok(()) => Gate::Runs,
+                Err(why) => Gate::Unobservable(why.clone()),
+            },
             Need::Hook(name) if self.hooks.iter().any(|hook| hook == name) => Gate::Runs,
             Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => Gate::NotApplicable(
                 format!("the profile says that the device has nothing for the hook `{name}`"),
@@ -265,6 +274,17 @@ impl Capabilities {
     }
 }
 
+/// Whether the device has to get on with a map file of ours; a transfer that fails needs no file that it could read.
+fn serves_a_map_to_read(test: &Test) -> bool {
+    let mut steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
+    steps.any(|step| match &step.verb {
+        Verb::Serve(serve) => {
+            serve.file.is_none() && matches!(serve.behaviour, ServeBehaviour::Well | ServeBehaviour::Slow)
+        }
+        _ => false,
+    })
+}
+
 fn literal(term: &Term) -> Option<&str> {
     match &term.kind {
         TermKind::Literal(Value::String(text)) => Some(text),
@@ -337,7 +357,8 @@ mod tests {
             claims: BTreeMap::new(),
             vantage: Vantage::Subscriber,
             hooks: Vec::new(),
-            maps: true,
+            maps: Ok(()),
+            map_file: Ok(()),
             motion: Ok(()),
             claims_add: true,
         }

@@ -114,13 +114,6 @@ impl ProfileHooks {
         }
     }
 
-    /// Ends the device the harness has started.
-    pub async fn stop_device(&mut self) {
-        if let Some(device) = &mut self.device {
-            device.stop().await;
-        }
-    }
-
     async fn carry_out(&mut self, hook: &Hook, values: &BTreeMap<String, String>) -> HookOutcome {
         let action = hook.action.filled(values);
         let outcome = match action {

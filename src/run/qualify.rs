@@ -12,7 +12,8 @@ use std::sync::{Arc, Mutex};
 
 use super::built_in::BuiltIn;
 use super::library::Library;
-use super::virtual_run::{Finished, VirtualRun, run_silently};
+use super::session::Finished;
+use super::virtual_run::{VirtualRun, run_silently};
 use crate::engine::EngineError;
 use crate::pack::{Pack, Role};
 use crate::reference::Fault;

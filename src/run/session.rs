@@ -14,12 +14,13 @@ use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
 use super::strikes::Strikes;
 use crate::course::Layout;
-use crate::engine::{Engine, EngineError, Operator, Watcher};
+use crate::engine::{Engine, EngineError, Operator, Recorder, Watcher};
 use crate::journal::event::{Event, Gate, Plan, PlannedTest};
 use crate::judge::RunJudge;
 use crate::link::Link;
+use crate::link::mqtt::BenchInfo;
 use crate::pack::Role;
-use crate::result::TestResult;
+use crate::result::{RunResult, TestResult};
 use crate::suite::model::Test;
 
 /// What a run is about.
@@ -36,12 +37,24 @@ pub struct Setup {
     pub layout: Option<Layout>,
     /// How many mock AGVs the harness has; none when an AGV is tested.
     pub vehicles: usize,
+    /// Map files the device can read; without one, ours are served.
+    pub maps: Vec<bytes::Bytes>,
     /// Deviations the profile declares.
     pub deviations: BTreeMap<String, String>,
     /// What restricts the statement from the start.
     pub limits: Vec<String>,
     /// Identifier of the run; makes ids unique.
     pub run: String,
+}
+
+/// A finished run.
+pub struct Finished {
+    /// How it ended.
+    pub end: End,
+    /// What came out.
+    pub result: RunResult,
+    /// Journal and judge.
+    pub recorder: Recorder,
 }
 
 /// How a run ended.
@@ -71,15 +84,20 @@ pub trait Progress: Watcher {
     fn test_ended(&mut self, result: &TestResult);
     /// Something worth knowing.
     fn note(&mut self, text: &str);
+    /// The bench stands, and a device that is not ours is expected there.
+    fn expects_device(&mut self, bench: &BenchInfo) {
+        let _ = bench;
+    }
 }
 
 /// Carries out a run. `saved` is called after every test, so that a crash loses nothing.
 pub async fn run<L: Link, O: Operator>(
     engine: &mut Engine<L, O>,
-    setup: Setup,
+    mut setup: Setup,
     progress: &mut dyn Progress,
     saved: &mut dyn FnMut(&RunJudge),
 ) -> End {
+    engine.map_files = std::mem::take(&mut setup.maps);
     let end = match Session::new(engine, setup, progress).carry_out(saved).await {
         Ok(end) => end,
         Err(error) => End::Broken(error),

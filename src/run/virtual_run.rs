@@ -6,13 +6,11 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 
 use super::built_in::BuiltIn;
-use super::capabilities::Capabilities;
-use super::fleet::Fleet;
-use super::header::HeaderParts;
 use super::library::Library;
 use super::reference_agv::ReferenceAgv;
 use super::reference_master_control::ReferenceMasterControl;
-use super::session::{End, Progress, Setup, run};
+use super::session::{Finished, Progress, run};
+use super::setup::{BenchFacts, DeviceUnderTest, Request};
 use crate::clock::{Moment, Stamp};
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, Occurrence};
@@ -21,7 +19,6 @@ use crate::judge::RunJudge;
 use crate::link::memory::{MemoryLink, MemoryOptions};
 use crate::link::{Link, LinkError, Vantage};
 use crate::pack::{Pack, Role};
-use crate::result::RunResult;
 use crate::suite::model::{Step, Test};
 
 /// What is run.
@@ -85,16 +82,6 @@ impl VirtualRun {
     }
 }
 
-/// A finished virtual run.
-pub struct Finished {
-    /// How it ended.
-    pub end: End,
-    /// What came out.
-    pub result: RunResult,
-    /// Journal and judge.
-    pub recorder: Recorder,
-}
-
 /// Hooks are commands to the device on the bus.
 struct OnTheBus(&'static [&'static str]);
 
@@ -149,54 +136,29 @@ pub async fn run_virtually(
     for mock in device.mock_peers() {
         link.add_own_peer(mock);
     }
-    let vehicles = device.fleet().map_or_else(Vec::new, |fleet| fleet.mock_vehicles(pack));
-    let mocks = vehicles.len();
-    let header = HeaderParts {
-        subject: device.subject(),
-        pack,
-        run: &request.run,
-        vantage: request.vantage,
-        suites: &library.rules.sha256,
-        modified: library.assets.modified(),
-        time: device.time().bindings(),
-        device: device.device_bindings(),
-        vehicles,
-        fleet: device.fleet().map_or_else(Vec::new, Fleet::bindings),
-        settings: Vec::new(),
-        command: request.command.clone(),
-    };
-    let first = Occurrence::harness(
-        link.now(),
-        Event::RunBegun {
-            header: Box::new(header.header()),
-        },
-    );
-    let recorder = Recorder::begin(&library.rules, writer, first)?;
-    let composer = Composer::new(&request.run);
     let operator = OnTheBus(device.hooks());
-    let hooks = operator.hooks();
-    let mut engine = Engine::new(link, operator, recorder, composer, interrupt);
-    let setup = Setup {
+    let mut tested = DeviceUnderTest::built_in(device, true);
+    if let Err(why) = &request.motion {
+        tested.stand_still(why);
+    }
+    let bench = BenchFacts {
+        vantage: request.vantage,
+        hooks: operator.hooks(),
+        maps: Ok(()),
+    };
+    let composer = Composer::new(&request.run);
+    let asked = Request {
         tests: request.tests,
         complete: request.complete,
         draw: request.draw,
-        capabilities: Capabilities {
-            factsheet: None,
-            statements: device.statements(),
-            samples: device.device_bindings(),
-            claims: std::collections::BTreeMap::new(),
-            vantage: request.vantage,
-            hooks,
-            maps: true,
-            motion: request.motion,
-            claims_add: true,
-        },
-        layout: Some(device.layout().clone()),
-        vehicles: mocks,
-        deviations: std::collections::BTreeMap::new(),
-        limits: vec![device.limit(true)],
-        run: request.run.clone(),
+        run: request.run,
+        command: request.command,
     };
+    let (header, setup) = tested.on(bench, asked, library, pack);
+    let header = Box::new(header);
+    let first = Occurrence::harness(link.now(), Event::RunBegun { header });
+    let recorder = Recorder::begin(&library.rules, writer, first)?;
+    let mut engine = Engine::new(link, operator, recorder, composer, interrupt);
     let end = run(&mut engine, setup, progress, saved).await;
     let recorder = engine.recorder;
     Ok(Finished {

@@ -73,14 +73,68 @@ fn a_device_killed_in_the_middle_of_a_test_leaves_the_rest_undecided() {
     bench.is_whole();
 }
 
+/// A reference AGV that the harness starts itself.
+fn started_by_the_harness() -> String {
+    let tool = env!("CARGO_BIN_EXE_vda5050-tck");
+    format!(
+        "command = [{tool:?}, \"simulate\", \"agv\", \"--broker\", \"mqtt://{{broker-host}}:{{broker-port}}\", \
+         \"--manufacturer\", \"{{manufacturer}}\", \"--serial\", \"{{serial-number}}\"]"
+    )
+}
+
+#[test]
+fn links_to_maps_name_the_host_of_the_profile_and_lead_to_its_files() {
+    let bench = Bench::new();
+    let map = bench.path().join("hall.map");
+    std::fs::write(&map, "resolution 0.05\n").unwrap();
+    let profile = Profile {
+        device: started_by_the_harness(),
+        bench: "maps-listen = \"0.0.0.0:0\"\nmaps-host = \"127.0.0.2\"".to_owned(),
+        more: format!("[maps]\nfiles = [{map:?}]"),
+        ..Profile::default()
+    };
+    let (run, _) = bench.start(&profile, &["maps/download"]);
+    run.end().code(0);
+    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    assert!(
+        journal.contains("\"url\":\"http://127.0.0.2:"),
+        "the link names another host"
+    );
+    let sha256 = "5d60c106967c72309233e066016751f08d3f24360498f93d62c11f571c743547";
+    assert!(journal.contains(sha256), "another file was served");
+    bench.is_whole();
+}
+
+#[test]
+fn without_a_map_that_the_device_can_read_or_reach_nobody_is_accused_of_a_download() {
+    let reasons = [
+        ("", "", "the profile names no map file"),
+        (
+            "maps-listen = \"0.0.0.0:0\"",
+            "[maps]\nfiles = [\"device.toml\"]",
+            "no device can fetch a map from 0.0.0.0",
+        ),
+    ];
+    for (settings, more, reason) in reasons {
+        let bench = Bench::new();
+        let profile = Profile {
+            device: started_by_the_harness(),
+            bench: settings.to_owned(),
+            more: more.to_owned(),
+            ..Profile::default()
+        };
+        let (run, _) = bench.start(&profile, &["maps/download"]);
+        run.end().code(3);
+        let test = &bench.result()["tests"][0];
+        assert_eq!(test["verdict"], "inconclusive", "{test}");
+        assert!(test["reason"].as_str().unwrap().contains(reason), "{test}");
+    }
+}
+
 #[test]
 fn a_device_that_is_started_again_by_the_harness_is_judged_on() {
-    let tool = env!("CARGO_BIN_EXE_vda5050-tck");
     let profile = Profile {
-        device: format!(
-            "command = [{tool:?}, \"simulate\", \"agv\", \"--broker\", \"mqtt://{{broker-host}}:{{broker-port}}\", \
-             \"--manufacturer\", \"{{manufacturer}}\", \"--serial\", \"{{serial-number}}\"]"
-        ),
+        device: started_by_the_harness(),
         more: "[hooks.power-cycle]\nbuiltin = \"restart-command\"".to_owned(),
         ..Profile::default()
     };

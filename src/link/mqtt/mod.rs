@@ -86,6 +86,8 @@ pub struct BenchOptions {
     pub tls: Option<TlsFiles>,
     /// Where the map server listens.
     pub maps_listen: String,
+    /// Host name in the links to map files, as the device knows this machine; where the map server listens unless said.
+    pub maps_host: Option<String>,
     /// Topic filters of the standing subscription: the topics of the device.
     pub device_topics: Vec<String>,
     /// The clock of the run.
@@ -102,6 +104,7 @@ impl BenchOptions {
             tap: true,
             tls: None,
             maps_listen: "127.0.0.1:0".to_owned(),
+            maps_host: None,
             device_topics,
             clock: WallClock::start(),
         }
@@ -152,7 +155,7 @@ impl MqttBench {
             tls: endpoint.tls.clone(),
             embedded: embedded.is_some(),
         };
-        let maps = MapServer::start(&options.maps_listen, reporter.clone()).await?;
+        let maps = MapServer::start(&options.maps_listen, options.maps_host.as_deref(), reporter.clone()).await?;
         self_test(&endpoint).await?;
         let run = uuid::Uuid::new_v4().simple().to_string();
         let standing = standing(&endpoint, &run, &options, &reporter).await?;

@@ -1,0 +1,493 @@
+//! A run over real sockets: the bench is put up, the device of a profile is awaited or a built-in one is started, and all
+//! is taken down again.
+
+use std::collections::BTreeMap;
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde_json::{Map, Value};
+
+use super::built_in::{BuiltIn, UnknownName};
+use super::device_driver::RunningDevice;
+use super::hooks::{DeviceProcess, ProfileHooks};
+use super::library::Library;
+use super::running_fleet::WithFleet;
+use super::session::{Finished, Progress, run};
+use super::setup::{BenchFacts, DeviceUnderTest, Request};
+use super::virtual_run::Silent;
+use crate::clock::WallClock;
+use crate::diagnostic::Diagnostic;
+use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, RecordError, Recorder};
+use crate::journal::event::{Event, Occurrence};
+use crate::journal::file::JournalWriter;
+use crate::judge::RunJudge;
+use crate::link::mqtt::endpoint::{Credentials, Endpoint};
+use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
+use crate::link::{LinkError, Vantage};
+use crate::pack::Pack;
+use crate::profile::{self, Effective, Profile, Surroundings};
+use crate::tap::tls::TlsFiles;
+
+/// A run over real sockets.
+pub struct SocketRun {
+    /// What is known of the device.
+    pub device: DeviceUnderTest,
+    /// What is run.
+    pub request: Request,
+    /// How the bench is put up.
+    pub options: BenchOptions,
+    /// How the device comes to be there.
+    source: Source,
+    /// Whether the device can reach the map server; `Err` says why not.
+    maps: Result<(), String>,
+    /// Where a device prints that the harness starts itself.
+    pub device_log: Option<PathBuf>,
+}
+
+/// Where the device comes from.
+#[expect(clippy::large_enum_variant, reason = "there is one in a process")]
+enum Source {
+    BuiltIn {
+        device: BuiltIn,
+        faults: Vec<String>,
+    },
+    Profile {
+        profile: Profile,
+        folder: PathBuf,
+        attended: bool,
+    },
+}
+
+/// Why a run could not begin or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The profile is wrong, or a file that it names.
+    #[error("{}", titles(.0))]
+    Profile(Vec<Diagnostic>),
+    /// The built-in device has nothing of that name.
+    #[error(transparent)]
+    Unknown(#[from] UnknownName),
+    /// Ports, broker or certificates.
+    #[error(transparent)]
+    Bench(#[from] LinkError),
+    /// The journal cannot be written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The run cannot be carried out.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// The device cannot be started, or no port is free for it.
+    #[error(transparent)]
+    Device(#[from] std::io::Error),
+}
+
+fn titles(all: &[Diagnostic]) -> String {
+    let titles: Vec<String> = all.iter().map(ToString::to_string).collect();
+    titles.join("\n")
+}
+
+impl From<Vec<Diagnostic>> for RunError {
+    fn from(all: Vec<Diagnostic>) -> Self {
+        Self::Profile(all)
+    }
+}
+
+impl SocketRun {
+    /// All tests against a built-in device on loopback; in a hurry, and with these faults.
+    #[must_use]
+    pub fn built_in(mut device: BuiltIn, faults: &[String], library: &Library, pack: &Pack) -> Self {
+        device.hurry();
+        let tested = DeviceUnderTest::built_in(&device, false);
+        Self {
+            request: Request::all(device.role(), library, pack),
+            options: BenchOptions::loopback(tested.published(pack)),
+            device: tested,
+            source: Source::BuiltIn {
+                device,
+                faults: faults.to_vec(),
+            },
+            maps: Ok(()),
+            device_log: None,
+        }
+    }
+
+    /// All tests against the device of a profile. Its hooks are run in `folder`; `attended` says whether there is a
+    /// person who can be asked.
+    ///
+    /// # Errors
+    /// What the profile lacks, and files or a password that it names and that are not there.
+    pub fn of_profile(
+        effective: &Effective,
+        library: &Library,
+        pack: &Pack,
+        surroundings: &Surroundings,
+        place: Place,
+    ) -> Result<Self, Vec<Diagnostic>> {
+        let profile = &effective.profile;
+        let device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
+        let options = bench_of(profile, device.published(pack), surroundings)?;
+        let maps = match device.fleet {
+            Some(_) => Ok(()),
+            None => reach(&options, profile.device.command.is_some()),
+        };
+        Ok(Self {
+            request: Request::all(profile.device.role, library, pack),
+            options,
+            device,
+            source: Source::Profile {
+                profile: profile.clone(),
+                folder: place.folder,
+                attended: place.attended,
+            },
+            maps,
+            device_log: None,
+        })
+    }
+
+    /// The same on this thread until it is over, with nobody watching and without a bundle.
+    ///
+    /// # Errors
+    /// When it cannot begin.
+    pub fn carry_out_silently(self, library: &Library, pack: &Pack) -> Result<Finished, RunError> {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()?;
+        let (_keep, interrupt) = tokio::sync::watch::channel(false);
+        let finished = runtime.block_on(self.carry_out(library, pack, None, interrupt, &mut Silent, &mut |_| {}));
+        // Sockets of a silent peer must not keep it from ending.
+        runtime.shutdown_background();
+        finished
+    }
+
+    /// Puts the bench up, carries the run out and takes everything down again.
+    ///
+    /// # Errors
+    /// When it cannot begin. What breaks later is how the run ended.
+    pub async fn carry_out(
+        self,
+        library: &Library,
+        pack: &Pack,
+        writer: Option<JournalWriter>,
+        interrupt: tokio::sync::watch::Receiver<bool>,
+        progress: &mut dyn Progress,
+        saved: &mut dyn FnMut(&RunJudge),
+    ) -> Result<Finished, RunError> {
+        let clock = self.options.clock;
+        let vantage = if self.options.tap {
+            Vantage::Tap
+        } else {
+            Vantage::Subscriber
+        };
+        let (link, info) = MqttBench::start(self.options).await?;
+        let stage = Stage {
+            library,
+            pack,
+            writer,
+            interrupt,
+            device: self.device,
+            request: self.request,
+            maps: self.maps,
+            vantage,
+            clock,
+        };
+        match self.source {
+            Source::BuiltIn { device, faults } => {
+                let faults: Vec<&str> = faults.iter().map(String::as_str).collect();
+                let endpoint = Endpoint::parse(&info.device_address, None, None)?;
+                let operator = Commands {
+                    device: device.start(&faults, endpoint, clock)?,
+                    hooks: device.hooks(),
+                };
+                stage.run(link, &info, operator, progress, saved).await
+            }
+            Source::Profile {
+                profile,
+                folder,
+                attended,
+            } => {
+                let operator = hooks(&profile, &info, self.device_log, folder, attended)?;
+                progress.expects_device(&info);
+                stage.run(link, &info, operator, progress, saved).await
+            }
+        }
+    }
+}
+
+/// What belongs to a profile and does not stand in it.
+#[derive(Clone, Debug, Default)]
+pub struct Place {
+    /// Where its commands are run.
+    pub folder: PathBuf,
+    /// Whether a person can be asked.
+    pub attended: bool,
+    /// How many mock AGVs a master control gets at least; the usual number unless said.
+    pub vehicles: Option<usize>,
+}
+
+/// Everything but link and operator.
+struct Stage<'a> {
+    library: &'a Library,
+    pack: &'a Pack,
+    writer: Option<JournalWriter>,
+    interrupt: tokio::sync::watch::Receiver<bool>,
+    device: DeviceUnderTest,
+    request: Request,
+    maps: Result<(), String>,
+    vantage: Vantage,
+    clock: WallClock,
+}
+
+impl Stage<'_> {
+    async fn run<O: Operator>(
+        self,
+        link: MqttLink,
+        info: &BenchInfo,
+        operator: O,
+        progress: &mut dyn Progress,
+        saved: &mut dyn FnMut(&RunJudge),
+    ) -> Result<Finished, RunError> {
+        let bench = BenchFacts {
+            vantage: self.vantage,
+            hooks: operator.hooks(),
+            maps: self.maps,
+        };
+        let fleet = self.device.fleet.clone();
+        let composer = Composer::new(&self.request.run);
+        let (header, setup) = self.device.on(bench, self.request, self.library, self.pack);
+        let header = Box::new(header);
+        let first = Occurrence::harness(self.clock.now(), Event::RunBegun { header });
+        let recorder = Recorder::begin(&self.library.rules, self.writer, first)?;
+        let operator = match &fleet {
+            None => WithFleet::alone(operator),
+            Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter())
+                .map_err(|unknown| UnknownName(unknown.to_string()))?,
+        };
+        let mut engine = Engine::new(link, operator, recorder, composer, self.interrupt);
+        let end = run(&mut engine, setup, progress, saved).await;
+        let Engine {
+            link,
+            recorder,
+            operator,
+            ..
+        } = engine;
+        operator.stop().await;
+        link.stop().await;
+        Ok(Finished {
+            result: recorder.judge().result(),
+            end,
+            recorder,
+        })
+    }
+}
+
+/// The bench that a profile describes.
+fn bench_of(profile: &Profile, topics: Vec<String>, surroundings: &Surroundings) -> Result<BenchOptions, Diagnostic> {
+    let bench = &profile.bench;
+    let password = bench.password.password(surroundings);
+    let password = password.map_err(|error| Diagnostic::whole("password", error.to_string()))?;
+    let credentials = bench.username.clone().map(|username| Credentials {
+        username,
+        password: password
+            .map(|password| password.reveal().to_owned())
+            .unwrap_or_default(),
+    });
+    Ok(BenchOptions {
+        listen: bench.listen.clone(),
+        broker: match &bench.broker {
+            None => BrokerChoice::Embedded,
+            Some(url) => BrokerChoice::External {
+                url: url.clone(),
+                authority: bench.tls_ca.clone(),
+                credentials,
+            },
+        },
+        tap: bench.tap,
+        tls: match (&bench.tls_cert, &bench.tls_key) {
+            (Some(certificate), Some(key)) => Some(TlsFiles {
+                certificate: certificate.clone(),
+                key: key.clone(),
+            }),
+            _ => None,
+        },
+        maps_listen: bench.maps_listen.clone(),
+        maps_host: bench.maps_host.clone(),
+        ..BenchOptions::loopback(topics)
+    })
+}
+
+/// Whether a device that connects to this bench can fetch a file from its map server; `Err` says why not. One that the
+/// harness starts runs on this machine.
+fn reach(options: &BenchOptions, starts_device: bool) -> Result<(), String> {
+    let host = bench
+        .maps_host
+        .as_deref()
+        .unwrap_or_else(|| host_of(&options.maps_listen));
+    if is_any(host) {
+        return Err(format!(
+            "no device can fetch a map from {host} ([bench] maps-host is the name of this machine as the device knows it)"
+        ));
+    }
+    let meets_at = match (&options.broker, options.tap) {
+        (BrokerChoice::External { url, .. }, false) => {
+            let (_, rest) = url.split_once("://").unwrap_or(("", url));
+            host_of(rest)
+        }
+        _ => host_of(&options.listen),
+    };
+    if is_this_machine(host) && !is_this_machine(meets_at) && !starts_device {
+        return Err(format!(
+            "a device that connects to {meets_at} cannot fetch a map from {host} ([bench] maps-listen and maps-host)"
+        ));
+    }
+    Ok(())
+}
+
+fn host_of(address: &str) -> &str {
+    let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
+    host.trim_start_matches('[').trim_end_matches(']')
+}
+
+fn is_any(host: &str) -> bool {
+    host.parse::<IpAddr>().is_ok_and(|address| address.is_unspecified())
+}
+
+fn is_this_machine(host: &str) -> bool {
+    host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+}
+
+/// The hooks of a profile; starts the device if the profile says how.
+fn hooks(
+    profile: &Profile,
+    info: &BenchInfo,
+    device_log: Option<PathBuf>,
+    folder: PathBuf,
+    attended: bool,
+) -> std::io::Result<ProfileHooks> {
+    let (host, port) = info
+        .device_address
+        .rsplit_once(':')
+        .unwrap_or((&info.device_address, "1883"));
+    let device = &profile.device;
+    let common: BTreeMap<String, String> = [
+        ("broker-host", host.to_owned()),
+        ("broker-port", port.to_owned()),
+        ("manufacturer", device.manufacturer.clone().unwrap_or_default()),
+        ("serial-number", device.serial_number.clone().unwrap_or_default()),
+        (
+            "vehicle",
+            profile.vehicles.serial_numbers.first().cloned().unwrap_or_default(),
+        ),
+        ("free-port", free_port()?),
+    ]
+    .into_iter()
+    .map(|(name, value)| (name.to_owned(), value))
+    .collect();
+    let mut process = device.command.as_ref().map(|command| {
+        let filled = command
+            .iter()
+            .map(|word| profile::fill(word, &common, str::to_owned))
+            .collect();
+        DeviceProcess::new(filled, folder.clone(), device_log)
+    });
+    if let Some(process) = &mut process {
+        process.start()?;
+    }
+    Ok(ProfileHooks::new(
+        profile.hooks.clone(),
+        common,
+        folder,
+        process,
+        attended,
+    ))
+}
+
+/// Ports below those that an operating system gives to outgoing connections: what one of them is given is not free any
+/// more when the device is started again.
+const OWN_PORTS: std::ops::Range<u32> = 20_000..32_000;
+
+/// A port of this machine that nobody uses now. Harnesses that start at the same time begin to look in different places.
+fn free_port() -> std::io::Result<String> {
+    let span = OWN_PORTS.end - OWN_PORTS.start;
+    let first = std::process::id().wrapping_mul(97) % span;
+    for step in 0..100 {
+        let port = OWN_PORTS.start + (first + step) % span;
+        if std::net::TcpListener::bind(format!("127.0.0.1:{port}")).is_ok() {
+            return Ok(port.to_string());
+        }
+    }
+    let address = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?;
+    Ok(address.port().to_string())
+}
+
+/// Hooks of the built-in device: commands to its driver.
+struct Commands {
+    device: RunningDevice,
+    hooks: &'static [&'static str],
+}
+
+impl Operator for Commands {
+    fn hooks(&self) -> Vec<String> {
+        self.hooks.iter().map(|hook| (*hook).to_owned()).collect()
+    }
+
+    async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome {
+        if !self.hooks.contains(&hook) {
+            return HookOutcome::Missing;
+        }
+        if self.device.command(hook, Value::Object(parameters)).await {
+            HookOutcome::Done("done by the built-in device".to_owned())
+        } else {
+            HookOutcome::Failed("the built-in device is not running any more".to_owned())
+        }
+    }
+
+    fn usual_time(&self) -> Duration {
+        Duration::from_millis(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bench(listen: &str, maps_listen: &str, maps_host: Option<&str>) -> BenchOptions {
+        BenchOptions {
+            listen: listen.to_owned(),
+            maps_listen: maps_listen.to_owned(),
+            maps_host: maps_host.map(str::to_owned),
+            ..BenchOptions::loopback(Vec::new())
+        }
+    }
+
+    #[test]
+    fn a_device_elsewhere_reaches_no_map_on_loopback() {
+        let elsewhere = |maps_listen, maps_host| reach(&bench("192.168.1.20:1883", maps_listen, maps_host), false);
+        assert!(elsewhere("127.0.0.1:0", None).is_err());
+        assert!(elsewhere("0.0.0.0:0", None).is_err());
+        assert!(elsewhere("0.0.0.0:0", Some("localhost")).is_err());
+        assert!(elsewhere("[::]:0", None).is_err());
+        assert!(elsewhere("0.0.0.0:0", Some("192.168.1.20")).is_ok());
+        assert!(elsewhere("192.168.1.20:0", None).is_ok());
+    }
+
+    #[test]
+    fn a_device_on_this_machine_reaches_them() {
+        assert!(reach(&bench("127.0.0.1:1883", "127.0.0.1:0", None), false).is_ok());
+        assert!(reach(&bench("192.168.1.20:1883", "127.0.0.1:0", None), true).is_ok());
+        assert!(reach(&bench("[::1]:1883", "[::1]:0", None), false).is_ok());
+    }
+
+    #[test]
+    fn without_a_tap_it_is_where_the_broker_is() {
+        let mut bench = bench("127.0.0.1:1883", "127.0.0.1:0", None);
+        bench.tap = false;
+        bench.broker = BrokerChoice::External {
+            url: "mqtt://192.168.1.10:1883".to_owned(),
+            authority: None,
+            credentials: None,
+        };
+        assert!(reach(&bench, false).is_err());
+    }
+}
