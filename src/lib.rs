@@ -45,6 +45,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod bench;
 pub mod broker;
 pub mod checks;
 pub mod cli;
@@ -64,6 +65,7 @@ pub mod reference;
 pub mod report;
 pub mod result;
 pub mod run;
+pub mod simulate;
 pub mod suite;
 pub mod tap;
 pub mod ui;

@@ -11,7 +11,7 @@ use mqtt5::broker::{BrokerShutdownHandle, MqttBroker};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-use crate::link::LinkError;
+use crate::bench::LinkError;
 
 pub use self_test::self_test;
 

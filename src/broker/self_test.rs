@@ -7,9 +7,9 @@ use bytes::Bytes;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use crate::link::mqtt::client::{Client, ClientEvent, ClientOptions};
-use crate::link::mqtt::endpoint::Endpoint;
-use crate::link::{LinkError, Outgoing};
+use crate::bench::client::{Client, ClientEvent, ClientOptions};
+use crate::bench::endpoint::Endpoint;
+use crate::bench::{LinkError, Outgoing};
 
 /// How long each message may take.
 const LIMIT: Duration = Duration::from_secs(5);

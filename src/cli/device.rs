@@ -6,7 +6,8 @@ use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
 use crate::pack::{Pack, Role};
 use crate::profile::Effective;
-use crate::run::{BuiltIn, Library};
+use crate::run::Library;
+use crate::simulate::BuiltIn;
 
 /// The protocol version the device is judged by.
 pub(super) fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Problem> {

@@ -14,7 +14,8 @@ use crate::pack::{Pack, Requirement, Role};
 use crate::profile::{HOOKS, VEHICLE_WORDS};
 use crate::reference::Fault;
 use crate::report::coverage;
-use crate::run::{BuiltIn, Library, sources};
+use crate::run::{Library, sources};
+use crate::simulate::BuiltIn;
 use crate::suite::model::{Monitor, Rule, Test, Verb};
 use crate::ui::{self, Output};
 

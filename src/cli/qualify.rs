@@ -8,7 +8,8 @@ use super::exit::Exit;
 use super::problem::Problem;
 use crate::pack::Role;
 use crate::reference::Fault;
-use crate::run::{BuiltIn, Library, Qualification, qualify_tests};
+use crate::run::{Library, Qualification, qualify_tests};
+use crate::simulate::BuiltIn;
 
 /// `qualify`.
 pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {

@@ -17,12 +17,11 @@ use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::judge::RunJudge;
 use crate::link::mqtt::BrokerChoice;
+use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{self, Effective, Surroundings};
-use crate::run::{
-    BuiltIn, Bundle, Library, Place, ReferenceAgv, ReferenceMasterControl, Request, RunError, SocketRun, Subject,
-    USUAL_FLEET, VirtualRun, run_virtually, write_result,
-};
+use crate::run::{Bundle, Library, Place, Request, RunError, SocketRun, VirtualRun, run_virtually, write_result};
+use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
 /// What `run` and `certify` have in common.
 struct Job {
@@ -78,13 +77,13 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
     let altered = !arguments.fault.is_empty()
         || !arguments.tolerance.is_empty()
-        || arguments.vehicle.0 != crate::run::Vehicle::default();
+        || arguments.vehicle.0 != crate::simulate::Vehicle::default();
     if !built_in && altered {
         let title = "`--fault`, `--tolerance` and `--vehicle` are for the built-in device, and another device is tested \
                      here";
         return Err(Diagnostic::whole("usage", title).into());
     }
-    if role == Role::MasterControl && arguments.vehicle.0 != crate::run::Vehicle::default() {
+    if role == Role::MasterControl && arguments.vehicle.0 != crate::simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
     }
@@ -187,7 +186,7 @@ fn interrupts() -> watch::Receiver<bool> {
 }
 
 impl Job {
-    fn bundle(&self, subject: &Subject, utc: jiff::Timestamp) -> Result<Bundle, Problem> {
+    fn bundle(&self, subject: &Participant, utc: jiff::Timestamp) -> Result<Bundle, Problem> {
         let bundle = Bundle::create(
             &self.output.out,
             &subject.manufacturer,
@@ -306,7 +305,7 @@ impl Job {
         self.conclude(&bundle, finished, terminal)
     }
 
-    fn screen(&self, device: &Subject) -> Screen {
+    fn screen(&self, device: &Participant) -> Screen {
         let results = self.output.format == args::Format::Text;
         if self.output.verbose > 0 {
             for setting in &self.effective.settings {

@@ -9,13 +9,14 @@ use super::args::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMa
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
+use crate::bench::endpoint::{Credentials, Endpoint};
 use crate::clock::WallClock;
 use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
-use crate::link::mqtt::endpoint::{Credentials, Endpoint};
 use crate::pack::{Pack, Role};
-use crate::run::device_driver::RunningDevice;
-use crate::run::{BuiltIn, Fleet, HookServer, Library, ReferenceAgv, ReferenceMasterControl};
+use crate::run::Library;
+use crate::simulate::driver::RunningDevice;
+use crate::simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl};
 
 /// `simulate`.
 pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
@@ -162,7 +163,7 @@ fn configured(device: &SimulatedMasterControl, pack: &Pack) -> Result<ReferenceM
         return Ok(ReferenceMasterControl::new(pack));
     }
     let fleet = if names.is_empty() {
-        Fleet::new(&like, "vda5050-tck", &[], crate::run::USUAL_FLEET, pack)
+        Fleet::new(&like, "vda5050-tck", &[], crate::simulate::USUAL_FLEET, pack)
     } else {
         Fleet::named(&like, &names, pack)
     };

@@ -8,9 +8,9 @@ use serde_json::{Map, Value, json};
 
 use super::ids::IdForm;
 use super::route::{RouteBuilder, SentOrders};
+use crate::bench::Outgoing;
 use crate::clock::Stamp;
 use crate::judge::Ground;
-use crate::link::Outgoing;
 use crate::pattern::{Bindings, Unbound};
 use crate::suite::model::{Patch, Raw, Send, SendAction};
 

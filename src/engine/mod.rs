@@ -24,10 +24,11 @@ pub use ids::IdForm;
 pub use operator::{HookOutcome, Operator};
 pub use recorder::{RecordError, Recorder};
 
+use crate::bench::{LinkError, Offer, Outgoing};
 use crate::clock::Moment;
 use crate::journal::event::{Event, Occurrence, Payload, StepEnd};
 use crate::judge::{JudgeError, Progress, TestJudge};
-use crate::link::{Link, LinkError, Offer, Outgoing};
+use crate::link::Link;
 use crate::suite::model::{Section, Step, Test, Verb};
 
 /// More time than this is not left between two orders.

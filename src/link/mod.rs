@@ -1,81 +1,15 @@
 //! What connects the harness with the device: publish, and see what happens.
 //!
-//! [`Link`] is the whole bench as the engine sees it. `mqtt` is the real one (rumqttc, broker, tap and map
-//! server), `memory` an in-process bus with MQTT's retain, will and QoS rules in virtual time. A link
+//! [`Link`] is the whole bench as the engine sees it. `mqtt` is the real one (broker, tap, map server and a connection of
+//! the harness), `memory` an in-process bus with MQTT's retain, will and QoS rules in virtual time. A link
 //! reports everything as journal occurrences and judges nothing.
 
-mod heard;
-pub(crate) mod inbox;
 pub mod memory;
 pub mod mqtt;
 
+use crate::bench::{LinkError, Offer, Outgoing, Vantage};
 use crate::clock::{Moment, Stamp};
 use crate::journal::event::{LinkFault, Occurrence};
-use crate::suite::model::ServeBehaviour;
-
-/// From where the harness can see.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Vantage {
-    /// Every packet of the device.
-    Tap,
-    /// Only what the broker delivers.
-    Subscriber,
-}
-
-/// A message the harness publishes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Outgoing {
-    /// Full topic.
-    pub topic: String,
-    /// Payload.
-    pub payload: bytes::Bytes,
-    /// QoS.
-    pub qos: u8,
-    /// RETAIN.
-    pub retain: bool,
-}
-
-/// A file for the map server.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Offer {
-    /// Name of the offer.
-    pub name: String,
-    /// The file.
-    pub body: bytes::Bytes,
-    /// How it is served.
-    pub behaviour: ServeBehaviour,
-}
-
-/// Why a link could not do what it was asked.
-#[derive(Debug, thiserror::Error)]
-pub enum LinkError {
-    /// The broker is gone or was never there.
-    #[error("the broker at {address} is not reachable: {reason}")]
-    Broker {
-        /// Where it should be.
-        address: String,
-        /// What the transport said.
-        reason: String,
-    },
-    /// A port could not be opened.
-    #[error("cannot listen on {address}: {reason}")]
-    Listen {
-        /// Which.
-        address: String,
-        /// What the system said.
-        reason: String,
-    },
-    /// The link cannot do that from its vantage.
-    #[error("{what} needs the tap, and this run only has vantage `subscriber`")]
-    NeedsTap {
-        /// What was asked.
-        what: String,
-    },
-    /// Credentials, certificates or addresses are wrong.
-    #[error("{0}")]
-    Setup(String),
-}
 
 /// The bench as the engine sees it. Not used as a trait object; the engine is generic over it.
 #[expect(async_fn_in_trait, reason = "the engine runs on one thread and needs no Send bound")]

@@ -18,11 +18,11 @@ use tokio::net::TcpSocket;
 use tokio::task::JoinHandle;
 
 use super::{SLOW_TRANSFER, path_of, wrong_bytes};
+use crate::bench::inbox::Reporter;
+use crate::bench::listen::listen_on;
+use crate::bench::{LinkError, Offer};
 use crate::journal::event::{Direction, Event, Source};
-use crate::link::inbox::Reporter;
-use crate::link::{LinkError, Offer};
 use crate::suite::model::ServeBehaviour;
-use crate::tap::listen_on;
 
 /// In how many parts a file is sent.
 const PARTS: usize = 20;

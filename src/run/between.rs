@@ -4,11 +4,12 @@ use serde_json::Map;
 
 use super::admission::is_stale;
 use super::session::Session;
+use crate::bench::Vantage;
 use crate::engine::vehicle::{has_any_open_connection, has_open_connection};
 use crate::engine::{EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, LinkFault};
 use crate::judge::RunJudge;
-use crate::link::{Link, Vantage};
+use crate::link::Link;
 use crate::pack::Role;
 use crate::profile::show_duration;
 

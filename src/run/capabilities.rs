@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value};
 
 use super::fits::outgrown;
+use crate::bench::Vantage;
 use crate::journal::event::{Capability, Gate};
-use crate::link::Vantage;
 use crate::pattern::{Term, TermKind};
 use crate::profile::{SAMPLE_ACTIONS, SampleKind};
 use crate::suite::model::{Need, SendAction, ServeBehaviour, Test, Verb};

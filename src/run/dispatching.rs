@@ -5,13 +5,13 @@
 
 use serde_json::{Map, Value};
 
-use super::fleet::Fleet;
 use super::session::Session;
 use crate::course::Node;
 use crate::engine::vehicle::is_idle;
 use crate::engine::{EngineError, Operator, Recorder};
 use crate::journal::event::Event;
 use crate::link::Link;
+use crate::simulate::Fleet;
 use crate::suite::model::Test;
 
 /// A vehicle that is no farther from its node, in metres, stands on it.

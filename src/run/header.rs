@@ -4,58 +4,12 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
+use crate::bench::Vantage;
 use crate::journal::event::{MockVehicle, RunHeader, Setting};
-use crate::link::Vantage;
-use crate::pack::{Pack, Role};
+use crate::pack::{Pack, Participant};
 
 /// Format of the journal.
 pub const JOURNAL_FORMAT: &str = "vda5050-tck.journal/1";
-
-/// Who is judged, and by what.
-#[derive(Clone, Debug)]
-pub struct Subject {
-    /// Which side it is.
-    pub role: Role,
-    /// Manufacturer as in topics and headers.
-    pub manufacturer: String,
-    /// Serial number as in topics and headers.
-    pub serial_number: String,
-    /// How its topics are built; the pack's own way unless said.
-    pub topic_template: Option<String>,
-}
-
-impl std::fmt::Display for Subject {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {}", self.manufacturer, self.serial_number)
-    }
-}
-
-impl Subject {
-    /// Full topic by topic name.
-    #[must_use]
-    pub fn topics(&self, pack: &Pack) -> BTreeMap<String, String> {
-        let template = self.topic_template.as_deref().unwrap_or_else(|| pack.topic_template());
-        // A profile gives how the topics begin, a pack the whole of them.
-        let template = if template.contains("{topic}") {
-            template.to_owned()
-        } else {
-            format!("{template}/{{topic}}")
-        };
-        let full = |name: &str| pack.fill_topic(&template, &self.manufacturer, &self.serial_number, name);
-        pack.topics()
-            .iter()
-            .map(|rule| (rule.name.as_str().to_owned(), full(rule.name.as_str())))
-            .collect()
-    }
-
-    /// The topics the device publishes.
-    #[must_use]
-    pub fn published(&self, pack: &Pack) -> Vec<String> {
-        let topics = self.topics(pack);
-        let own = pack.topics().iter().filter(|rule| rule.publisher == self.role);
-        own.filter_map(|rule| topics.get(rule.name.as_str()).cloned()).collect()
-    }
-}
 
 /// Name and version of this program.
 #[must_use]
@@ -66,7 +20,7 @@ pub fn tool() -> String {
 /// Makes the header of a run.
 pub struct HeaderParts<'a> {
     /// Who is judged.
-    pub subject: &'a Subject,
+    pub subject: &'a Participant,
     /// The protocol version.
     pub pack: &'a Pack,
     /// Identifier of the run.

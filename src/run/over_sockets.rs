@@ -8,26 +8,26 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::built_in::{BuiltIn, UnknownName};
-use super::device_driver::RunningDevice;
 use super::hooks::{DeviceProcess, ProfileHooks};
 use super::library::Library;
-use super::running_fleet::WithFleet;
 use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
 use super::virtual_run::Silent;
+use crate::bench::endpoint::{Credentials, Endpoint};
+use crate::bench::tls::TlsFiles;
+use crate::bench::{LinkError, Vantage};
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, RecordError, Recorder};
 use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
-use crate::link::mqtt::endpoint::{Credentials, Endpoint};
 use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
-use crate::link::{LinkError, Vantage};
 use crate::pack::Pack;
 use crate::profile::{self, Effective, Profile, Surroundings};
-use crate::tap::tls::TlsFiles;
+use crate::simulate::WithFleet;
+use crate::simulate::driver::RunningDevice;
+use crate::simulate::{BuiltIn, UnknownName};
 
 /// A run over real sockets.
 pub struct SocketRun {

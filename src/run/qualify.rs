@@ -10,7 +10,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::built_in::BuiltIn;
 use super::library::Library;
 use super::session::Finished;
 use super::virtual_run::{VirtualRun, run_silently};
@@ -18,6 +17,7 @@ use crate::engine::EngineError;
 use crate::pack::{Pack, Role};
 use crate::reference::Fault;
 use crate::result::RunResult;
+use crate::simulate::BuiltIn;
 use crate::suite::Unproven;
 use crate::suite::model::Test;
 use crate::verdict::Verdict;

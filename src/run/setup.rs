@@ -7,20 +7,21 @@ use std::sync::Arc;
 use bytes::Bytes;
 use serde_json::{Map, Value};
 
-use super::built_in::BuiltIn;
 use super::capabilities::Capabilities;
 use super::claims::{claims, statements};
-use super::fleet::{Fleet, USUAL_FLEET};
-use super::header::{HeaderParts, Subject};
+use super::header::HeaderParts;
 use super::library::Library;
-use super::reference_agv::ReferenceAgv;
 use super::session::Setup;
+use crate::bench::Vantage;
 use crate::course::Layout;
 use crate::diagnostic::Diagnostic;
 use crate::journal::event::{RunHeader, Setting};
-use crate::link::Vantage;
+use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{Effective, Profile, TimeLimits};
+use crate::simulate::BuiltIn;
+use crate::simulate::ReferenceAgv;
+use crate::simulate::{Fleet, USUAL_FLEET};
 use crate::suite::model::Test;
 
 /// What a run takes on, and what it is called.
@@ -56,7 +57,7 @@ impl Request {
 #[derive(Clone, Debug)]
 pub struct DeviceUnderTest {
     /// Who it says it is.
-    pub subject: Subject,
+    pub subject: Participant,
     /// The timing contract.
     pub time: TimeLimits,
     /// `device.*` beside identity and factsheet.
@@ -225,14 +226,14 @@ pub struct BenchFacts {
     pub maps: Result<(), String>,
 }
 
-fn subject(profile: &Profile) -> Result<Subject, Diagnostic> {
+fn subject(profile: &Profile) -> Result<Participant, Diagnostic> {
     let missing = |setting: &str, flag: &str| {
         let title = format!("the device is not named: `{setting}` is missing");
         Diagnostic::whole("missing-setting", title).hint(format!("set it in the profile, or with {flag}"))
     };
     let device = &profile.device;
     let named = |name: &Option<String>, setting, flag| name.clone().ok_or_else(|| missing(setting, flag));
-    Ok(Subject {
+    Ok(Participant {
         role: device.role,
         manufacturer: named(&device.manufacturer, "device.manufacturer", "--manufacturer")?,
         serial_number: named(&device.serial_number, "device.serial-number", "--serial")?,

@@ -5,20 +5,21 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::built_in::BuiltIn;
 use super::library::Library;
-use super::reference_agv::ReferenceAgv;
-use super::reference_master_control::ReferenceMasterControl;
 use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
+use crate::bench::{LinkError, Vantage};
 use crate::clock::{Moment, Stamp};
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
+use crate::link::Link;
 use crate::link::memory::{MemoryLink, MemoryOptions};
-use crate::link::{Link, LinkError, Vantage};
 use crate::pack::{Pack, Role};
+use crate::simulate::BuiltIn;
+use crate::simulate::ReferenceAgv;
+use crate::simulate::ReferenceMasterControl;
 use crate::suite::model::{Step, Test};
 
 /// What is run.

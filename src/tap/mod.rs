@@ -6,7 +6,6 @@ mod connection;
 pub mod faults;
 mod pump;
 mod rewrite;
-pub mod tls;
 pub mod wire;
 
 use std::net::SocketAddr;
@@ -19,9 +18,9 @@ use tokio::task::{JoinHandle, JoinSet};
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::{ClientConfig, ServerConfig};
 
+use crate::bench::LinkError;
+use crate::bench::inbox::Reporter;
 use crate::journal::event::{Direction, Event, LinkFault, Source};
-use crate::link::LinkError;
-use crate::link::inbox::Reporter;
 use faults::{Change, Faults};
 
 /// How long a cut may take; closing sockets takes no time, so this is only a safety net.
@@ -131,28 +130,6 @@ impl Tap {
 impl Drop for Tap {
     fn drop(&mut self) {
         self.accepting.abort();
-    }
-}
-
-/// Opens a port; a port that is taken gets a text that says what to do.
-pub(crate) async fn listen_on(address: &str) -> Result<TcpListener, LinkError> {
-    TcpListener::bind(address)
-        .await
-        .map_err(|error| cannot_listen(address, &error))
-}
-
-fn cannot_listen(address: &str, error: &std::io::Error) -> LinkError {
-    let reason = match error.kind() {
-        std::io::ErrorKind::AddrInUse => {
-            "another program is using this port already; stop it or listen on another port".to_owned()
-        }
-        std::io::ErrorKind::PermissionDenied => "the system does not allow this port; choose one above 1023".to_owned(),
-        std::io::ErrorKind::AddrNotAvailable => "this machine has no such address".to_owned(),
-        _ => error.to_string(),
-    };
-    LinkError::Listen {
-        address: address.to_owned(),
-        reason,
     }
 }
 

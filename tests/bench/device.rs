@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
+use vda5050_tck::bench::Offer;
+use vda5050_tck::bench::endpoint::Endpoint;
 use vda5050_tck::clock::Stamp;
 use vda5050_tck::journal::event::{Event, LinkFault, Packet};
+use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::BenchOptions;
-use vda5050_tck::link::mqtt::endpoint::Endpoint;
-use vda5050_tck::link::{Link, Offer};
 use vda5050_tck::reference::{ConnectOptions, Device, Input, Output, Publication};
-use vda5050_tck::run::device_driver::RunningDevice;
+use vda5050_tck::simulate::driver::RunningDevice;
 use vda5050_tck::suite::model::ServeBehaviour;
 
 use crate::rig::*;

@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
 
+use vda5050_tck::bench::LinkError;
 use vda5050_tck::journal::event::{Close, Event, LinkFault, Packet};
+use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::{BenchOptions, MqttBench};
-use vda5050_tck::link::{Link, LinkError};
 
 use crate::rig::*;
 

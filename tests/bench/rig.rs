@@ -7,11 +7,12 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::sync::mpsc;
 
+use vda5050_tck::bench::Outgoing;
+use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
+use vda5050_tck::bench::endpoint::Endpoint;
 use vda5050_tck::journal::event::{Close, Event, LinkFault, Occurrence, Packet};
-use vda5050_tck::link::mqtt::client::{Client, ClientEvent, ClientOptions};
-use vda5050_tck::link::mqtt::endpoint::Endpoint;
+use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::{BenchInfo, BenchOptions, MqttBench, MqttLink};
-use vda5050_tck::link::{Link, Outgoing};
 
 pub struct Rig {
     pub link: MqttLink,

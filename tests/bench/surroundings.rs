@@ -7,11 +7,12 @@ use bytes::Bytes;
 use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
 
+use vda5050_tck::bench::Offer;
+use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
+use vda5050_tck::bench::endpoint::Endpoint;
 use vda5050_tck::journal::event::{Event, Source};
+use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::BenchOptions;
-use vda5050_tck::link::mqtt::client::{Client, ClientEvent, ClientOptions};
-use vda5050_tck::link::mqtt::endpoint::Endpoint;
-use vda5050_tck::link::{Link, Offer};
 use vda5050_tck::suite::model::ServeBehaviour;
 
 use crate::rig::*;
@@ -93,7 +94,7 @@ async fn the_device_side_can_be_tls() {
         missing("openssl");
         return;
     }
-    let tls = vda5050_tck::tap::tls::TlsFiles {
+    let tls = vda5050_tck::bench::tls::TlsFiles {
         certificate: certificate.clone(),
         key,
     };

@@ -4,7 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vda5050_tck::pack::{Pack, Role};
-use vda5050_tck::run::{BuiltIn, Decider, Library, Qualification, VirtualRun, decided, qualify, run_silently};
+use vda5050_tck::run::{Decider, Library, Qualification, VirtualRun, decided, qualify, run_silently};
+use vda5050_tck::simulate::BuiltIn;
 use vda5050_tck::verdict::Verdict;
 
 /// What is excused on one side of the interface.

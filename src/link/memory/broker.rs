@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use bytes::Bytes;
 
-use crate::link::Outgoing;
+use crate::bench::Outgoing;
 
 /// A client of the broker; the harness's own standing subscription is one of them.
 pub(super) type Client = u64;

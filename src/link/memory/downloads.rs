@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use super::peer::PeerDownload;
 use super::{MemoryLink, Task};
+use crate::bench::Offer;
 use crate::journal::event::{Direction, Event, Source};
-use crate::link::Offer;
 use crate::maps;
 use crate::suite::model::ServeBehaviour;
 

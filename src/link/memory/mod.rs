@@ -19,9 +19,10 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::time::Duration;
 
+use crate::bench::{LinkError, Offer, Outgoing, Vantage};
 use crate::clock::{Moment, Stamp};
 use crate::journal::event::{Direction, Event, LinkFault, Occurrence, Payload, Source};
-use crate::link::{Link, LinkError, Offer, Outgoing, Vantage};
+use crate::link::Link;
 use crate::tap::faults::{Change, Faults};
 
 use connection::Connection;

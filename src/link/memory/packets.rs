@@ -4,8 +4,8 @@ use bytes::Bytes;
 
 use super::broker::Delivery;
 use super::peer::PeerConnect;
+use crate::bench::Outgoing;
 use crate::journal::event::{Filter, Packet, Payload, Will};
-use crate::link::Outgoing;
 
 /// From the device.
 #[derive(Clone, Debug)]

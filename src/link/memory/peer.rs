@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
+use crate::bench::Outgoing;
 use crate::clock::{Moment, Stamp};
-use crate::link::Outgoing;
 
 /// How a peer opens its MQTT connection.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -13,9 +13,9 @@ use super::connection::{Connection, Lane, next_id, take_due};
 use super::packets::{Down, Up, connect_packet, down_packet, up_packet};
 use super::peer::PeerInput;
 use super::{HARNESS, MemoryLink, TO_HARNESS, Task};
+use crate::bench::{Outgoing, Vantage};
 use crate::clock::Moment;
 use crate::journal::event::{Close, Direction, Event, Packet, Payload, Source};
-use crate::link::{Outgoing, Vantage};
 use crate::tap::faults::Fate;
 use crate::tap::wire::Reader;
 

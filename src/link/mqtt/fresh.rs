@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use super::client::{Client, ClientEvent, ClientOptions};
+use crate::bench::Outgoing;
+use crate::bench::client::{Client, ClientEvent, ClientOptions};
+use crate::bench::inbox::Reporter;
 use crate::journal::event::{Direction, Event, Payload, Source};
-use crate::link::Outgoing;
-use crate::link::inbox::Reporter;
 
 /// So often a new client looks before it says that nothing is stored.
 const LOOKS: u32 = 3;

@@ -3,8 +3,6 @@
 //! Everything that happens comes through one inbox, stamped on arrival. The bench owns all tasks and sockets;
 //! [`MqttLink::stop`] closes them.
 
-pub mod client;
-pub mod endpoint;
 mod fresh;
 
 use std::net::SocketAddr;
@@ -15,18 +13,19 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep_until, timeout};
 
+use crate::bench::client::{Client, ClientEvent, ClientOptions};
+use crate::bench::endpoint::{Credentials, Endpoint};
+use crate::bench::inbox::{Inbox, inbox};
+use crate::bench::tls::{self, TlsFiles};
+use crate::bench::{LinkError, Offer, Outgoing, Vantage};
 use crate::broker::{EmbeddedBroker, self_test};
 use crate::clock::{Moment, Stamp, WallClock};
 use crate::journal::event::{Direction, Event, LinkFault, Occurrence, Payload, Source};
-use crate::link::inbox::{Inbox, inbox};
-use crate::link::{Link, LinkError, Offer, Outgoing, Vantage};
+use crate::link::Link;
 use crate::maps::MapServer;
-use crate::tap::tls::{self, TlsFiles};
 use crate::tap::{Tap, Upstream};
-use client::{Client, ClientEvent, ClientOptions};
-use endpoint::{Credentials, Endpoint};
 
-pub use crate::link::inbox::Reporter;
+pub use crate::bench::inbox::Reporter;
 
 /// How long the broker may take to accept the harness, or to serve a fresh subscriber.
 const ANSWER_LIMIT: Duration = Duration::from_secs(10);

@@ -8,7 +8,7 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::{ClientConfig, RootCertStore, ServerConfig};
 
-use crate::link::LinkError;
+use crate::bench::LinkError;
 
 /// The certificate the tap shows to the device.
 #[derive(Clone, Debug, PartialEq, Eq)]

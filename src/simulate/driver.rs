@@ -14,13 +14,13 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep_until};
 
-use super::device_peer::outgoing;
+use super::peer::outgoing;
+use crate::bench::Outgoing;
+use crate::bench::client::{Client, ClientEvent, ClientOptions};
+use crate::bench::endpoint::Endpoint;
 use crate::clock::{Moment, WallClock};
 use crate::journal::event::{Direction, Event, Payload, Source};
-use crate::link::Outgoing;
 use crate::link::mqtt::Reporter;
-use crate::link::mqtt::client::{Client, ClientEvent, ClientOptions};
-use crate::link::mqtt::endpoint::Endpoint;
 use crate::maps::FETCH_TIMEOUT;
 use crate::reference::{Device, Download, Input, Output, Publication};
 

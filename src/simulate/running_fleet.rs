@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::device_driver::RunningDevice;
+use super::driver::RunningDevice;
 use super::fleet::Fleet;
+use crate::bench::endpoint::Endpoint;
 use crate::clock::WallClock;
 use crate::engine::{HookOutcome, Operator};
 use crate::link::mqtt::Reporter;
-use crate::link::mqtt::endpoint::Endpoint;
 use crate::reference::agv::{Agv, UnknownFault};
 
 /// Hooks, and the mock AGVs of the harness; none when an AGV is tested.

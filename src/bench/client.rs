@@ -14,7 +14,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
 use super::endpoint::Endpoint;
-use crate::link::Outgoing;
+use crate::bench::Outgoing;
 
 /// Largest packet taken and sent; rumqttc's own limit of 10 KiB is less than an order can have.
 const LARGEST_PACKET: usize = 256 << 20;

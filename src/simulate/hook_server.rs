@@ -15,9 +15,9 @@ use serde_json::{Map, Value};
 use tokio::sync::Mutex;
 use tokio::task::JoinHandle;
 
-use super::device_driver::RunningDevice;
-use crate::link::LinkError;
-use crate::tap::listen_on;
+use super::driver::RunningDevice;
+use crate::bench::LinkError;
+use crate::bench::listen::listen_on;
 
 /// No parameters need more.
 const LARGEST_BODY: usize = 64 << 10;

@@ -4,16 +4,17 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-use super::device_driver::RunningDevice;
-use super::device_peer::DevicePeer;
+use super::driver::RunningDevice;
 use super::fleet::Fleet;
-use super::header::Subject;
+use super::peer::DevicePeer;
 use super::reference_agv::ReferenceAgv;
 use super::reference_master_control::ReferenceMasterControl;
+use super::unknown::UnknownName;
+use crate::bench::endpoint::Endpoint;
 use crate::clock::WallClock;
 use crate::course::Layout;
 use crate::link::memory::Peer;
-use crate::link::mqtt::endpoint::Endpoint;
+use crate::pack::Participant;
 use crate::pack::Role;
 use crate::profile::TimeLimits;
 use crate::reference::Fault;
@@ -29,11 +30,6 @@ pub enum BuiltIn {
     /// The reference master control, with the mock AGVs it commands.
     MasterControl(ReferenceMasterControl),
 }
-
-/// A name that the built-in device does not know.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct UnknownName(pub String);
 
 impl From<ReferenceAgv> for BuiltIn {
     fn from(device: ReferenceAgv) -> Self {
@@ -56,7 +52,7 @@ impl BuiltIn {
 
     /// Who it says it is.
     #[must_use]
-    pub fn subject(&self) -> &Subject {
+    pub fn subject(&self) -> &Participant {
         match self {
             Self::Agv(device) => &device.subject,
             Self::MasterControl(device) => &device.subject,

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use tokio_rustls::rustls::ClientConfig;
 
-use crate::link::LinkError;
-use crate::tap::tls;
+use crate::bench::LinkError;
+use crate::bench::tls;
 
 /// User name and password for a broker.
 #[derive(Clone, PartialEq, Eq)]

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::header::Subject;
 use super::reference_agv::ReferenceAgv;
 use crate::journal::event::MockVehicle;
+use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 
 /// How many mock AGVs there are unless more are asked for: the one that tests talk about, and one beside it.
@@ -101,7 +101,7 @@ impl Fleet {
     /// The topics a master control publishes for these vehicles.
     #[must_use]
     pub fn commanded(&self, pack: &Pack) -> Vec<String> {
-        let all = self.vehicles.iter().map(|vehicle| Subject {
+        let all = self.vehicles.iter().map(|vehicle| Participant {
             role: Role::MasterControl,
             ..vehicle.subject.clone()
         });

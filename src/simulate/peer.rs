@@ -2,8 +2,8 @@
 
 use bytes::Bytes;
 
+use crate::bench::Outgoing;
 use crate::clock::{Moment, Stamp};
-use crate::link::Outgoing;
 use crate::link::memory::{Peer, PeerConnect, PeerDownload, PeerInput, PeerOutput};
 use crate::reference::{Device, Download, Input, Output, Publication};
 

@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::built_in::UnknownName;
 use super::fleet::{Fleet, USUAL_FLEET};
-use super::header::Subject;
 use super::reference_agv::ReferenceAgv;
+use super::unknown::UnknownName;
 use crate::course::{Layout, Node};
+use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::TimeLimits;
 use crate::reference::deviations::master_control as deviations;
@@ -22,7 +22,7 @@ const WAY: usize = 3;
 #[derive(Clone, Debug)]
 pub struct ReferenceMasterControl {
     /// Who it says it is.
-    pub subject: Subject,
+    pub subject: Participant,
     /// The mock AGVs it commands.
     pub fleet: Fleet,
     /// The floor.
@@ -77,7 +77,7 @@ impl ReferenceMasterControl {
             ..MasterControlConfig::default()
         };
         Self {
-            subject: Subject {
+            subject: Participant {
                 role: Role::MasterControl,
                 manufacturer: "vda5050-tck".to_owned(),
                 serial_number: config.name.clone(),

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use super::header::Subject;
 use crate::course::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout};
+use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{Place, SAMPLE_ACTIONS, SampleAction, SampleActions, TimeLimits};
 use crate::reference::agv::tolerances::UnknownTolerance;
@@ -16,7 +16,7 @@ use crate::reference::agv::{AgvConfig, LayoutNode, OnboardMap};
 #[derive(Clone, Debug)]
 pub struct ReferenceAgv {
     /// Who it says it is.
-    pub subject: Subject,
+    pub subject: Participant,
     /// The floor.
     pub layout: Layout,
     /// How it is configured.
@@ -134,7 +134,7 @@ impl ReferenceAgv {
     /// A reference AGV for a protocol version.
     #[must_use]
     pub fn new(pack: &Pack) -> Self {
-        let subject = Subject {
+        let subject = Participant {
             role: Role::Agv,
             manufacturer: "vda5050-tck".to_owned(),
             serial_number: "reference-agv".to_owned(),
