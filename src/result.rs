@@ -174,6 +174,15 @@ pub struct TestResult {
     pub allowances: Vec<String>,
 }
 
+impl TestResult {
+    /// The decisions that are not a pass.
+    pub fn findings(&self) -> impl Iterator<Item = &Decision> {
+        self.decisions
+            .iter()
+            .filter(|decision| decision.verdict() != Verdict::Pass)
+    }
+}
+
 /// One step of a test.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -6,21 +6,23 @@
     reason = "a test may fail by panicking"
 )]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Modules by layer; an arrow may point to the same layer or down, never up.
-const LAYERS: [(&str, u8); 26] = [
+/// Modules by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer.
+const LAYERS: [(&str, u8); 28] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
     ("run", 5),
+    ("simulate", 5),
     ("report", 5),
     ("engine", 4),
     ("judge", 4),
     ("reference", 4),
     ("result", 3),
     ("link", 3),
+    ("bench", 3),
     ("broker", 3),
     ("tap", 3),
     ("maps", 3),
@@ -79,13 +81,26 @@ fn below_src(path: &Path) -> String {
         .to_string()
 }
 
-/// Code lines: no comments, and nothing after the unit tests begin.
+/// Code lines with their numbers: no comments, and no unit tests. A test module in a file of its own is named in one
+/// line, and code goes on after it; an inline one is the end of its file.
 fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines()
-        .enumerate()
-        .take_while(|(_, line)| !line.starts_with("#[cfg(test)]"))
-        .filter(|(_, line)| !line.trim_start().starts_with("//"))
-        .map(|(at, line)| (at + 1, line))
+    let mut lines = text.lines().enumerate().peekable();
+    let mut ended = false;
+    std::iter::from_fn(move || {
+        while !ended {
+            let (at, line) = lines.next()?;
+            if line.starts_with("#[cfg(test)]") {
+                while lines.next_if(|(_, line)| line.starts_with("#[")).is_some() {}
+                let declared = lines.next();
+                ended = declared.is_some_and(|(_, line)| line.ends_with('{'));
+                continue;
+            }
+            if !line.trim_start().starts_with("//") {
+                return Some((at + 1, line));
+            }
+        }
+        None
+    })
 }
 
 fn is_test_file(path: &Path) -> bool {
@@ -93,44 +108,249 @@ fn is_test_file(path: &Path) -> bool {
     name.ends_with("tests.rs") || name.contains("/tests/") || name.ends_with("properties.rs")
 }
 
+/// A file as a module: `judge::step` for `judge/step/mod.rs`, `judge::step::weigh` for `judge/step/weigh.rs`.
+type Module = Vec<String>;
+
+/// Which modules each module names, by `crate::`, `super::` and `self::`. What a file names of its own ancestors is not
+/// among it: a folder and its parts are one thing.
+fn arrows() -> BTreeMap<Module, BTreeSet<Module>> {
+    let files: BTreeMap<Module, String> = sources()
+        .into_iter()
+        .filter(|(path, _)| !is_test_file(path))
+        .map(|(path, text)| {
+            let name = below_src(&path);
+            let name = name.trim_end_matches(".rs").trim_end_matches("/mod");
+            let lines: Vec<&str> = code(&text).map(|(_, line)| line).collect();
+            (name.split('/').map(str::to_owned).collect(), lines.join("\n"))
+        })
+        .filter(|(module, _): &(Module, String)| !matches!(module[0].as_str(), "lib" | "main"))
+        .collect();
+    let named = |module: &Module, text: &str| {
+        let declared = text.lines().filter_map(|line| {
+            let (_, name) = line.split_once("mod ")?;
+            Some([module.clone(), vec![name.strip_suffix(';')?.to_owned()]].concat())
+        });
+        let paths = paths(text).into_iter().map(|path| absolute(module, path));
+        let known = |mut path: Module| {
+            while !path.is_empty() && !files.contains_key(&path) {
+                path.pop();
+            }
+            path
+        };
+        let others = declared.chain(paths).map(known);
+        others
+            .filter(|other| !other.is_empty() && !module.starts_with(other))
+            .collect()
+    };
+    let all: BTreeMap<Module, BTreeSet<Module>> = files
+        .iter()
+        .map(|(module, text)| (module.clone(), named(module, text)))
+        .collect();
+    assert!(
+        all.values().map(BTreeSet::len).sum::<usize>() > 500,
+        "the paths were not read"
+    );
+    all
+}
+
+/// All paths of a text that begin with `crate`, `super` or `self`, with the lists in braces written out.
+fn paths(text: &str) -> Vec<Vec<String>> {
+    let mut all = Vec::new();
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    for word in ["crate", "super", "self"] {
+        for (at, _) in text.match_indices(&format!("{word}::")) {
+            if text[..at].ends_with(|c: char| is_word(c) || c == ':') {
+                continue;
+            }
+            let rest = &text[at..];
+            let mut end = 0;
+            loop {
+                let part: usize = rest[end..]
+                    .chars()
+                    .take_while(|c| is_word(*c))
+                    .map(char::len_utf8)
+                    .sum();
+                end += part;
+                match rest[end..].strip_prefix("::") {
+                    Some(more) if part > 0 && more.starts_with(|c: char| is_word(c) || c == '{') => end += 2,
+                    _ => break,
+                }
+            }
+            let begin: Vec<String> = rest[..end]
+                .split("::")
+                .filter(|part| !part.is_empty())
+                .map(str::to_owned)
+                .collect();
+            if rest[end..].starts_with('{') {
+                write_out(&begin, &rest[end..], &mut all);
+            } else {
+                all.push(begin);
+            }
+        }
+    }
+    all
+}
+
+/// `{a::B, c::{D, E}}` after `begin`; returns how long it was.
+fn write_out(begin: &[String], list: &str, all: &mut Vec<Vec<String>>) -> usize {
+    let mut here = begin.to_vec();
+    let mut word = String::new();
+    let mut at = 1;
+    while let Some(c) = list[at..].chars().next() {
+        match c {
+            '{' => {
+                at += write_out(&here, &list[at..], all);
+                here.truncate(begin.len());
+                continue;
+            }
+            ':' if !word.is_empty() => here.push(std::mem::take(&mut word)),
+            ',' | '}' => {
+                if !word.is_empty() {
+                    here.push(std::mem::take(&mut word));
+                    all.push(here.clone());
+                }
+                here.truncate(begin.len());
+                if c == '}' {
+                    return at + 1;
+                }
+            }
+            c if c.is_whitespace() || c == ':' => {}
+            c => word.push(c),
+        }
+        at += c.len_utf8();
+    }
+    at
+}
+
+/// A path as the crate's root sees it.
+fn absolute(module: &Module, path: Vec<String>) -> Module {
+    if path[0] == "crate" {
+        return path[1..].to_vec();
+    }
+    let ups = path
+        .iter()
+        .take_while(|part| matches!(part.as_str(), "super" | "self"))
+        .count();
+    let supers = path
+        .iter()
+        .take_while(|part| matches!(part.as_str(), "super" | "self"))
+        .filter(|part| *part == "super")
+        .count();
+    let kept = module.len().saturating_sub(supers);
+    [&module[..kept], &path[ups..]].concat()
+}
+
+/// The places that can be reached from themselves.
+fn in_circles(arrows: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
+    let reached = |from: &Module| {
+        let mut seen = BTreeSet::new();
+        let mut open: Vec<&Module> = arrows[from].iter().collect();
+        while let Some(at) = open.pop() {
+            if seen.insert(at) {
+                open.extend(arrows.get(at).into_iter().flatten());
+            }
+        }
+        seen.contains(from)
+    };
+    arrows
+        .keys()
+        .filter(|from| reached(from))
+        .map(|module| module.join("::"))
+        .collect()
+}
+
 #[test]
 fn dependencies_point_down() {
     let layers: BTreeMap<&str, u8> = LAYERS.into_iter().collect();
     let mut wrong = Vec::new();
-    for (path, text) in sources().iter().filter(|(path, _)| !is_test_file(path)) {
-        let here = module(path);
-        let Some(own) = layers.get(here.as_str()) else {
-            panic!("{here} has no layer in this test");
-        };
-        for (line, content) in code(text) {
-            for part in content.split("crate::").skip(1) {
-                let names: Vec<String> = match part.strip_prefix('{') {
-                    Some(list) => list
-                        .split(',')
-                        .map(|name| name.trim().split([':', '}']).next().unwrap_or("").to_owned())
-                        .collect(),
-                    None => vec![
-                        part.split(|c: char| !c.is_alphanumeric() && c != '_')
-                            .next()
-                            .unwrap_or("")
-                            .to_owned(),
-                    ],
-                };
-                for name in names {
-                    let Some(other) = layers.get(name.as_str()) else {
-                        continue;
-                    };
-                    if other > own {
-                        wrong.push(format!(
-                            "{}:{line}: {here} (layer {own}) names {name} (layer {other})",
-                            below_src(path)
-                        ));
-                    }
-                }
+    for (from, others) in arrows() {
+        let here = from[0].as_str();
+        let own = layers
+            .get(here)
+            .unwrap_or_else(|| panic!("{here} has no layer in this test"));
+        for to in others {
+            let layer = layers
+                .get(to[0].as_str())
+                .unwrap_or_else(|| panic!("{} has no layer in this test", to[0]));
+            if layer > own {
+                wrong.push(format!(
+                    "{} (layer {own}) names {} (layer {layer})",
+                    from.join("::"),
+                    to.join("::")
+                ));
             }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_rooms_stand_in_a_circle() {
+    let mut rooms: BTreeMap<Module, BTreeSet<Module>> = BTreeMap::new();
+    for (from, others) in arrows() {
+        let room = rooms.entry(vec![from[0].clone()]).or_default();
+        room.extend(
+            others
+                .into_iter()
+                .filter(|to| to[0] != from[0])
+                .map(|to| vec![to[0].clone()]),
+        );
+    }
+    let circles = in_circles(&rooms);
+    assert!(
+        circles.is_empty(),
+        "rooms that depend on themselves: {}",
+        circles.join(", ")
+    );
+}
+
+/// Rooms whose parts know each other both ways: a device is one state machine, told in chapters.
+const TOLD_IN_CHAPTERS: [&str; 1] = ["reference"];
+
+#[test]
+fn no_files_of_a_room_stand_in_a_circle() {
+    let mut arrows = arrows();
+    arrows.retain(|module, _| !TOLD_IN_CHAPTERS.contains(&module[0].as_str()));
+    let circles = in_circles(&arrows);
+    assert!(
+        circles.is_empty(),
+        "files that depend on themselves: {}",
+        circles.join(", ")
+    );
+}
+
+#[test]
+fn the_reading_of_paths_misses_none() {
+    let text =
+        "use crate::a::{b::C, d::{self, E},\n    F};\nlet x = super::g::h(); self::i();\nlet crate_name = mycrate::x;";
+    let found: Vec<String> = paths(text).iter().map(|path| path.join("::")).collect();
+    assert_eq!(
+        found,
+        [
+            "crate::a::b::C",
+            "crate::a::d::self",
+            "crate::a::d::E",
+            "crate::a::F",
+            "super::g::h",
+            "self::i"
+        ]
+    );
+    let file =
+        "//! Doc.\n#[cfg(test)]\nmod tests;\nuse crate::x;\n// no\n#[cfg(test)]\nmod inline {\nuse crate::y;\n}\n";
+    let seen: Vec<&str> = code(file).map(|(_, line)| line).collect();
+    assert_eq!(seen, ["use crate::x;"]);
+    let circle = |ends: &[(&str, &str)]| {
+        let mut arrows: BTreeMap<Module, BTreeSet<Module>> = BTreeMap::new();
+        for (from, to) in ends {
+            arrows
+                .entry(vec![(*from).to_owned()])
+                .or_default()
+                .insert(vec![(*to).to_owned()]);
+        }
+        in_circles(&arrows)
+    };
+    assert_eq!(circle(&[("a", "b"), ("b", "c"), ("c", "b")]), ["b", "c"]);
+    assert!(circle(&[("a", "b"), ("b", "c")]).is_empty());
 }
 
 #[test]
@@ -149,7 +369,7 @@ fn the_judging_side_knows_no_clock_and_no_runtime() {
 #[test]
 fn libraries_stay_in_their_place() {
     let everywhere: Vec<&str> = LAYERS.iter().map(|(name, _)| *name).collect();
-    refuse(&everywhere, &["rumqttc"], &["link/mqtt", "link/device", "broker/"]);
+    refuse(&everywhere, &["rumqttc"], &["bench/client.rs"]);
     refuse(&everywhere, &["mqtt5::", "mqtt5_protocol"], &["broker", "tap"]);
     refuse(&everywhere, &["saphyr"], &["yaml.rs"]);
     refuse(&everywhere, &["junit_report"], &["report/junit"]);
@@ -181,7 +401,7 @@ fn incoming_messages_stay_values() {
     // Typed structs would repair what has to be detected: only the journal's own records, the results, the
     // profile and the packs are deserialized into types.
     let allowed = [
-        "journal", "result", "report", "profile", "pack", "course", "verdict", "clock", "link",
+        "journal", "result", "report", "profile", "pack", "course", "verdict", "clock", "bench",
     ];
     let mut wrong = Vec::new();
     for (path, text) in sources() {

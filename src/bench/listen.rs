@@ -11,7 +11,8 @@ pub(crate) async fn listen_on(address: &str) -> Result<TcpListener, LinkError> {
         .map_err(|error| cannot_listen(address, &error))
 }
 
-fn cannot_listen(address: &str, error: &std::io::Error) -> LinkError {
+/// Why a port cannot be opened, in words that say what to do.
+pub(crate) fn cannot_listen(address: &str, error: &std::io::Error) -> LinkError {
     let reason = match error.kind() {
         std::io::ErrorKind::AddrInUse => {
             "another program is using this port already; stop it or listen on another port".to_owned()

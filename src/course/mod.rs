@@ -6,6 +6,7 @@
 
 mod assign;
 mod curve;
+mod graph;
 mod layout;
 mod lif;
 mod outward;

@@ -4,7 +4,8 @@
 //! A transport to `d` thus leads over three edges, whatever way is taken, unless a longer one is. `far` is another node
 //! that is not on this way.
 
-use super::assign::{Graph, add_ways};
+use super::assign::add_ways;
+use super::graph::Graph;
 use super::ways::{Stop, way};
 use super::{Course, CourseError, CourseNeed, FAR, HERE, Layout, Standing, is_station};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::assign::Graph;
+use super::graph::Graph;
 use super::{CourseError, CourseNeed, Layout, Node};
 use crate::profile::{SampleActions, SampleKind};
 

@@ -8,34 +8,12 @@ use serde_json::{Map, Value, json};
 
 use super::ids::IdForm;
 use super::route::{RouteBuilder, SentOrders};
+use super::unmade::ComposeError;
 use crate::bench::Outgoing;
 use crate::clock::Stamp;
 use crate::judge::Ground;
-use crate::pattern::{Bindings, Unbound};
+use crate::pattern::Bindings;
 use crate::suite::model::{Patch, Raw, Send, SendAction};
-
-/// Why a message cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum ComposeError {
-    /// A variable has no value.
-    #[error("{0}")]
-    Unbound(String),
-    /// The course has no such node or edge.
-    #[error("the course has no {0}")]
-    Course(String),
-    /// The patch does not fit the message.
-    #[error("the patch does not fit: {0}")]
-    Patch(String),
-    /// There is no such topic.
-    #[error("there is no topic {0}")]
-    Topic(String),
-}
-
-impl From<Unbound> for ComposeError {
-    fn from(unbound: Unbound) -> Self {
-        Self::Unbound(unbound.to_string())
-    }
-}
 
 /// A finished message and the actionIds in it, by the names given with `as`.
 #[derive(Debug)]

@@ -12,6 +12,7 @@ mod map_file;
 mod operator;
 mod recorder;
 mod route;
+mod unmade;
 pub mod vehicle;
 
 use std::sync::Arc;
@@ -19,10 +20,11 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-pub use compose::{ComposeError, Composer};
+pub use compose::Composer;
 pub use ids::IdForm;
 pub use operator::{HookOutcome, Operator};
 pub use recorder::{RecordError, Recorder};
+pub use unmade::ComposeError;
 
 use crate::bench::{LinkError, Offer, Outgoing};
 use crate::clock::Moment;

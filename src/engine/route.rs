@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::compose::ComposeError;
+use super::unmade::ComposeError;
 use crate::course::is_station;
 use crate::profile::{Place, SampleKind};
 use crate::suite::model::{Route, RoutePlace};

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+pub use super::direction::Direction;
 pub use super::fault::LinkFault;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
@@ -27,16 +28,6 @@ pub enum Source {
     Maps,
     /// A person or a hook of the profile.
     Operator,
-}
-
-/// Which way something went, seen from the harness.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Direction {
-    /// From the device under test.
-    FromDevice,
-    /// To the device under test.
-    ToDevice,
 }
 
 /// How a step ended.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::event::Direction;
+use super::direction::Direction;
 
 /// What the harness does to the link.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

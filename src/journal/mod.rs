@@ -3,6 +3,7 @@
 //! [`event`] says what can be recorded, [`Journal`] keeps the records in order in memory, [`file`] writes
 //! them through as JSON Lines and reads them back. What the records *mean* is left to the judge.
 
+mod direction;
 pub mod event;
 mod fault;
 pub mod file;

@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
+use super::scene::Scene;
 use super::timeline::Timeline;
-use super::window::Scene;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Payload, Reading, Waiver};
 use crate::pack::RequirementId;

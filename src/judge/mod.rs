@@ -7,12 +7,14 @@
 mod decide;
 mod departure;
 mod hidden;
+mod holds;
 mod limit;
 mod mend;
 mod monitor;
 mod own_errors;
 mod reactions;
 mod run;
+mod scene;
 mod step;
 mod test;
 mod timeline;

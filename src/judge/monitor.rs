@@ -9,7 +9,8 @@ use serde_json::Map;
 
 use super::decide::mood;
 use super::hidden::Hidden;
-use super::step::{shown_path, unbound_text};
+use super::holds::unbound_text;
+use super::step::shown_path;
 use super::test::Ground;
 use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::clock::Moment;

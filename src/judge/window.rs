@@ -1,43 +1,15 @@
-//! What an evaluator may look at, and named checks over a window of it.
-
-use std::collections::BTreeMap;
-use std::sync::Arc;
+//! Named checks over a window of what an evaluator may look at.
 
 use serde_json::{Map, Value};
 
+use super::holds::{Holds, unbound_text};
 use super::mend::Mends;
-use super::step::Holds;
-use super::timeline::Timeline;
+use super::scene::Scene;
 use crate::checks::{self, CheckContext, CheckFinding, Running, Shared};
 use crate::journal::Entry;
-use crate::journal::event::Waiver;
-use crate::pack::{Pack, RequirementId, Role};
-use crate::pattern::Bindings;
+use crate::pack::RequirementId;
 use crate::suite::model::{Binding, CheckUse};
 use crate::verdict::Verdict;
-
-/// Everything around a step.
-#[derive(Clone, Copy)]
-pub struct Scene<'a> {
-    /// The protocol version.
-    pub pack: &'a Pack,
-    /// Full topic by topic name.
-    pub topics: &'a BTreeMap<String, String>,
-    /// The side under test.
-    pub role: Role,
-    /// Manufacturer and serial number.
-    pub identity: (&'a str, &'a str),
-    /// The run's own bindings: `time`, `device`.
-    pub run_bindings: &'a Map<String, Value>,
-    /// All variables of the test.
-    pub bindings: &'a Bindings,
-    /// By subject.
-    pub timeline: &'a Timeline,
-    /// All entries of the test so far.
-    pub entries: &'a [Arc<Entry>],
-    /// Lasting mistakes of the vehicle that do not stand in the way any more.
-    pub waivers: &'a [Waiver],
-}
 
 /// A named check running over a window.
 pub(super) struct CheckWindow {
@@ -83,9 +55,7 @@ impl CheckWindow {
         let definition = checks::find(&check.name).ok_or_else(|| format!("there is no check {}", check.name))?;
         let mut with = Map::new();
         for (name, term) in &check.with {
-            let value = term
-                .bind(scene.bindings)
-                .map_err(|unbound| super::step::unbound_text(&unbound))?;
+            let value = term.bind(scene.bindings).map_err(|unbound| unbound_text(&unbound))?;
             with.insert(name.clone(), value);
         }
         let shared = Shared::default();

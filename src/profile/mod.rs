@@ -11,6 +11,7 @@ mod effective;
 mod hooks;
 mod key;
 mod layer;
+mod load;
 mod read;
 #[cfg(test)]
 mod tests;
@@ -33,7 +34,7 @@ pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
     Statement,
 };
-pub use layer::{Surroundings, check, load};
+pub use load::{Surroundings, check, load};
 pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 pub use vehicle::{VEHICLE_WORDS, VehicleWord, find as find_vehicle_word};
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::between::Presence;
+use super::presence::{Presence, is_stale};
 use super::session::Session;
 use crate::engine::{EngineError, Operator, Recorder};
 use crate::journal::event::Event;
@@ -159,9 +159,4 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             .and_then(serde_json::Value::as_u64);
         Duration::from_millis(millis.unwrap_or(31_000))
     }
-}
-
-/// Stored by the broker before the run began.
-pub(super) fn is_stale(entry: &crate::journal::Entry) -> bool {
-    matches!(entry.event(), Event::Message { retain: true, .. })
 }

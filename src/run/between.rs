@@ -2,111 +2,65 @@
 
 use serde_json::Map;
 
-use super::admission::is_stale;
+use super::presence::{Presence, is_stale, says_online};
 use super::session::Session;
 use crate::bench::Vantage;
-use crate::engine::vehicle::{has_any_open_connection, has_open_connection};
 use crate::engine::{EngineError, HookOutcome, Operator, Recorder};
 use crate::journal::event::{Event, LinkFault};
-use crate::judge::RunJudge;
 use crate::link::Link;
-use crate::pack::Role;
 use crate::profile::show_duration;
 
 /// So often a device is switched on before it is given up.
 const STARTS: usize = 2;
 
-/// Whether the device is connected, as far as the harness can see.
-pub(super) enum Presence {
-    There,
-    Away,
-}
+impl<L: Link, O: Operator> Session<'_, L, O> {
+    /// Ends link faults that a test has left behind, and waits for the device to come back.
+    pub(super) async fn settle_link(&mut self) -> Result<(), EngineError> {
+        let entries = self.engine.recorder.journal().entries();
+        let last = entries.iter().rev().find_map(|entry| match entry.event() {
+            Event::Fault { fault } => Some(fault.clone()),
+            _ => None,
+        });
+        if matches!(last, None | Some(LinkFault::Restore)) {
+            return Ok(());
+        }
+        self.engine.note(Event::Fault {
+            fault: LinkFault::Restore,
+        })?;
+        self.engine.link.fault(LinkFault::Restore).await?;
+        Ok(())
+    }
 
-impl Presence {
-    pub(super) fn of(judge: &RunJudge, vantage: Vantage) -> Self {
-        let there = match vantage {
-            Vantage::Tap if judge.role() == Role::MasterControl => has_any_open_connection(judge),
-            // A master control says nothing by itself, so nobody can tell.
-            Vantage::Subscriber if judge.role() == Role::MasterControl => true,
-            Vantage::Tap => has_open_connection(judge),
-            Vantage::Subscriber => {
-                let said = judge.timeline().of("connection").last();
-                let online = judge.ground().pack.word("connection.online");
-                let state = said.and_then(|entry| entry.json()?.get("connectionState")?.as_str());
-                let fresh = judge
-                    .timeline()
-                    .of("state")
-                    .last()
-                    .is_some_and(|entry| !is_stale(entry));
-                if said.is_some() { state == online } else { fresh }
-            }
+    /// Waits for a device that is gone, with the help of the `power-cycle` hook if there is one. Gives the
+    /// reason when it stays away.
+    pub(super) async fn revive(&mut self) -> Result<Option<String>, EngineError> {
+        let vantage = self.setup.capabilities.vantage;
+        let there = move |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
+        let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
+        // A device that comes back by itself is given the chance before it is switched off and on.
+        let first = if has_hook {
+            self.time("settle")
+        } else {
+            self.time("reconnect")
         };
-        if there { Self::There } else { Self::Away }
+        let until = self.engine.link.now().moment + first;
+        if self.engine.watch(until, there).await? {
+            return Ok(None);
+        }
+        let why = format!(
+            "the device is gone: it did not come back within {}",
+            show_duration(self.time("reconnect"))
+        );
+        if !has_hook {
+            return Ok(Some(why));
+        }
+        let sent = last_sent(&self.engine.recorder);
+        let reason = format!("the device is gone and is restarted; the last message it was sent is {sent}");
+        Ok(match power_cycle(self, reason).await? {
+            Ok(()) => None,
+            Err(failed) => Some(format!("{why}, and {failed}")),
+        })
     }
-
-    pub(super) fn is_there(&self) -> bool {
-        matches!(self, Self::There)
-    }
-}
-
-/// Whether the device says on its own connection topic that it is online. A device that never said anything
-/// there is not held to it here: that is for the tests to find.
-pub(super) fn says_online(judge: &RunJudge) -> bool {
-    let Some(said) = judge.timeline().of("connection").last() else {
-        return true;
-    };
-    let state = said.json().and_then(|message| message.get("connectionState")?.as_str());
-    state == judge.ground().pack.word("connection.online")
-}
-
-/// Ends link faults that a test has left behind, and waits for the device to come back.
-pub(super) async fn settle_link<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Result<(), EngineError> {
-    let entries = session.engine.recorder.journal().entries();
-    let last = entries.iter().rev().find_map(|entry| match entry.event() {
-        Event::Fault { fault } => Some(fault.clone()),
-        _ => None,
-    });
-    if matches!(last, None | Some(LinkFault::Restore)) {
-        return Ok(());
-    }
-    session.engine.note(Event::Fault {
-        fault: LinkFault::Restore,
-    })?;
-    session.engine.link.fault(LinkFault::Restore).await?;
-    Ok(())
-}
-
-/// Waits for a device that is gone, with the help of the `power-cycle` hook if there is one. Gives the
-/// reason when it stays away.
-pub(super) async fn revive<L: Link, O: Operator>(
-    session: &mut Session<'_, L, O>,
-) -> Result<Option<String>, EngineError> {
-    let vantage = session.setup.capabilities.vantage;
-    let there = move |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
-    let has_hook = session.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
-    // A device that comes back by itself is given the chance before it is switched off and on.
-    let first = if has_hook {
-        session.time("settle")
-    } else {
-        session.time("reconnect")
-    };
-    let until = session.engine.link.now().moment + first;
-    if session.engine.watch(until, there).await? {
-        return Ok(None);
-    }
-    let why = format!(
-        "the device is gone: it did not come back within {}",
-        show_duration(session.time("reconnect"))
-    );
-    if !has_hook {
-        return Ok(Some(why));
-    }
-    let sent = last_sent(&session.engine.recorder);
-    let reason = format!("the device is gone and is restarted; the last message it was sent is {sent}");
-    Ok(match power_cycle(session, reason).await? {
-        Ok(()) => None,
-        Err(failed) => Some(format!("{why}, and {failed}")),
-    })
 }
 
 /// Switches the device off and on by its hook, and waits for the first state of the new connection. A start that takes

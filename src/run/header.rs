@@ -1,7 +1,5 @@
 //! The first record of a journal: what the run is about.
 
-use std::collections::BTreeMap;
-
 use serde_json::{Map, Value, json};
 
 use crate::bench::Vantage;

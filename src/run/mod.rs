@@ -21,6 +21,7 @@ mod library;
 mod outputs;
 mod over_sockets;
 mod pace;
+mod presence;
 mod qualify;
 mod rest;
 mod risk;

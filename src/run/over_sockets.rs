@@ -283,10 +283,14 @@ impl Stage<'_> {
 }
 
 /// The bench that a profile describes.
-fn bench_of(profile: &Profile, topics: Vec<String>, surroundings: &Surroundings) -> Result<BenchOptions, Diagnostic> {
+fn bench_of(
+    profile: &Profile,
+    topics: Vec<String>,
+    surroundings: &Surroundings,
+) -> Result<BenchOptions, Vec<Diagnostic>> {
     let bench = &profile.bench;
     let password = bench.password.password(surroundings);
-    let password = password.map_err(|error| Diagnostic::whole("password", error.to_string()))?;
+    let password = password.map_err(|error| vec![Diagnostic::whole("password", error.to_string())])?;
     let credentials = bench.username.clone().map(|username| Credentials {
         username,
         password: password
@@ -320,7 +324,7 @@ fn bench_of(profile: &Profile, topics: Vec<String>, surroundings: &Surroundings)
 /// Whether a device that connects to this bench can fetch a file from its map server; `Err` says why not. One that the
 /// harness starts runs on this machine.
 fn reach(options: &BenchOptions, starts_device: bool) -> Result<(), String> {
-    let host = bench
+    let host = options
         .maps_host
         .as_deref()
         .unwrap_or_else(|| host_of(&options.maps_listen));

@@ -5,7 +5,7 @@
 
 use serde_json::Value;
 
-use super::between::says_online;
+use super::presence::says_online;
 use crate::clock::Moment;
 use crate::course::Layout;
 use crate::judge::RunJudge;

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use super::between::{Presence, revive, settle_link};
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
 use super::draw::draw;
 use super::estimate::{self, Estimate};
+use super::presence::Presence;
 use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
 use super::strikes::Strikes;
@@ -315,7 +315,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             return Ok(None);
         }
         self.progress.note("the device is not connected; waiting for it");
-        revive(self).await
+        self.revive().await
     }
 
     fn bindings(&self, test: &Test, number: usize) -> Result<Map<String, Value>, String> {
@@ -393,7 +393,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
 
     /// Restores the link, and makes sure the vehicle is at rest.
     async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
-        settle_link(self).await?;
+        self.settle_link().await?;
         self.engine.drain().await?;
         if self.engine.recorder.judge().role() == Role::MasterControl {
             return self.tidy_fleet(test).await;

@@ -226,10 +226,11 @@ pub struct BenchFacts {
     pub maps: Result<(), String>,
 }
 
-fn subject(profile: &Profile) -> Result<Participant, Diagnostic> {
+fn subject(profile: &Profile) -> Result<Participant, Vec<Diagnostic>> {
     let missing = |setting: &str, flag: &str| {
         let title = format!("the device is not named: `{setting}` is missing");
-        Diagnostic::whole("missing-setting", title).hint(format!("set it in the profile, or with {flag}"))
+        let hint = format!("set it in the profile, or with {flag}");
+        vec![Diagnostic::whole("missing-setting", title).hint(hint)]
     };
     let device = &profile.device;
     let named = |name: &Option<String>, setting, flag| name.clone().ok_or_else(|| missing(setting, flag));
@@ -260,11 +261,11 @@ fn fleet(profile: &Profile, layout: Option<&Layout>, vehicles: usize, pack: &Pac
 
 /// The files of `[maps]`. A vehicle that is not ours is not judged by a file that nobody said it can read; mock AGVs
 /// read any.
-fn map_files(effective: &Effective, by_mock_vehicles: bool) -> Result<Result<Vec<Bytes>, String>, Diagnostic> {
+fn map_files(effective: &Effective, by_mock_vehicles: bool) -> Result<Result<Vec<Bytes>, String>, Vec<Diagnostic>> {
     let read = effective.profile.maps.iter().map(|file| {
         std::fs::read(file).map(Bytes::from).map_err(|error| {
             let title = format!("the map file {} cannot be read: {error}", file.display());
-            effective.complain("maps.files", "unreadable", title, "named here")
+            vec![effective.complain("maps.files", "unreadable", title, "named here")]
         })
     });
     let files: Vec<Bytes> = read.collect::<Result<_, _>>()?;

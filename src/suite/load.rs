@@ -7,50 +7,33 @@ use super::fields::{Fields, Problems};
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::model::{CourseNeed, Maturity, Test};
 use super::read::{named, read_monitor, read_test, start};
+use super::source::{States, parse};
 use super::steps::StepReader;
 use super::{CheckInfo, Suites, unproven};
 use crate::diagnostic::{Diagnostic, Source, Span};
 use crate::pack::Role;
-use crate::yaml::{self, Node};
+use crate::yaml::Node;
 
 const STATE_KEYS: &[&str] = &["state", "title", "steps"];
 
-/// The states of `suites/states/`, by name. A state whose file is broken is known without its steps.
-#[derive(Default)]
-pub(super) struct States(BTreeMap<String, Option<Node>>);
-
-impl States {
-    pub(super) fn steps_of(&self, name: &str) -> Option<&Node> {
-        self.0.get(name)?.as_ref()
+/// Reads one file and remembers its steps.
+fn read_state(states: &mut States, name: &str, source: &Arc<Source>, problems: &mut Problems) {
+    states.insert(name, None);
+    let Some(root) = parse(source, problems) else { return };
+    let Some(fields) = Fields::of(&root, problems) else {
+        return;
+    };
+    fields.only(&[STATE_KEYS], problems);
+    let at = start(&root);
+    named(&fields, "state", name, &at, problems);
+    fields.need_text("title", &at, problems);
+    let Some(steps) = fields.need("steps", &at, problems) else {
+        return;
+    };
+    if steps.list().is_some_and(<[Node]>::is_empty) {
+        problems.at("empty-steps", &steps.span, "a state without steps", "nothing to do");
     }
-
-    pub(super) fn is_known(&self, name: &str) -> bool {
-        self.0.contains_key(name)
-    }
-
-    pub(super) fn names(&self) -> Vec<&str> {
-        self.0.keys().map(String::as_str).collect()
-    }
-
-    /// Reads one file and remembers its steps.
-    fn read(&mut self, name: &str, source: &Arc<Source>, problems: &mut Problems) {
-        self.0.insert(name.to_owned(), None);
-        let Some(root) = parse(source, problems) else { return };
-        let Some(fields) = Fields::of(&root, problems) else {
-            return;
-        };
-        fields.only(&[STATE_KEYS], problems);
-        let at = start(&root);
-        named(&fields, "state", name, &at, problems);
-        fields.need_text("title", &at, problems);
-        let Some(steps) = fields.need("steps", &at, problems) else {
-            return;
-        };
-        if steps.list().is_some_and(<[Node]>::is_empty) {
-            problems.at("empty-steps", &steps.span, "a state without steps", "nothing to do");
-        }
-        self.0.insert(name.to_owned(), Some(steps.clone()));
-    }
+    states.insert(name, Some(steps.clone()));
 }
 
 /// Loads every file below `suites/`, given by path and text.
@@ -75,7 +58,7 @@ pub(super) fn load<'a>(
         }
         let source = Source::new(path, text);
         match (folder, rest.strip_suffix(".yaml")) {
-            ("states", Some(name)) => states.read(name, &source, &mut problems),
+            ("states", Some(name)) => read_state(&mut states, name, &source, &mut problems),
             ("agv", Some(name)) => tests.push((source, Some(Role::Agv), name.to_owned())),
             ("master-control", Some(name)) => tests.push((source, Some(Role::MasterControl), name.to_owned())),
             ("monitors", Some(name)) => monitors.push((source, name.to_owned())),
@@ -176,7 +159,7 @@ pub(super) fn load_text<'a>(
             .and_then(|rest| rest.strip_suffix(".yaml"))
         {
             // The mistakes of other files are not those of this one.
-            states.read(name, &Source::new(path, text), &mut Problems::default());
+            read_state(&mut states, name, &Source::new(path, text), &mut Problems::default());
         }
     }
     let source = Source::new(name, text);
@@ -192,7 +175,7 @@ pub(super) fn load_text<'a>(
             .and_then(|root| root.get("state")?.text())
             .unwrap_or_default()
             .to_owned();
-        states.read(&own, &source, &mut problems);
+        read_state(&mut states, &own, &source, &mut problems);
         lint_state(&own, &source, &states, vocabulary, known, &mut problems);
     } else {
         let read = read_test(&source, None, &states, vocabulary, known, &mut problems);
@@ -264,50 +247,4 @@ fn lint_state(
             lint::test(&test, &places, vocabulary, known, problems);
         }
     }
-}
-
-/// The tree of a file; its mistakes are noted.
-pub(super) fn parse(source: &Arc<Source>, problems: &mut Problems) -> Option<Node> {
-    match yaml::tree(source) {
-        Ok(root) => Some(root),
-        Err(found) => {
-            for diagnostic in found {
-                problems.add(unquoted_variable(&diagnostic).unwrap_or(diagnostic));
-            }
-            None
-        }
-    }
-}
-
-/// A syntax error that comes from `${…}` without quotes inside `{ }` or `[ ]`.
-fn unquoted_variable(diagnostic: &Diagnostic) -> Option<Diagnostic> {
-    let span = diagnostic.span.as_ref().filter(|_| diagnostic.code == "yaml-syntax")?;
-    let text = &span.source.text;
-    let line_start = text[..span.start].rfind('\n').map_or(0, |at| at + 1);
-    let line_end = text[span.start..].find('\n').map_or(text.len(), |at| span.start + at);
-    // The reader may notice only on the next line.
-    let from = text[..line_start.saturating_sub(1)].rfind('\n').map_or(0, |at| at + 1);
-    let mut quote = None;
-    let mut found = None;
-    for (at, c) in text[from..line_end].char_indices() {
-        match (quote, c) {
-            (None, '"' | '\'') => quote = Some(c),
-            (Some(open), c) if open == c => quote = None,
-            (None, '$') if text[from + at..].starts_with("${") => found = Some(from + at),
-            (_, '\n') => quote = None,
-            _ => {}
-        }
-    }
-    let start = found?;
-    let end = text[start..line_end].find('}').map_or(line_end, |at| start + at + 1);
-    let span = Span::new(&span.source, start, end);
-    Some(
-        Diagnostic::new(
-            "unquoted-variable",
-            span.clone(),
-            "a variable without quotes inside `{ }` or `[ ]`",
-            "YAML reads these braces as its own",
-        )
-        .hint(format!("write \"{}\"", span.text())),
-    )
 }

@@ -14,6 +14,7 @@ mod load;
 mod matrix;
 pub mod model;
 mod read;
+mod source;
 mod steps;
 mod stimuli;
 mod terms;

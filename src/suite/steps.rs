@@ -3,11 +3,11 @@
 use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of, word_of};
 use super::grammar::{time, walk};
-use super::load::States;
 use super::model::{
     ActionWalk, Always, Assertion, Binding, CheckUse, Expect, Extent, From, Never, Path, Retained, Selection, Step,
     TimeTerm, Until, Verb,
 };
+use super::source::States;
 use super::stimuli::{
     OPERATOR_KEYS, SEND_KEYS, SERVE_KEYS, VEHICLE_KEYS, check_name, link, link_keys, operator, send, serve, vehicle,
     which,

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use super::fields::{Fields, Problems};
 use super::lint::Vocabulary;
-use super::load::parse;
 use super::read::start;
+use super::source::parse;
 use super::steps::version_range;
 use crate::diagnostic::Source;
 use crate::pack::{Role, VersionRange};

@@ -20,6 +20,7 @@ use tokio_rustls::rustls::{ClientConfig, ServerConfig};
 
 use crate::bench::LinkError;
 use crate::bench::inbox::Reporter;
+use crate::bench::listen::{cannot_listen, listen_on};
 use crate::journal::event::{Direction, Event, LinkFault, Source};
 use faults::{Change, Faults};
 

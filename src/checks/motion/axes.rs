@@ -2,7 +2,8 @@
 
 use super::found;
 use super::lane::Place;
-use super::way::{self, Pose};
+use super::pose::Pose;
+use super::way;
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 

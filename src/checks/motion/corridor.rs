@@ -4,7 +4,8 @@ use serde_json::Value;
 
 use super::lane::Lane;
 use super::node_tolerance::margin;
-use super::way::{self, Pose};
+use super::pose::Pose;
+use super::way;
 use super::{found, softly};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;

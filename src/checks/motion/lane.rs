@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
+use super::pose::{Pose, finite};
 use crate::checks::orders::number;
 use crate::checks::traffic::{elements, text};
 use crate::nurbs::{Beside, Curve, Path};
@@ -17,11 +18,6 @@ pub(super) fn wrapped(angle: f64) -> f64 {
 /// How far two orientations are apart, the short way, in radians.
 pub(super) fn apart(one: f64, other: f64) -> f64 {
     wrapped(one - other).abs()
-}
-
-/// A number member that can be calculated with.
-pub(super) fn finite(value: &Value, name: &str) -> Option<f64> {
-    value.get(name)?.as_f64().filter(|number| number.abs() < 1e9)
 }
 
 /// nodePosition of an ordered node.
@@ -205,7 +201,7 @@ pub(super) struct Bend {
 
 impl Lane {
     /// Where a position is beside the trajectory.
-    pub fn bend(&self, pose: &super::way::Pose) -> Option<Bend> {
+    pub fn bend(&self, pose: &Pose) -> Option<Bend> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
         let path = self
             .demands
@@ -231,7 +227,7 @@ impl Lane {
     }
 
     /// Where a position is along the line.
-    pub fn along(&self, pose: &super::way::Pose) -> Option<Along> {
+    pub fn along(&self, pose: &Pose) -> Option<Along> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
         let heading = self.heading()?;
         if pose.map != from.map {
@@ -247,7 +243,7 @@ impl Lane {
     }
 
     /// Whether the pose is on the straight edge alone.
-    pub fn is_mid_edge(&self, pose: &super::way::Pose) -> bool {
+    pub fn is_mid_edge(&self, pose: &Pose) -> bool {
         !self.demands.curved && self.along(pose).is_some_and(|along| along.is_mid_edge())
     }
 

@@ -13,6 +13,7 @@ mod lane;
 mod mode_speed;
 mod node_theta;
 mod node_tolerance;
+mod pose;
 mod rotation_place;
 mod velocity_sign;
 mod way;

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::lane::{Demands, Lane, Stop, finite};
+use super::lane::{Demands, Lane, Stop};
+use super::pose::{Pose, finite};
 use crate::checks::CheckContext;
 use crate::checks::orders::{number, read_elements};
 use crate::checks::state::route::Shown;
@@ -20,29 +21,6 @@ const ELEMENTS: usize = 1024;
 
 /// Slower than this is at rest, in metres and radians per second.
 pub(super) const AT_REST: f64 = 0.02;
-
-/// agvPosition, where it is initialized and complete.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pose {
-    pub map: String,
-    pub x: f64,
-    pub y: f64,
-    pub theta: f64,
-}
-
-impl Pose {
-    fn read(state: &Value) -> Option<Self> {
-        let position = state.get("agvPosition")?;
-        let initialized = position.get("positionInitialized").and_then(Value::as_bool);
-        (initialized == Some(true)).then_some(())?;
-        Some(Self {
-            map: text(position, "mapId").chars().take(512).collect(),
-            x: finite(position, "x")?,
-            y: finite(position, "y")?,
-            theta: finite(position, "theta").filter(|theta| theta.abs() < 3.2)?,
-        })
-    }
-}
 
 /// velocity in vehicle coordinates; each member is optional.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

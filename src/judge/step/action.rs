@@ -11,7 +11,7 @@ use crate::journal::Entry;
 use crate::journal::event::Waiver;
 use crate::judge::limit::Limit;
 use crate::judge::mend::{Mends, is_lasting, status_meant};
-use crate::judge::window::Scene;
+use crate::judge::scene::Scene;
 use crate::result::NearestMiss;
 use crate::suite::model::{ActionWalk, Step, Walk};
 

@@ -10,7 +10,8 @@ use super::{
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::judge::limit::Limit;
-use crate::judge::window::{CheckWindow, Said, Scene};
+use crate::judge::scene::Scene;
+use crate::judge::window::{CheckWindow, Said};
 use crate::suite::model::{Always, Extent, From, Step, Until};
 
 pub(crate) struct Holding {

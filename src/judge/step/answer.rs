@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{Clause, Holds, Position, Selector, StepOutcome, bind_pattern};
 use crate::journal::Entry;
 use crate::journal::event::Event;
-use crate::judge::window::Scene;
+use crate::judge::scene::Scene;
 use crate::pattern::Bound;
 use crate::suite::model::{Assertion, Expect};
 

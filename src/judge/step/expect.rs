@@ -10,7 +10,7 @@ use super::{
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::judge::limit::Limit;
-use crate::judge::window::Scene;
+use crate::judge::scene::Scene;
 use crate::suite::model::{Expect, From, Step};
 
 pub(crate) struct Expecting {

@@ -16,15 +16,18 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+pub use super::holds::Holds;
+use super::holds::unbound_text;
 use super::limit::Limit;
 use super::mend::Mends;
+use super::scene::Scene;
 use super::timeline::Timeline;
-use super::window::{CheckWindow, Said, Scene};
+use super::window::{CheckWindow, Said};
 use crate::clock::Moment;
 use crate::diagnostic::Span;
 use crate::journal::Entry;
 use crate::pack::RequirementId;
-use crate::pattern::{Bound, Pattern, Unbound};
+use crate::pattern::{Bound, Pattern};
 use crate::result::NearestMiss;
 use crate::suite::model::{Assertion, Binding, From, Selection, Step, Verb};
 
@@ -54,21 +57,6 @@ impl Position {
             From::Usual | From::Here | From::Latest => self.cursor,
         }
     }
-}
-
-/// How a clause came out, before the mood of its requirement is known.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Holds {
-    /// It holds.
-    Yes,
-    /// It holds, later than it should.
-    Late,
-    /// A ruling of the catalogue asks for a warning.
-    Softly,
-    /// It does not hold.
-    No,
-    /// It could not be observed; the text says why.
-    Unseen(String),
 }
 
 /// One requirement bound to one clause, decided.
@@ -406,10 +394,6 @@ pub(super) fn bind_pattern(pattern: Option<&Pattern>, scene: &Scene<'_>) -> Resu
         .map(|pattern| pattern.bind(scene.bindings))
         .transpose()
         .map_err(|unbound| unbound_text(&unbound))
-}
-
-pub(in crate::judge) fn unbound_text(unbound: &Unbound) -> String {
-    format!("the variable ${{{}}} has no value here", unbound.name)
 }
 
 pub(super) fn limit(time: &crate::suite::model::TimeTerm, scene: &Scene<'_>) -> Result<Limit, String> {

@@ -6,7 +6,8 @@ use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_cla
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
-use crate::judge::window::{CheckWindow, Said, Scene};
+use crate::judge::scene::Scene;
+use crate::judge::window::{CheckWindow, Said};
 use crate::suite::model::{From, Never, Step};
 
 pub(crate) struct Forbidding {

@@ -9,7 +9,7 @@ use super::{
 use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::Event;
-use crate::judge::window::Scene;
+use crate::judge::scene::Scene;
 use crate::suite::model::{Retained, Step};
 
 pub(crate) struct Fetching {

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::test_view::findings;
 use super::view::Badge;
 use crate::report::clean;
 use crate::report::sources::TestSource;
@@ -32,7 +31,7 @@ pub fn source_view(source: &TestSource, test: &TestResult) -> SourceView {
     let mut notes: BTreeMap<usize, Vec<(Badge, String)>> = BTreeMap::new();
     let mut deciding = BTreeSet::new();
     let mut around = BTreeSet::new();
-    for decision in findings(test) {
+    for decision in test.findings() {
         let clause = source
             .clauses
             .iter()

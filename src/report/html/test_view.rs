@@ -193,7 +193,7 @@ fn view(
 fn marked(test: &TestResult) -> BTreeMap<u64, String> {
     let mut worst: BTreeMap<u64, Verdict> = BTreeMap::new();
     let mut marked = BTreeMap::new();
-    for decision in findings(test) {
+    for decision in test.findings() {
         if let Some(nearest) = &decision.nearest {
             marked.insert(nearest.seq, "nearest miss".to_owned());
         }
@@ -206,13 +206,6 @@ fn marked(test: &TestResult) -> BTreeMap<u64, String> {
     marked
 }
 
-/// The decisions that are not a pass.
-pub fn findings(test: &TestResult) -> impl Iterator<Item = &Decision> {
-    test.decisions
-        .iter()
-        .filter(|decision| decision.verdict() != Verdict::Pass)
-}
-
 /// Asks for the messages of a test: those that decided, the nearest misses, the stimuli around them. Says what
 /// was left out.
 fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
@@ -220,7 +213,7 @@ fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
     // The most important first, because there is a limit.
     let pointed_out = marked(test);
     let mut places: BTreeMap<u64, Vec<&str>> = BTreeMap::new();
-    for decision in findings(test) {
+    for decision in test.findings() {
         if let Some(witness) = decision.witness {
             places.entry(witness).or_default();
         }
@@ -235,7 +228,7 @@ fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
     let mut wanted: Vec<(u64, &str)> = pointed_out.iter().map(|(seq, role)| (*seq, role.as_str())).collect();
     let mut centres: BTreeSet<u64> = pointed_out.keys().copied().collect();
     wanted.extend(
-        findings(test)
+        test.findings()
             .filter_map(|finding| finding.waited.as_ref())
             .map(|w| (w.since, "stimulus")),
     );

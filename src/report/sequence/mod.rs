@@ -4,6 +4,7 @@
 //! what is left out, this module places the rest. The picture stands alone, and inside an HTML page it takes the page's colours; its arrows
 //! link to `#m<number>` where the page shows that message.
 
+mod row;
 mod rows;
 mod thin;
 
@@ -13,7 +14,7 @@ use askama::Template;
 
 use super::clean::short;
 use crate::journal::Journal;
-use rows::{Lane, Row, What};
+use row::{Lane, Row, What};
 
 /// Most rows of a diagram unless the caller says otherwise.
 pub const ROW_LIMIT: usize = 200;

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Options;
-use super::rows::{Row, What};
+use super::row::{Row, What};
 use crate::journal::{Direction, Entry, Event, Packet};
 use crate::report::clean::line;
 use crate::report::statement::many;
