@@ -61,6 +61,7 @@ pub mod nurbs;
 pub mod pack;
 pub mod pattern;
 pub mod profile;
+pub mod qualify;
 pub mod reference;
 pub mod report;
 pub mod result;

@@ -10,11 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Modules by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer.
-const LAYERS: [(&str, u8); 28] = [
+const LAYERS: [(&str, u8); 29] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
     ("run", 5),
+    ("qualify", 5),
     ("simulate", 5),
     ("report", 5),
     ("engine", 4),

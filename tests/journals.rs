@@ -16,8 +16,9 @@ use std::path::Path;
 
 use serde::Deserialize;
 use vda5050_tck::judge::judge;
+use vda5050_tck::qualify::decided;
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::{Library, decided};
+use vda5050_tck::run::Library;
 use vda5050_tck::verdict::{Accumulated, Verdict};
 
 /// Requirement id to verdict; nothing means that it must not be decided.

@@ -9,9 +9,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use vda5050_tck::pack::Pack;
+use vda5050_tck::qualify::{Decider, decided};
 use vda5050_tck::reference::agv::{FAULTS, TOLERANCES};
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::{Decider, Library, VirtualRun, decided, run_silently};
+use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 /// Liberties that exclude another one: of each pair the second is left out where all are taken at once.

@@ -191,7 +191,7 @@ mod tests {
         assert!(judge(&at(2.0, 1.01), false).is_empty());
         assert!(judge(&at(9.0, 1.0), true).is_empty(), "it drives");
         assert!(
-            judge(&at(2000.0, 900.0), true).is_empty(),
+            judge(&at(2000.0, 400.0), true).is_empty(),
             "elsewhere, and not in millimetres"
         );
     }

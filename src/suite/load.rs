@@ -9,7 +9,7 @@ use super::model::{CourseNeed, Maturity, Test};
 use super::read::{named, read_monitor, read_test, start};
 use super::source::{States, parse};
 use super::steps::StepReader;
-use super::{CheckInfo, Suites, unproven};
+use super::{CheckInfo, Suites, exceptions};
 use crate::diagnostic::{Diagnostic, Source, Span};
 use crate::pack::Role;
 use crate::yaml::Node;
@@ -46,7 +46,7 @@ pub(super) fn load<'a>(
     let mut states = States::default();
     let mut tests = Vec::new();
     let mut monitors = Vec::new();
-    let mut unproven = Vec::new();
+    let mut exceptions = Vec::new();
     for (path, text) in files {
         let inner = path.strip_prefix("suites/").unwrap_or(path);
         let Some((folder, rest)) = inner.split_once('/') else {
@@ -62,8 +62,8 @@ pub(super) fn load<'a>(
             ("agv", Some(name)) => tests.push((source, Some(Role::Agv), name.to_owned())),
             ("master-control", Some(name)) => tests.push((source, Some(Role::MasterControl), name.to_owned())),
             ("monitors", Some(name)) => monitors.push((source, name.to_owned())),
-            ("qualification", Some("agv")) => unproven.push((source, Role::Agv)),
-            ("qualification", Some("master-control")) => unproven.push((source, Role::MasterControl)),
+            ("qualification", Some("agv")) => exceptions.push((source, Role::Agv)),
+            ("qualification", Some("master-control")) => exceptions.push((source, Role::MasterControl)),
             _ => stray(path, &mut problems),
         }
     }
@@ -76,10 +76,10 @@ pub(super) fn load<'a>(
         let read = read_monitor(source, Some(name), vocabulary, known, &mut problems);
         suites.monitors.extend(read.map(Arc::new));
     }
-    for (source, role) in &unproven {
-        suites
-            .unproven
-            .extend(unproven::read(source, *role, vocabulary, &mut problems));
+    for (source, role) in &exceptions {
+        let read = exceptions::read(source, *role, vocabulary, &mut problems);
+        suites.exceptions.unproven.extend(read.unproven);
+        suites.exceptions.unfound.extend(read.unfound);
     }
     suites.tests.sort_by(|left, right| left.id.cmp(&right.id));
     suites.monitors.sort_by(|left, right| left.id.cmp(&right.id));

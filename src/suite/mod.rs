@@ -6,6 +6,7 @@
 
 mod course;
 mod drawn;
+mod exceptions;
 mod expand;
 mod fields;
 mod grammar;
@@ -20,14 +21,13 @@ mod stimuli;
 mod terms;
 #[cfg(test)]
 mod tests;
-mod unproven;
 mod visit;
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
+pub use exceptions::{Exceptions, Unfound, Unproven};
 pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
-pub use unproven::Unproven;
 
 use crate::diagnostic::Diagnostic;
 use crate::pack::{Assets, Catalogue, Packs};
@@ -62,7 +62,7 @@ pub struct Suites {
     /// The monitors.
     pub monitors: Vec<Arc<Monitor>>,
     /// What qualification cannot prove, and why.
-    pub unproven: Vec<Unproven>,
+    pub exceptions: Exceptions,
     /// The tests by requirement, once somebody has asked for them.
     deciding: OnceLock<HashMap<String, Vec<Arc<Test>>>>,
 }

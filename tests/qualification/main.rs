@@ -1,4 +1,4 @@
-//! What the suites find, on devices with known mistakes: our own with each of their faults, and those of others.
+//! What the suites find, on devices with known mistakes: our own with a share of their faults, and those of others.
 //!
 //! Both are in one program because the one needs the processor and the other mostly waits. What needs the processor
 //! stands back (`stand_back`), so that the devices of others are not kept waiting.
@@ -11,6 +11,7 @@
 
 mod foreign;
 mod reference;
+mod share;
 
 /// The allocator of the program: a qualification is a million small trees.
 #[global_allocator]

@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn the_place_of_the_update_is_found() {
-        assert_eq!(shown(6.0, 5.0, 6.0), ["ORD-UPD-07"]);
+        assert_eq!(shown(6.0, 5.0, 6.0), ["ORD-UPD-07 warning"]);
     }
 
     #[test]

@@ -130,9 +130,9 @@ pub struct Qualify {
     /// Only this side's [agv, master-control]; both unless said
     #[arg(long, value_name = "ROLE", value_parser = super::inspect::parse_role)]
     pub role: Option<crate::pack::Role>,
-    /// The faults of blind rounds that the suites need not find yet, instead of the proven ones
+    /// Print which fault fails which clause, too
     #[arg(long)]
-    pub blind: bool,
+    pub matrix: bool,
 
     /// Only these faults; may be repeated
     #[arg(long, value_name = "NAME")]
@@ -140,7 +140,7 @@ pub struct Qualify {
     /// For this protocol version; every one known unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,
-    /// How the kill matrix is written
+    /// How the outcome is written
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
     /// Which suites.

@@ -1,16 +1,16 @@
-//! What the faults about a requirement leave unproven: faults of blind rounds are tried on it, then every fault.
+//! What is unproven when the faults are found: the faults that are about it are tried, then every fault.
 //!
 //! What the suites say no fault is known to fail is left out: to try everything on it would cost minutes and show what
 //! is known.
 
 use std::collections::BTreeSet;
 
-use super::{DRAWN, Decider, Kill, Vehicle, concerns, each, excuses, kill, merge};
+use super::DRAWN;
+use super::decider::Decider;
+use super::kill::{Grounds, Kill, concerns, each, merge};
 use crate::engine::EngineError;
-use crate::pack::Pack;
 use crate::reference::Fault;
-use crate::run::library::Library;
-use crate::suite::Unproven;
+use crate::suite::Exceptions;
 use crate::suite::model::Test;
 
 /// So many faults are tried before it is looked again what is still unproven.
@@ -18,67 +18,67 @@ const CHUNK: usize = 12;
 
 /// What there is to prove, and on what.
 pub(super) struct Rest<'r> {
-    pub(super) library: &'r Library,
-    pub(super) pack: &'r Pack,
-    pub(super) vehicles: &'r [Vehicle],
-    /// Everything that passes on the faultless device.
-    pub(super) deciders: &'r BTreeSet<Decider>,
-    /// What the suites say no fault is known to fail.
-    pub(super) excused: &'r [Unproven],
+    grounds: &'r Grounds<'r>,
+    /// What passes on the faultless device, but for what the suites say no fault is known to fail.
+    deciders: Vec<&'r Decider>,
 }
 
-impl Rest<'_> {
-    /// Tries what is left with the faults of blind rounds, then with all of them.
+impl<'r> Rest<'r> {
+    pub(super) fn new(grounds: &'r Grounds<'r>, deciders: &'r BTreeSet<Decider>, exceptions: &Exceptions) -> Self {
+        let excused = |decider: &Decider| exceptions.unproven.iter().any(|one| decider.is(one));
+        let deciders = deciders.iter().filter(|decider| !excused(decider)).collect();
+        Self { grounds, deciders }
+    }
+
+    /// Tries what is left with the faults that are about it, then with all of them.
     ///
     /// # Errors
     /// When a run cannot be carried out.
-    pub(super) fn prove(&self, faults: &[Fault], late: &[Fault], kills: &mut Vec<Kill>) -> Result<(), EngineError> {
-        self.try_the_late(late, kills)?;
+    pub(super) fn prove(&self, faults: &[Fault], kills: &mut [Kill]) -> Result<(), EngineError> {
+        self.try_the_concerned(faults, kills)?;
         self.try_on_monitors(kills)?;
-        self.try_drawn_on_monitors(late, kills)?;
+        self.try_drawn_on_monitors(faults, kills)?;
         self.try_all(faults, kills)?;
         self.try_alone(faults, kills)
     }
 
-    /// What none of these kills proves, but for what is excused.
-    fn open(&self, kills: &[Kill]) -> Vec<&Decider> {
-        let killed: BTreeSet<&Decider> = kills.iter().flat_map(|kill| &kill.deciders).collect();
-        let open = self.deciders.iter().filter(|decider| !killed.contains(decider));
-        open.filter(|decider| !self.excused.iter().any(|one| excuses(one, decider)))
-            .collect()
+    /// What none of these kills proves.
+    fn open(&self, kills: &[Kill]) -> Vec<&'r Decider> {
+        let killed: BTreeSet<&Decider> = kills.iter().flat_map(|kill| kill.deciders.keys()).collect();
+        let open = self.deciders.iter().filter(|decider| !killed.contains(*decider));
+        open.copied().collect()
     }
 
     /// The tests of which something is open.
-    fn open_places(&self, kills: &[Kill]) -> BTreeSet<&str> {
+    fn open_places(&self, kills: &[Kill]) -> BTreeSet<&'r str> {
         let open = self.open(kills).into_iter();
         open.filter_map(|one| one.place.split(' ').next()).collect()
     }
 
     /// The requirements of the monitors that are open.
-    fn open_monitored(&self, kills: &[Kill]) -> BTreeSet<&str> {
-        let tests = &self.vehicles.first().map_or(&[][..], |vehicle| &vehicle.request.tests);
-        let is_monitor =
-            |decider: &Decider| !decider.place.contains(' ') && !tests.iter().any(|test| test.table() == decider.place);
+    fn open_monitored(&self, kills: &[Kill]) -> BTreeSet<&'r str> {
+        let tables = self.grounds.tables();
+        let is_monitor = |decider: &Decider| !decider.place.contains(' ') && !tables.contains(&decider.place.as_str());
         let open = self.open(kills).into_iter().filter(|decider| is_monitor(decider));
         open.map(|decider| decider.requirement.as_str()).collect()
     }
 
     fn kill(&self, fault: &Fault, draw: Option<u64>, selected: &dyn Fn(&Test) -> bool) -> Result<Kill, EngineError> {
-        kill(self.library, self.pack, self.vehicles, fault, draw, selected)
+        self.grounds.kill(fault, draw, selected)
     }
 
-    /// Tries the faults of blind rounds on the tests that decide what they break, where something in them is open.
-    fn try_the_late(&self, late: &[Fault], kills: &mut Vec<Kill>) -> Result<(), EngineError> {
-        for some in late.chunks(CHUNK) {
+    /// Tries the faults on the tests that decide what they break, where something in them is open.
+    fn try_the_concerned(&self, faults: &[Fault], kills: &mut [Kill]) -> Result<(), EngineError> {
+        for some in faults.chunks(CHUNK) {
             let places = self.open_places(kills);
             let is_open = |test: &Test| places.contains(test.table());
             let more = each(some, |fault| {
                 self.kill(fault, DRAWN, &|test| is_open(test) && concerns(fault, test))
             })?;
-            kills.extend(more);
+            merge(kills, more);
         }
         // What only some members show is tried on all that is drawn from.
-        for some in late.chunks(CHUNK) {
+        for some in faults.chunks(CHUNK) {
             let places = self.open_places(kills);
             let is_open = |test: &Test| test.drawn.is_some() && places.contains(test.table());
             let more = each(some, |fault| {
@@ -94,7 +94,7 @@ impl Rest<'_> {
     fn try_on_monitors(&self, kills: &mut [Kill]) -> Result<(), EngineError> {
         let related = |kill: &Kill, open: &BTreeSet<&str>| {
             let named = kill.fault.breaks.iter().any(|id| open.contains(*id));
-            named || kill.requirements.iter().any(|id| open.contains(id.as_str()))
+            named || kill.requirements().iter().any(|id| open.contains(id))
         };
         let open = self.open_monitored(kills);
         let all: Vec<Fault> = kills
@@ -115,9 +115,9 @@ impl Rest<'_> {
         Ok(())
     }
 
-    /// A monitor may see only in some of the drawn cases what a fault of a blind round does.
-    fn try_drawn_on_monitors(&self, late: &[Fault], kills: &mut [Kill]) -> Result<(), EngineError> {
-        for some in late.chunks(CHUNK) {
+    /// A monitor may see only in some of the drawn cases what a fault does.
+    fn try_drawn_on_monitors(&self, faults: &[Fault], kills: &mut [Kill]) -> Result<(), EngineError> {
+        for some in faults.chunks(CHUNK) {
             let open = self.open_monitored(kills);
             let about = |fault: &&Fault| fault.breaks.iter().any(|id| open.contains(*id));
             let some: Vec<Fault> = some.iter().filter(about).copied().collect();
@@ -146,7 +146,7 @@ impl Rest<'_> {
         for some in order.chunks(CHUNK) {
             let places = self.open_places(kills);
             let is_open = |test: &Test| places.contains(test.table());
-            let mut tests = self.vehicles.iter().flat_map(|vehicle| &vehicle.request.tests);
+            let mut tests = self.grounds.vehicles.iter().flat_map(|vehicle| &vehicle.request.tests);
             if !tests.any(|test| is_open(test)) {
                 break;
             }

@@ -1,0 +1,92 @@
+//! The faults that `cargo test` tries: one in eight, drawn by the commit, and all that the last change is about.
+//!
+//! `VDA5050_TCK_SHARE` is the seed (the commit unless set), `VDA5050_TCK_BASE` what the change is held against (the commit
+//! before the last one unless set).
+
+use std::collections::BTreeSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::process::Command;
+
+use vda5050_tck::pack::Role;
+use vda5050_tck::reference::Fault;
+use vda5050_tck::run::Library;
+use vda5050_tck::simulate::BuiltIn;
+
+/// One in so many is tried.
+const SHARE: u64 = 8;
+
+fn git(arguments: &[&str]) -> Option<String> {
+    let folder = env!("CARGO_MANIFEST_DIR");
+    let output = Command::new("git")
+        .arg("-C")
+        .arg(folder)
+        .args(arguments)
+        .output()
+        .ok()?;
+    output
+        .status
+        .success()
+        .then(|| String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// The share of a side.
+pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
+    let seed = std::env::var("VDA5050_TCK_SHARE").ok();
+    let seed = seed.or_else(|| git(&["rev-parse", "HEAD"])).unwrap_or_default();
+    let base = std::env::var("VDA5050_TCK_BASE").unwrap_or_else(|_| "HEAD~1".to_owned());
+    let change = git(&["diff", "--unified=0", &base, "--", "src", "suites"]).unwrap_or_default();
+    let touched = touched(library, role, &change);
+    let is_drawn = |fault: &Fault| {
+        let mut hasher = DefaultHasher::new();
+        (seed.trim(), fault.name).hash(&mut hasher);
+        hasher.finish() % SHARE == 0
+    };
+    let all = BuiltIn::every_fault(role);
+    let share: Vec<Fault> = all
+        .filter(|fault| is_drawn(fault) || touched.contains(fault.name))
+        .copied()
+        .collect();
+    println!(
+        "{role}: {} faults, seed {}, {} for the change",
+        share.len(),
+        seed.trim(),
+        touched.len()
+    );
+    share
+}
+
+/// The faults that a change names, and those that are about a requirement of a test or monitor whose file is in it.
+fn touched(library: &Library, role: Role, change: &str) -> BTreeSet<&'static str> {
+    let lines = change.lines().filter(|line| line.starts_with(['+', '-']));
+    let words: BTreeSet<&str> = lines
+        .flat_map(|line| line.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '-')))
+        .collect();
+    let paths: BTreeSet<&str> = change.lines().filter_map(|line| line.strip_prefix("+++ b/")).collect();
+    let suites = &library.rules.suites;
+    let mut about: BTreeSet<String> = BTreeSet::new();
+    for test in suites.tests.iter().filter(|test| test.device == role) {
+        if paths.contains(test.source.name.as_str()) {
+            about.extend(test.requirements().iter().map(ToString::to_string));
+        }
+    }
+    let is_touched =
+        |fault: &&Fault| words.contains(fault.name) || fault.breaks.first().is_some_and(|id| about.contains(*id));
+    BuiltIn::every_fault(role)
+        .filter(is_touched)
+        .map(|fault| fault.name)
+        .collect()
+}
+
+#[test]
+fn a_change_draws_the_faults_it_names_and_those_of_the_tests_it_is_in() {
+    let library = Library::load(None).unwrap_or_else(|_| panic!("the suites load"));
+    let named = touched(
+        &library,
+        Role::Agv,
+        "+++ b/src/x.rs\n+    StateQosOne \"state-qos-1\" [\"MQTT-07\"]\n",
+    );
+    assert_eq!(named.into_iter().collect::<Vec<_>>(), ["state-qos-1"]);
+    let test = "+++ b/suites/agv/order-rejection/lower-update-id.yaml\n+title: another\n";
+    assert!(touched(&library, Role::Agv, test).contains("outdated-update-taken-over"));
+    assert!(touched(&library, Role::MasterControl, test).is_empty());
+}
