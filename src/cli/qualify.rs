@@ -90,8 +90,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
                 };
                 let lines = complaints
                     .into_iter()
-                    .map(|line| format!("{line}\n"))
-                    .collect::<String>();
+                    .fold(String::new(), |text, line| text + "wrong: " + &line + "\n");
                 format!("{role}, VDA 5050 {version}\n{matrix}{lines}{}\n\n", outcome.summary())
             }
             Format::Json => format!("{}\n", data(*role, &version.to_string(), &outcome)),

@@ -2,12 +2,11 @@
 
 mod drawn;
 mod monitor;
+mod path;
 mod serving;
 mod vehicle;
 
 use std::sync::Arc;
-
-use serde_json::Value;
 
 use crate::diagnostic::{Source, Span};
 use crate::pack::{RequirementId, Role, VersionRange};
@@ -160,6 +159,7 @@ pub enum Need {
 pub use crate::course::CourseNeed;
 pub use drawn::{Drawn, Kind};
 pub use monitor::{About, Monitor, Rule};
+pub use path::Path;
 pub use serving::ServeBehaviour;
 pub use vehicle::{VehicleStep, Which};
 
@@ -581,26 +581,5 @@ impl ServeBehaviour {
             Self::Slow => "slow",
             Self::Unreachable => "unreachable",
         }
-    }
-}
-
-/// A path into a message: member names and array indices.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Path {
-    /// As written: `maps`, `agvPosition.x`, `errors[0].errorType`.
-    pub text: String,
-}
-
-impl Path {
-    /// The value at this path.
-    #[must_use]
-    pub fn of<'a>(&self, message: &'a Value) -> Option<&'a Value> {
-        self.text
-            .split(['.', '[', ']'])
-            .filter(|part| !part.is_empty())
-            .try_fold(message, |value, part| match value {
-                Value::Array(items) => items.get(part.parse::<usize>().ok()?),
-                other => other.get(part),
-            })
     }
 }

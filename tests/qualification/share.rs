@@ -39,7 +39,7 @@ pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
     let is_drawn = |fault: &Fault| {
         let mut hasher = DefaultHasher::new();
         (seed.trim(), fault.name).hash(&mut hasher);
-        hasher.finish() % SHARE == 0
+        hasher.finish().is_multiple_of(SHARE)
     };
     let all = BuiltIn::every_fault(role);
     let share: Vec<Fault> = all
