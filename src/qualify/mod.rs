@@ -101,13 +101,7 @@ pub fn qualify(
     let faults: Vec<Fault> = faults.iter().filter(possible).copied().collect();
     outcome.kills = match depth {
         Depth::Everything => each(&faults, |fault| grounds.kill(fault, DRAWN, &|_| true))?,
-        Depth::Faults | Depth::Clauses => each(&faults, |fault| {
-            // What is known not to be found is tried on nothing but what there is to prove.
-            match outcome.exceptions.is_unfound(fault.name) {
-                true => Ok(Kill::nothing(fault)),
-                false => find::find(&grounds, role, fault),
-            }
-        })?,
+        Depth::Faults | Depth::Clauses => each(&faults, |fault| find::find(&grounds, role, fault))?,
     };
     if depth == Depth::Clauses {
         rest::Rest::new(&grounds, &outcome.deciders, &outcome.exceptions).prove(&faults, &mut outcome.kills)?;

@@ -82,6 +82,10 @@ impl Qualification {
             };
             all.push(format!("fault {} ({breaks}) {seen}", kill.fault.name));
         }
+        let found = self.kills.iter().filter(|kill| is_found(self.role, kill));
+        for kill in found.filter(|kill| self.exceptions.is_unfound(kill.fault.name)) {
+            all.push(format!("fault {} is found, and needs no reason", kill.fault.name));
+        }
         for kill in &self.kills {
             let is_lapse = BuiltIn::lapse(self.role, kill.fault.name).is_some();
             if self.is_latest && is_lapse && kill.named() == Some(Verdict::Fail) {

@@ -122,6 +122,7 @@ records! {
             fate
         });
     fault "refused-update-extended" ["ORD-UPD-05"] "Goes on from the end of an update that was refused."
+        because "No sentence forbids to extend an order behind a refused update."
         => plain().judges(|(), _, _, running, _, fate| if fate == Fate::CalledOff && running.refused {
             (running.refused, running.confirmed) = (false, true);
             Fate::Runs

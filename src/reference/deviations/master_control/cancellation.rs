@@ -23,6 +23,7 @@ records! {
             site.drop_order(vehicle, then.take().or(stay));
         }).allows(|(), _, _, what, usual| usual || matches!(what, Permission::Interrupt));
     fault "updated-while-cancelled" ["ORD-CANCEL-01"] "Extends the base of an order it is calling off."
+        because "That an order which is called off gets no update is read out of the text."
         => plain().allows(|(), _, vehicle, what, usual| {
             let running = vehicle.running.as_ref().filter(|running| running.confirmed);
             usual || (matches!(what, Permission::Follow) && vehicle.cancel.is_some() && running.is_some())
@@ -32,6 +33,7 @@ records! {
             usual || (matches!(what, Permission::CancelEnded) && vehicle.state.as_ref().is_some_and(State::route_empty))
         });
     fault "action-not-awaited" ["ORD-CANCEL-01"] "Sends the next order while an action of the last one still runs."
+        because "That a new order waits for the end of the old actions is read out of the text."
         => plain().judges(|(), _, _, running, state, fate| {
             let driven = state.route_empty() && running.is_whole() && running.confirmed && running.accepted;
             if fate == Fate::Runs && driven { Fate::Over } else { fate }
@@ -43,6 +45,7 @@ records! {
             site.drop_order(vehicle, then);
         }).allows(|(), _, _, what, usual| usual || matches!(what, Permission::Interrupt));
     fault "replaced-at-work" ["ORD-CANCEL-01"] "Sends the next order without cancelOrder while the vehicle stands and an action of the old one runs."
+        because "That the order is called off before it is replaced is read out of the text."
         => replaced(|vehicle, then| {
             let Some((state, running)) = vehicle.state.as_ref().zip(vehicle.running.as_ref()) else { return false };
             let works = |id: &str| state.action(id).is_some_and(|action| !action.is_terminal());

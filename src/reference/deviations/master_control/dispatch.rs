@@ -16,6 +16,7 @@ use std::time::Duration;
 
 records! {
     fault "fleet-of-one" ["MQTT-11"] "Serves the first vehicle only."
+        because "MQTT-11 is a recommendation."
         => plain().configures(|config| config.vehicles.truncate(1));
     fault "pause-for-all" ["TOPIC-13"] "Pauses every vehicle of the fleet, and lets all go on, when that is asked for one of them."
         => Box::new(PauseForAll);

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 records! {
     fault "position-during-order" ["IACT-02"] "Sets the position of a vehicle that drives an order."
+        because "Whether initPosition contradicts an order is disputed, so that the ruling makes it a warning."
         => beside(|_, _| true);
     fault "r1-charging-during-order" ["IACT-02"] "It sends startCharging and stopCharging as instant actions while the vehicle drives an order."
         => beside(|_, kind| kind.ends_with("Charging"));

@@ -17,6 +17,7 @@ records! {
             _ => usual,
         });
     fault "node-states-limit-ignored" ["FACT-12"] "Sends orders with more nodes than the vehicle can list in its states."
+        because "The limit speaks of the array of the state, so that an order beyond it is a warning."
         => plain().measures(|(), _, _, what, usual| match what {
             Measure::NodeStates => usize::MAX,
             _ => usual,

@@ -65,6 +65,7 @@ records! {
             usual || (matches!(what, Permission::Follow) && *held && vehicle.cancel.is_none() && site.reachable(vehicle))
         });
     fault "cleared-order-updated" ["ORD-MSG-02"] "Goes on with the order a vehicle has given up in MANUAL."
+        because "That a cleared order gets no update is read out of the text."
         => plain().judges(|(), _, _, running, state, fate| {
             if fate != Fate::Again || !running.accepted || state.order_id != running.id {
                 return fate;
@@ -213,6 +214,7 @@ records! {
     fault "block-forgotten-on-return" ["ORD-12"] "Forgets which edges a vehicle may not use when that vehicle comes back."
         => on_return(|_, vehicle| vehicle.blocked.clear());
     fault "cancel-forgotten-on-return" ["ORD-CANCEL-01"] "Forgets that it has called an order off when the vehicle comes back, and goes on with it."
+        because "No sentence says when cancelOrder is sent."
         => on_return(|_, vehicle| vehicle.cancel = None);
     fault "update-ids-restart-on-return" ["ORD-UPD-04"] "Counts orderUpdateId from 1 again when the vehicle comes back with its order."
         => on_return(|_, vehicle| restart_update_ids(vehicle));

@@ -17,19 +17,24 @@ use std::time::Duration;
 
 records! {
     fault "empty-last-node-shunned" ["TOPIC-13"] "Serves a vehicle no more that once knew no last node."
+        because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| nowhere(heard));
     fault "foreign-action-shunned" ["TOPIC-13"] "Serves a vehicle no more that has listed an action nobody sent."
+        because "No sentence says within what time a vehicle is served."
         => shuns(|_, site, heard| {
             let session = site.session.to_string();
             actions(heard).any(|action| !action["actionId"].as_str().unwrap_or_default().contains(&session))
         });
     fault "nameless-action-shunned" ["TOPIC-13"] "Serves a vehicle no more that has listed an action without its type."
+        because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| actions(heard).any(|action| action.get("actionType").is_none()));
     fault "pause-shunned" ["TOPIC-13"] "Serves a vehicle no more that was paused for more than one state."
         => shuns(|past, _, _| past.paused > 1);
     fault "non-ascii-shunned" ["TOPIC-13"] "Serves a vehicle no more that has sent a letter beyond ASCII."
+        because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| !heard.payload.is_ascii());
     fault "exponent-shunned" ["TOPIC-13"] "Serves a vehicle no more that has written a number with an exponent."
+        because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| has_exponent(heard.payload));
     fault "gap-shunned" ["TOPIC-13"] "Serves a vehicle no more that has left a headerId out."
         => shuns(|past, _, heard| {
@@ -37,12 +42,14 @@ records! {
             past.header.zip(count).is_some_and(|(old, new)| new > old + 1)
         });
     fault "empty-payload-shunned" ["TOPIC-13"] "Serves a vehicle no more after a message of no bytes."
+        because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| heard.payload.is_empty());
     fault "minimal-factsheet-shunned" ["TOPIC-13"] "Serves a vehicle no more whose factsheet has left optional members out."
         => shuns(|_, _, heard| {
             heard.name == "factsheet" && heard.message.pointer("/protocolLimits/maxArrayLens/order.nodes").is_none()
         });
     fault "wrong-type-shunned" ["TOPIC-13"] "Serves a vehicle no more that has written a number as text."
+        because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| heard.name == "state" && heard.message["orderUpdateId"].is_string());
     fault "dies-of-null" ["TOPIC-14"] "Ends when a member of a state is null."
         => dies(|heard| {
@@ -52,6 +59,7 @@ records! {
     fault "dies-of-empty-last-node" ["TOPIC-14"] "Ends when a vehicle knows no last node."
         => dies(nowhere);
     fault "zero-is-a-limit" ["TOPIC-13"] "Takes a limit of 0 in a factsheet for one."
+        because "No sentence says within what time a vehicle is served."
         => plain().allows(|(), _, vehicle, what, usual| {
             let zero = vehicle.factsheet.as_ref().is_some_and(|sheet| sheet.has_zeros);
             usual && !(zero && matches!(what, Permission::Name(_)))

@@ -66,6 +66,7 @@ records! {
             }
         });
     fault "refused-order-repeated" ["ORD-REJ-18"] "Sends an order that was refused again and again, each time a little different."
+        because "No sentence forbids to send a refused order again."
         => plain().judges(|(), site, vehicle, running, state, fate| {
             let refused = refusal(running, state).is_some() && !running.accepted;
             if fate != Fate::Over || !refused || running.resends >= 20 {
