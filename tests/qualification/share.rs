@@ -1,6 +1,6 @@
 //! The faults that `cargo test` tries: one in eight, drawn by the commit, and all that the last change is about.
 //!
-//! `VDA5050_TCK_SHARE` is the seed (the commit unless set), `VDA5050_TCK_BASE` what the change is held against (the commit
+//! `QUALIFY_SHARE` is the seed (the commit unless set), `QUALIFY_BASE` what the change is held against (the commit
 //! before the last one unless set).
 
 use std::collections::BTreeSet;
@@ -31,9 +31,9 @@ fn git(arguments: &[&str]) -> Option<String> {
 
 /// The share of a side.
 pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
-    let seed = std::env::var("VDA5050_TCK_SHARE").ok();
+    let seed = std::env::var("QUALIFY_SHARE").ok();
     let seed = seed.or_else(|| git(&["rev-parse", "HEAD"])).unwrap_or_default();
-    let base = std::env::var("VDA5050_TCK_BASE").unwrap_or_else(|_| "HEAD~1".to_owned());
+    let base = std::env::var("QUALIFY_BASE").unwrap_or_else(|_| "HEAD~1".to_owned());
     let change = git(&["diff", "--unified=0", &base, "--", "src", "suites"]).unwrap_or_default();
     let touched = touched(library, role, &change);
     let is_drawn = |fault: &Fault| {
