@@ -101,7 +101,11 @@ pub fn qualify(
     let faults: Vec<Fault> = faults.iter().filter(possible).copied().collect();
     outcome.kills = match depth {
         Depth::Everything => each(&faults, |fault| grounds.kill(fault, DRAWN, &|_| true))?,
-        Depth::Faults | Depth::Clauses => each(&faults, |fault| find::find(&grounds, role, fault))?,
+        Depth::Faults | Depth::Clauses if outcome.is_latest => {
+            each(&faults, |fault| find::find(&grounds, role, fault))?
+        }
+        // In an older version no fault has to be found; what it fails is seen when the clauses are proven.
+        Depth::Faults | Depth::Clauses => faults.iter().map(Kill::nothing).collect(),
     };
     if depth == Depth::Clauses {
         rest::Rest::new(&grounds, &outcome.deciders, &outcome.exceptions).prove(&faults, &mut outcome.kills)?;
