@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vda5050_tck::pack::Pack;
-use vda5050_tck::reference::agv::FAULTS;
+use vda5050_tck::reference::deviations::agv::FAULTS;
 use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;

@@ -10,7 +10,8 @@ use std::time::Duration;
 
 use vda5050_tck::pack::Pack;
 use vda5050_tck::qualify::{Decider, decided};
-use vda5050_tck::reference::agv::{FAULTS, TOLERANCES};
+use vda5050_tck::reference::agv::TOLERANCES;
+use vda5050_tck::reference::deviations::agv::FAULTS;
 use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;

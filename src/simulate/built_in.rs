@@ -19,7 +19,7 @@ use crate::pack::Role;
 use crate::profile::TimeLimits;
 use crate::reference::Fault;
 use crate::reference::agv::{Agv, Tolerance};
-use crate::reference::deviations::master_control as deviations;
+use crate::reference::deviations::{agv as vehicles, master_control as deviations};
 
 /// A built-in device under test.
 #[derive(Clone, Debug)]
@@ -117,7 +117,7 @@ impl BuiltIn {
     #[must_use]
     pub fn faults(role: Role) -> &'static [Fault] {
         match role {
-            Role::Agv => crate::reference::agv::FAULTS,
+            Role::Agv => &vehicles::FAULTS,
             Role::MasterControl => &deviations::FAULTS,
         }
     }
@@ -131,7 +131,7 @@ impl BuiltIn {
     #[must_use]
     pub fn blind_faults(role: Role) -> &'static [Fault] {
         match role {
-            Role::Agv => crate::reference::agv::BLIND_FAULTS,
+            Role::Agv => &vehicles::BLIND_FAULTS,
             Role::MasterControl => &deviations::BLIND_FAULTS,
         }
     }
@@ -149,7 +149,7 @@ impl BuiltIn {
     #[must_use]
     pub fn lapse(role: Role, fault: &str) -> Option<&'static str> {
         match role {
-            Role::Agv => crate::reference::agv::lapse(fault),
+            Role::Agv => vehicles::lapse(fault),
             Role::MasterControl => deviations::lapse(fault),
         }
     }
@@ -202,7 +202,7 @@ impl BuiltIn {
     pub fn peer(&self, faults: &[&str]) -> Result<Box<dyn Peer>, UnknownName> {
         Ok(match self {
             Self::Agv(device) => {
-                let agv = Agv::new(device.config.clone(), faults);
+                let agv = vehicles::built(device.config.clone(), faults);
                 Box::new(DevicePeer(agv.map_err(|unknown| UnknownName(unknown.to_string()))?))
             }
             Self::MasterControl(device) => {
@@ -221,7 +221,7 @@ impl BuiltIn {
     pub fn start(&self, faults: &[&str], endpoint: Endpoint, clock: WallClock) -> Result<RunningDevice, UnknownName> {
         Ok(match self {
             Self::Agv(device) => {
-                let agv = Agv::new(device.config.clone(), faults);
+                let agv = vehicles::built(device.config.clone(), faults);
                 let agv = agv.map_err(|unknown| UnknownName(unknown.to_string()))?;
                 RunningDevice::start(agv, endpoint, clock, None)
             }

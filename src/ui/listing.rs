@@ -112,7 +112,7 @@ mod tests {
                 wrong: "Sends no state.",
             },
         ];
-        insta::assert_snapshot!(faults(&some, crate::reference::agv::lapse), @r"
+        insta::assert_snapshot!(faults(&some, crate::reference::deviations::agv::lapse), @r"
         outdated-update-taken-over  Takes over an update that is older than the one it has. (ORD-REJ-10, ORD-REJ-11)
         silent                      Sends no state. (STATE-01)
         ");

@@ -12,11 +12,11 @@ use super::{Agv, motion};
 const SIDEWAYS: f64 = 0.1;
 
 /// Slowest controlled speed, in metres or radians per second.
-pub(super) const SLOWEST: f64 = 0.01;
+pub(crate) const SLOWEST: f64 = 0.01;
 
 impl Agv {
     /// Where a node is: as the order says, else as the layout knows. A line-guided vehicle only knows its layout.
-    pub(super) fn place(&self, node: &Node) -> Option<Place> {
+    pub(crate) fn place(&self, node: &Node) -> Option<Place> {
         if let Some(position) = node.position.as_ref().filter(|_| !self.config.line_guided()) {
             // With its axes mirrored it reads places it does not know as it reports them.
             let mirrored = self.faults.has(F::AxesMirrored) && self.config.node(&node.id).is_none();
@@ -34,7 +34,7 @@ impl Agv {
     }
 
     /// Whether the vehicle can do all this; the first `known` nodes are only the joint.
-    pub(super) fn check_ability(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
+    pub(crate) fn check_ability(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
         self.check_memory(order, known)?;
         let usable = |path: &&String| path.rsplit('.').next().is_some_and(|field| self.config.uses(field));
         self.check_zone_set(order)?;

@@ -28,7 +28,7 @@ enum Decision {
 
 impl Agv {
     /// Takes an order message.
-    pub(super) fn order_received(&mut self, payload: &[u8]) {
+    pub(crate) fn order_received(&mut self, payload: &[u8]) {
         if self.ignores_order() {
             return;
         }
@@ -80,7 +80,7 @@ impl Agv {
     }
 
     /// `r2-refused-order-queued`: begins the order that came too early.
-    pub(super) fn begin_queued(&mut self) {
+    pub(crate) fn begin_queued(&mut self) {
         if self.queued.is_none() || self.is_busy() {
             return;
         }
@@ -211,7 +211,7 @@ impl Agv {
     }
 
     /// Does the ended actions of a node once more.
-    pub(super) fn repeat_actions(&mut self, sequence_id: u32) {
+    pub(crate) fn repeat_actions(&mut self, sequence_id: u32) {
         let origin = Origin::Node(sequence_id);
         let mut repeated = false;
         for action in self.actions.iter_mut().filter(|action| action.origin == origin) {
@@ -321,7 +321,7 @@ impl Agv {
     }
 
     /// Nodes left, an order action not ended, or a cancellation under way; a horizon keeps it busy.
-    pub(super) fn is_busy(&self) -> bool {
+    pub(crate) fn is_busy(&self) -> bool {
         let free = |action: &Action| {
             let left = self.book.cancelled && action.status == super::actions::Status::Waiting;
             let trigger = action
@@ -459,7 +459,7 @@ impl Agv {
         }
     }
 
-    pub(super) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
+    pub(crate) fn append(&mut self, nodes: Vec<Node>, edges: Vec<Edge>) {
         let mut edges = edges.into_iter().peekable();
         for node in nodes {
             while let Some(edge) = edges.next_if(|edge| edge.sequence_id < node.sequence_id) {
@@ -492,7 +492,7 @@ impl Agv {
         self.book.edges.push_back(edge);
     }
 
-    pub(super) fn push_actions(&mut self, requests: Vec<ActionRequest>, origin: Origin) {
+    pub(crate) fn push_actions(&mut self, requests: Vec<ActionRequest>, origin: Origin) {
         for request in requests {
             let again = self.book.dropped.contains(&request.id);
             if again && self.faults.has(F::ReleasedActionsLost) {

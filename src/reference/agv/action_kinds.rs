@@ -9,7 +9,7 @@ use super::order_message::ActionRequest;
 
 /// Where an action may be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scope {
+pub(crate) enum Scope {
     Instant,
     Node,
     Edge,
@@ -17,7 +17,7 @@ pub(super) enum Scope {
 
 impl Scope {
     /// The literal of the factsheet.
-    pub(super) fn literal(self) -> &'static str {
+    pub(crate) fn literal(self) -> &'static str {
         match self {
             Self::Instant => "INSTANT",
             Self::Node => "NODE",
@@ -28,7 +28,7 @@ impl Scope {
 
 /// What an action does when it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Deed {
+pub(crate) enum Deed {
     StartPause,
     StopPause,
     StartCharging,
@@ -53,29 +53,29 @@ pub(super) enum Deed {
 
 /// A parameter of an action.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Parameter {
-    pub(super) key: &'static str,
+pub(crate) struct Parameter {
+    pub(crate) key: &'static str,
     /// valueDataType of the factsheet.
-    pub(super) data_type: &'static str,
-    pub(super) optional: bool,
+    pub(crate) data_type: &'static str,
+    pub(crate) optional: bool,
 }
 
 /// One action the vehicle offers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ActionKind {
-    pub(super) name: &'static str,
-    pub(super) deed: Deed,
-    pub(super) scopes: &'static [Scope],
-    pub(super) parameters: &'static [Parameter],
+pub(crate) struct ActionKind {
+    pub(crate) name: &'static str,
+    pub(crate) deed: Deed,
+    pub(crate) scopes: &'static [Scope],
+    pub(crate) parameters: &'static [Parameter],
     /// Has a preparation, reported as INITIALIZING.
-    pub(super) prepares: bool,
+    pub(crate) prepares: bool,
     /// Can be held, reported as PAUSED.
-    pub(super) pausable: bool,
+    pub(crate) pausable: bool,
     /// Takes time also as an instant action.
-    pub(super) lasting: bool,
-    pub(super) description: &'static str,
+    pub(crate) lasting: bool,
+    pub(crate) description: &'static str,
     /// resultDescription of the factsheet.
-    pub(super) result: Option<&'static str>,
+    pub(crate) result: Option<&'static str>,
 }
 
 const fn required(key: &'static str, data_type: &'static str) -> Parameter {
@@ -104,10 +104,10 @@ const MAP: &[Parameter] = &[required("mapId", "STRING"), required("mapVersion", 
 const DURATION: &[Parameter] = &[optional("duration", "NUMBER")];
 
 /// Highest lift in metres; a pick or drop above it cannot be performed.
-pub(super) const MAX_HEIGHT: f64 = 2.0;
+pub(crate) const MAX_HEIGHT: f64 = 2.0;
 
 /// Names of the load handling devices.
-pub(super) const LOAD_POSITIONS: [&str; 1] = ["LHD1"];
+pub(crate) const LOAD_POSITIONS: [&str; 1] = ["LHD1"];
 
 const PICK: &[Parameter] = &[
     required("stationType", "STRING"),
@@ -307,7 +307,7 @@ const KINDS: [ActionKind; 20] = [
 ];
 
 /// The actions this vehicle offers.
-pub(super) fn offered(config: &AgvConfig) -> impl Iterator<Item = &'static ActionKind> {
+pub(crate) fn offered(config: &AgvConfig) -> impl Iterator<Item = &'static ActionKind> {
     KINDS.iter().filter(|kind| is_offered(config, kind))
 }
 
@@ -321,12 +321,12 @@ fn is_offered(config: &AgvConfig, kind: &ActionKind) -> bool {
 }
 
 /// The offered action of that name.
-pub(super) fn find(config: &AgvConfig, name: &str) -> Option<&'static ActionKind> {
+pub(crate) fn find(config: &AgvConfig, name: &str) -> Option<&'static ActionKind> {
     offered(config).find(|kind| kind.name == name)
 }
 
 /// Why an action cannot be performed as asked; a path or key and a reason.
-pub(super) fn refusal(
+pub(crate) fn refusal(
     kind: &ActionKind,
     request: &ActionRequest,
     config: &AgvConfig,

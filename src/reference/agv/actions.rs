@@ -15,7 +15,7 @@ use super::order_message::{ActionRequest, Blocking};
 
 /// actionStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Status {
+pub(crate) enum Status {
     Waiting,
     Initializing,
     Running,
@@ -26,7 +26,7 @@ pub(super) enum Status {
 
 impl Status {
     /// The literal of the state.
-    pub(super) fn literal(self) -> &'static str {
+    pub(crate) fn literal(self) -> &'static str {
         match self {
             Self::Waiting => "WAITING",
             Self::Initializing => "INITIALIZING",
@@ -38,19 +38,19 @@ impl Status {
     }
 
     /// FINISHED or FAILED.
-    pub(super) fn is_terminal(self) -> bool {
+    pub(crate) fn is_terminal(self) -> bool {
         matches!(self, Self::Finished | Self::Failed)
     }
 
     /// INITIALIZING, RUNNING or PAUSED.
-    pub(super) fn is_active(self) -> bool {
+    pub(crate) fn is_active(self) -> bool {
         matches!(self, Self::Initializing | Self::Running | Self::Paused)
     }
 }
 
 /// What asked for an action: an element of the order, by its sequenceId, or master control directly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Origin {
+pub(crate) enum Origin {
     Node(u32),
     Edge(u32),
     Instant,
@@ -58,24 +58,24 @@ pub(super) enum Origin {
 
 /// One action and its state.
 #[derive(Clone, Debug)]
-pub(super) struct Action {
-    pub(super) request: ActionRequest,
+pub(crate) struct Action {
+    pub(crate) request: ActionRequest,
     /// `None` for an action the vehicle does not know.
-    pub(super) kind: Option<&'static ActionKind>,
-    pub(super) origin: Origin,
-    pub(super) status: Status,
-    pub(super) result: Option<String>,
+    pub(crate) kind: Option<&'static ActionKind>,
+    pub(crate) origin: Origin,
+    pub(crate) status: Status,
+    pub(crate) result: Option<String>,
     /// When the present stage ends; `None` if something else ends it.
-    pub(super) due: Option<Moment>,
+    pub(crate) due: Option<Moment>,
     /// What was left, and what it was, when it was held.
-    held: Option<(Status, Option<Duration>)>,
+    pub(crate) held: Option<(Status, Option<Duration>)>,
     /// The end of the present stage was reported early (`cancel-fails-early`).
-    pub(super) masked: Option<Status>,
+    pub(crate) masked: Option<Status>,
 }
 
 impl Action {
     /// An action that waits for its trigger.
-    pub(super) fn waiting(request: ActionRequest, kind: Option<&'static ActionKind>, origin: Origin) -> Self {
+    pub(crate) fn waiting(request: ActionRequest, kind: Option<&'static ActionKind>, origin: Origin) -> Self {
         Self {
             request,
             kind,
@@ -89,7 +89,7 @@ impl Action {
     }
 
     /// Whether the action belongs to the order.
-    pub(super) fn of_order(&self) -> bool {
+    pub(crate) fn of_order(&self) -> bool {
         self.origin != Origin::Instant
     }
 
@@ -98,7 +98,7 @@ impl Action {
     }
 
     /// Ends the action.
-    pub(super) fn end(&mut self, status: Status) {
+    pub(crate) fn end(&mut self, status: Status) {
         self.status = status;
         self.due = None;
         self.held = None;
@@ -132,12 +132,12 @@ impl Action {
     }
 
     /// A parameter that is a string.
-    pub(super) fn text(&self, key: &str) -> &str {
+    pub(crate) fn text(&self, key: &str) -> &str {
         self.request.parameter(key).and_then(Value::as_str).unwrap_or_default()
     }
 
     /// A parameter that is a number.
-    pub(super) fn number(&self, key: &str) -> Option<f64> {
+    pub(crate) fn number(&self, key: &str) -> Option<f64> {
         self.request.parameter(key).and_then(Value::as_f64)
     }
 }
@@ -152,33 +152,33 @@ struct List {
 
 /// All actions, in the order they became known.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Actions {
+pub(crate) struct Actions {
     all: Vec<Action>,
     lists: Vec<List>,
 }
 
 impl Actions {
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Action> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Action> {
         self.all.iter()
     }
 
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Action> {
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Action> {
         self.all.iter_mut()
     }
 
-    pub(super) fn get(&self, id: &str) -> Option<&Action> {
+    pub(crate) fn get(&self, id: &str) -> Option<&Action> {
         self.all.iter().find(|action| action.request.id == id)
     }
 
-    pub(super) fn get_mut(&mut self, id: &str) -> Option<&mut Action> {
+    pub(crate) fn get_mut(&mut self, id: &str) -> Option<&mut Action> {
         self.all.iter_mut().find(|action| action.request.id == id)
     }
 
-    pub(super) fn push(&mut self, action: Action) {
+    pub(crate) fn push(&mut self, action: Action) {
         self.all.push(action);
     }
 
-    pub(super) fn retain(&mut self, keep: impl FnMut(&Action) -> bool) {
+    pub(crate) fn retain(&mut self, keep: impl FnMut(&Action) -> bool) {
         self.all.retain(keep);
         let all = &self.all;
         let known = |id: &String| all.iter().any(|action| action.request.id == *id);
@@ -189,31 +189,31 @@ impl Actions {
     }
 
     /// Forgets what was triggered and not begun.
-    pub(super) fn drop_lists(&mut self) {
+    pub(crate) fn drop_lists(&mut self) {
         self.lists.clear();
     }
 
     /// Triggers what waits at a place once more (`r6-resumed-action-waits-again` only).
-    pub(super) fn trigger_again(&mut self, origin: Origin, faults: Faults) {
+    pub(crate) fn trigger_again(&mut self, origin: Origin, faults: Faults) {
         self.lists.retain(|list| list.origin != origin);
         self.trigger(origin, faults);
     }
 
     /// Forgets everything.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.all.clear();
         self.lists.clear();
     }
 
     /// Whether an action of the order has not ended.
-    pub(super) fn order_unfinished(&self) -> bool {
+    pub(crate) fn order_unfinished(&self) -> bool {
         self.all
             .iter()
             .any(|action| action.of_order() && !action.status.is_terminal())
     }
 
     /// A node was traversed, or an edge entered: its actions are triggered.
-    pub(super) fn trigger(&mut self, origin: Origin, faults: Faults) {
+    pub(crate) fn trigger(&mut self, origin: Origin, faults: Faults) {
         if faults.has(F::EdgeListCut) && matches!(origin, Origin::Edge(_)) {
             let of_edge = self.all.iter_mut().filter(|action| action.origin == origin);
             of_edge.skip(1).for_each(|action| action.end(Status::Failed));
@@ -259,7 +259,7 @@ impl Actions {
     }
 
     /// Ids of actions that can begin now, if any.
-    pub(super) fn startable(&mut self, faults: Faults) -> Vec<String> {
+    pub(crate) fn startable(&mut self, faults: Faults) -> Vec<String> {
         let unawaited =
             |action: &Action| action.request.blocking == Blocking::None && faults.has(F::R3HardStartsBesideNone);
         for index in 0..self.lists.len() {
@@ -312,7 +312,7 @@ impl Actions {
     }
 
     /// Whether the actions forbid driving (BLOCK-03, BLOCK-04, BLOCK-07).
-    pub(super) fn block_driving(&self, faults: Faults) -> bool {
+    pub(crate) fn block_driving(&self, faults: Faults) -> bool {
         let stops = |action: &Action| match action.request.blocking {
             _ if action.status == Status::Initializing && faults.has(F::R1PreparesWhileDriving) => false,
             Blocking::None => false,
@@ -335,13 +335,13 @@ impl Actions {
     }
 
     /// Whether an action waits there.
-    pub(super) fn waiting_at(&self, origin: Origin) -> bool {
+    pub(crate) fn waiting_at(&self, origin: Origin) -> bool {
         let mut actions = self.all.iter().filter(|action| action.origin == origin);
         actions.any(|action| action.status == Status::Waiting)
     }
 
     /// Whether an edge has actions that stop the vehicle.
-    pub(super) fn edge_stops(&self, sequence_id: u32, faults: Faults) -> bool {
+    pub(crate) fn edge_stops(&self, sequence_id: u32, faults: Faults) -> bool {
         let mut actions = self
             .all
             .iter()
@@ -357,7 +357,7 @@ impl Actions {
     }
 
     /// The vehicle leaves the edge: its actions end (NODE-05).
-    pub(super) fn leave_edge(&mut self, sequence_id: u32, faults: Faults, cut: Status) {
+    pub(crate) fn leave_edge(&mut self, sequence_id: u32, faults: Faults, cut: Status) {
         let origin = Origin::Edge(sequence_id);
         self.lists.retain(|list| list.origin != origin);
         let ended = if faults.has(F::LastEdgeActionOutlivesEdge) {
@@ -376,7 +376,7 @@ impl Actions {
     }
 
     /// `none-aborted`: what does not keep the vehicle on its node is broken off when it leaves.
-    pub(super) fn leave_node(&mut self, sequence_id: u32) {
+    pub(crate) fn leave_node(&mut self, sequence_id: u32) {
         let of_node = |action: &&mut Action| action.origin == Origin::Node(sequence_id);
         for action in self.all.iter_mut().filter(of_node) {
             if action.request.blocking == Blocking::None && action.status.is_active() {
@@ -386,22 +386,22 @@ impl Actions {
     }
 
     /// Holds what can be held.
-    pub(super) fn hold(&mut self, now: Moment, faults: Faults) {
+    pub(crate) fn hold(&mut self, now: Moment, faults: Faults) {
         self.all.iter_mut().for_each(|action| action.hold(now, faults));
     }
 
     /// Lets held actions go on.
-    pub(super) fn resume(&mut self, now: Moment, faults: Faults) {
+    pub(crate) fn resume(&mut self, now: Moment, faults: Faults) {
         self.all.iter_mut().for_each(|action| action.resume(now, faults));
     }
 
     /// When the next stage of an action ends.
-    pub(super) fn next_end(&self) -> Option<Moment> {
+    pub(crate) fn next_end(&self) -> Option<Moment> {
         self.all.iter().filter_map(|action| action.due).min()
     }
 
     /// The id of an action whose stage has ended.
-    pub(super) fn due(&self, now: Moment) -> Option<String> {
+    pub(crate) fn due(&self, now: Moment) -> Option<String> {
         let ended = self.all.iter().find(|action| action.due.is_some_and(|due| due <= now));
         ended.map(|action| action.request.id.clone())
     }

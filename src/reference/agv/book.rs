@@ -8,91 +8,91 @@ use super::order_message::{Edge, Node};
 
 /// Where a node is.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Place {
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) map_id: String,
+pub(crate) struct Place {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) map_id: String,
 }
 
 /// A node still to be traversed.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Stop {
-    pub(super) node: Node,
-    pub(super) place: Place,
+pub(crate) struct Stop {
+    pub(crate) node: Node,
+    pub(crate) place: Place,
 }
 
 /// A cancellation under way.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Cancel {
+pub(crate) struct Cancel {
     /// actionId of the cancelOrder action.
-    pub(super) action_id: String,
+    pub(crate) action_id: String,
     /// The vehicle drives to its next node first.
-    pub(super) to_node: bool,
+    pub(crate) to_node: bool,
 }
 
 /// The order and its progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Book {
-    pub(super) order_id: String,
-    pub(super) update_id: u32,
-    pub(super) last_node: String,
-    pub(super) last_sequence: u32,
+pub(crate) struct Book {
+    pub(crate) order_id: String,
+    pub(crate) update_id: u32,
+    pub(crate) last_node: String,
+    pub(crate) last_sequence: u32,
     /// Still to be traversed, horizon included (STATE-12).
-    pub(super) nodes: VecDeque<Stop>,
+    pub(crate) nodes: VecDeque<Stop>,
     /// Still to be traversed, horizon included.
-    pub(super) edges: VecDeque<Edge>,
+    pub(crate) edges: VecDeque<Edge>,
     /// The last released node: the decision point.
-    pub(super) base_end: (String, u32),
+    pub(crate) base_end: (String, u32),
     /// The first of `edges` has been entered.
-    pub(super) entered: bool,
-    pub(super) cancel: Option<Cancel>,
+    pub(crate) entered: bool,
+    pub(crate) cancel: Option<Cancel>,
     /// The node traversed last, and the edge left last.
-    pub(super) left: (Option<Stop>, Option<Edge>),
+    pub(crate) left: (Option<Stop>, Option<Edge>),
     /// First sequenceId by nodeId (`loop-confused` only).
-    pub(super) visits: BTreeMap<String, u32>,
+    pub(crate) visits: BTreeMap<String, u32>,
     /// The order was cancelled, so it cannot be continued.
-    pub(super) cancelled: bool,
+    pub(crate) cancelled: bool,
     /// The order was updated.
-    pub(super) updated: bool,
+    pub(crate) updated: bool,
     /// The link broke since the order came (`update-refused-after-cut` only).
-    pub(super) cut: bool,
+    pub(crate) cut: bool,
     /// sequenceId behind which everything comes from updates (`update-actions-not-performed` only).
-    pub(super) first_end: u32,
+    pub(crate) first_end: u32,
     /// actionIds of the horizon an update has just replaced.
-    pub(super) dropped: Vec<String>,
+    pub(crate) dropped: Vec<String>,
     /// It has asked for a new base (`new-base-request-stays` only).
-    pub(super) asked: bool,
+    pub(crate) asked: bool,
     /// Where the order began (`distance-not-reset` only).
-    pub(super) begun_at: Option<(f64, f64)>,
+    pub(crate) begun_at: Option<(f64, f64)>,
     /// The order was complete and is continued (`continuation-not-driven` only).
-    pub(super) continued: bool,
+    pub(crate) continued: bool,
     /// When a faulty vehicle does what it does a moment later.
-    pub(super) soon: Option<Moment>,
+    pub(crate) soon: Option<Moment>,
     /// It left the decision point by itself (`horizon-slipped-into` only).
-    pub(super) slipped: bool,
+    pub(crate) slipped: bool,
     /// The order names a zone set (`zone-set-invented` only).
-    pub(super) zoned: bool,
+    pub(crate) zoned: bool,
     /// It drives as if the horizon were released (`r1-horizon-…` only).
-    pub(super) unbound: bool,
+    pub(crate) unbound: bool,
     /// Where it ends its way (`r1-stops-at-stitch` only).
-    pub(super) stuck_at: Option<u32>,
+    pub(crate) stuck_at: Option<u32>,
     /// It does not drive any more (`r1-outdated-halts-driving` only).
-    pub(super) stunned: bool,
+    pub(crate) stunned: bool,
     /// It drives although it is paused (`r1-update-drives-in-pause` only).
-    pub(super) heedless: bool,
+    pub(crate) heedless: bool,
     /// It went on after a pause on this edge (`r1-max-speed-forgotten-in-pause` only).
-    pub(super) hurried: bool,
+    pub(crate) hurried: bool,
     /// lastNodeId and lastNodeSequenceId before the present ones (`r1-last-node-after-actions` only).
-    pub(super) previous: (String, u32),
+    pub(crate) previous: (String, u32),
     /// sequenceIds that were in the horizon once (`r2-released-not-updated` only).
-    pub(super) planned: BTreeSet<u32>,
+    pub(crate) planned: BTreeSet<u32>,
     /// It drives whatever its actions forbid (`r2-blocking-forgotten-after-pause` only).
-    pub(super) unblocked: bool,
+    pub(crate) unblocked: bool,
 }
 
 impl Book {
     /// No order yet.
-    pub(super) fn empty(last_node: String) -> Self {
+    pub(crate) fn empty(last_node: String) -> Self {
         Self {
             order_id: String::new(),
             update_id: 0,
@@ -128,12 +128,12 @@ impl Book {
     }
 
     /// Whether there was an order since the vehicle was switched on.
-    pub(super) fn has_order(&self) -> bool {
+    pub(crate) fn has_order(&self) -> bool {
         !self.order_id.is_empty()
     }
 
     /// The edge that leads to the next node; `None` if the vehicle needs none.
-    pub(super) fn edge_ahead(&self) -> Option<&Edge> {
+    pub(crate) fn edge_ahead(&self) -> Option<&Edge> {
         let next = self.nodes.front()?;
         self.edges
             .front()
@@ -141,7 +141,7 @@ impl Book {
     }
 
     /// Removes the horizon; the sequenceIds that went.
-    pub(super) fn drop_horizon(&mut self) -> Vec<u32> {
+    pub(crate) fn drop_horizon(&mut self) -> Vec<u32> {
         let nodes = self
             .nodes
             .iter()
@@ -159,14 +159,14 @@ impl Book {
     }
 
     /// Removes all nodes and edges.
-    pub(super) fn drop_route(&mut self) {
+    pub(crate) fn drop_route(&mut self) {
         self.nodes.clear();
         self.edges.clear();
         self.entered = false;
     }
 
     /// Whether the base runs low while there is more to come (STATE-16).
-    pub(super) fn base_runs_low(&self) -> bool {
+    pub(crate) fn base_runs_low(&self) -> bool {
         let horizon = self.nodes.iter().any(|stop| !stop.node.released);
         horizon && self.edges.iter().filter(|edge| edge.released).count() <= 1
     }

@@ -11,14 +11,14 @@ use super::faults::FaultName as F;
 use super::tolerances::ToleranceName as T;
 
 /// How long a faulty vehicle waits before it does what it should not.
-pub(super) const MOMENT: Duration = Duration::from_millis(50);
+pub(crate) const MOMENT: Duration = Duration::from_millis(50);
 
 /// How long a cancellation takes at least for a vehicle that may take its time.
 const CANCELLING: Duration = Duration::from_millis(400);
 
 impl Agv {
     /// A cancelOrder action begins.
-    pub(super) fn cancel_order(&mut self, action_id: &str) {
+    pub(crate) fn cancel_order(&mut self, action_id: &str) {
         if let Some(cancel) = self
             .book
             .cancel
@@ -182,7 +182,7 @@ impl Agv {
     }
 
     /// Ends the cancellation once nothing moves or runs any more (ORD-CANCEL-07, ORD-CANCEL-11).
-    pub(super) fn settle_cancel(&mut self) -> bool {
+    pub(crate) fn settle_cancel(&mut self) -> bool {
         let Some(cancel) = self.book.cancel.clone() else {
             return false;
         };
@@ -265,7 +265,7 @@ impl Agv {
     }
 
     /// What a faulty vehicle does a moment after it stopped or was cancelled.
-    pub(super) fn a_moment_later(&mut self) {
+    pub(crate) fn a_moment_later(&mut self) {
         if self.book.soon.is_none_or(|soon| soon > self.moment()) {
             return;
         }
@@ -277,7 +277,7 @@ impl Agv {
     }
 
     /// Drops the order at once, with everything that belongs to it.
-    pub(super) fn give_up_order(&mut self) {
+    pub(crate) fn give_up_order(&mut self) {
         let moment = self.moment();
         self.motion.halt(moment);
         self.motion.reached = false;

@@ -80,7 +80,7 @@ const MAX_OBSTACLES: usize = 100;
 const KEPT: Duration = Duration::from_secs(60);
 
 impl Agv {
-    pub(super) fn command(&mut self, name: &str, arguments: &Value) {
+    pub(crate) fn command(&mut self, name: &str, arguments: &Value) {
         let text = |key: &str| arguments.get(key).and_then(Value::as_str).unwrap_or_default();
         if self.persona_command(name, arguments) {
             return;
@@ -167,7 +167,7 @@ impl Agv {
     }
 
     /// The button that waitForTrigger waits for; it serves all of them unless one is named.
-    pub(super) fn trigger(&mut self, wanted: &str) {
+    pub(crate) fn trigger(&mut self, wanted: &str) {
         let waits = |action: &&super::actions::Action| {
             (wanted.is_empty() || action.request.id == wanted)
                 && action.status == Status::Running

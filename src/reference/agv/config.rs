@@ -305,22 +305,22 @@ impl Default for AgvConfig {
 
 impl AgvConfig {
     /// The full topic of a topic name.
-    pub(super) fn topic(&self, name: &str) -> Option<&str> {
+    pub(crate) fn topic(&self, name: &str) -> Option<&str> {
         self.topics.get(name).map(String::as_str)
     }
 
     /// Whether the protocol version has a feature.
-    pub(super) fn has(&self, feature: &str) -> bool {
+    pub(crate) fn has(&self, feature: &str) -> bool {
         self.features.contains(feature)
     }
 
     /// Whether it follows a line and knows no coordinates.
-    pub(super) fn line_guided(&self) -> bool {
+    pub(crate) fn line_guided(&self) -> bool {
         self.branches.is_some()
     }
 
     /// Whether it can use an optional field of an edge.
-    pub(super) fn uses(&self, field: &str) -> bool {
+    pub(crate) fn uses(&self, field: &str) -> bool {
         match field {
             "trajectory" => self.trajectories,
             "corridor" => self.trajectories && self.has("corridors"),
@@ -330,7 +330,7 @@ impl AgvConfig {
     }
 
     /// The node of that id in the layout.
-    pub(super) fn node(&self, id: &str) -> Option<&LayoutNode> {
+    pub(crate) fn node(&self, id: &str) -> Option<&LayoutNode> {
         self.nodes.iter().find(|node| node.id == id)
     }
 }

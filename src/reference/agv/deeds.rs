@@ -16,7 +16,7 @@ const FARTHEST: f64 = 10_000.0;
 
 /// Which error a failed action raises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Area {
+pub(crate) enum Area {
     InstantAction,
     Map,
     Localization,
@@ -26,16 +26,16 @@ pub(super) enum Area {
 
 /// Why an action failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Problem {
+pub(crate) struct Problem {
     area: Area,
     reason: String,
-    pub(super) references: Vec<(String, String)>,
+    pub(crate) references: Vec<(String, String)>,
     silent: bool,
 }
 
 impl Problem {
     /// What went wrong with an action.
-    pub(super) fn new(area: Area, action: &Action, reason: &str) -> Self {
+    pub(crate) fn new(area: Area, action: &Action, reason: &str) -> Self {
         let reference = |key: &str, value: &str| (key.to_owned(), value.to_owned());
         let references = vec![
             reference("actionId", &action.request.id),
@@ -50,7 +50,7 @@ impl Problem {
     }
 
     /// A problem with the map an action is about.
-    pub(super) fn map(action: &Action, reason: &str) -> Self {
+    pub(crate) fn map(action: &Action, reason: &str) -> Self {
         let mut problem = Self::new(Area::Map, action, reason);
         for key in ["mapId", "mapVersion"] {
             problem.references.push((key.to_owned(), action.text(key).to_owned()));
@@ -59,19 +59,19 @@ impl Problem {
     }
 
     /// An instant action that cannot be performed.
-    pub(super) fn unable(action: &Action, reason: &str) -> Self {
+    pub(crate) fn unable(action: &Action, reason: &str) -> Self {
         Self::new(Area::InstantAction, action, reason)
     }
 
     /// The same, without an error.
-    pub(super) fn silent_if(mut self, silent: bool) -> Self {
+    pub(crate) fn silent_if(mut self, silent: bool) -> Self {
         self.silent |= silent;
         self
     }
 }
 
 /// How a deed went.
-pub(super) enum Outcome {
+pub(crate) enum Outcome {
     Done(Option<String>),
     Failed(Problem),
     /// Something else ends the action.
@@ -89,7 +89,7 @@ const RESUMING: Duration = Duration::from_millis(500);
 
 impl Agv {
     /// An action of the order begins.
-    pub(super) fn begin_action(&mut self, id: &str) {
+    pub(crate) fn begin_action(&mut self, id: &str) {
         let moment = self.moment();
         let Some(action) = self.actions.get(id).filter(|action| action.status == Status::Waiting) else {
             return;
@@ -113,7 +113,7 @@ impl Agv {
     }
 
     /// An action does its work now.
-    pub(super) fn run_action(&mut self, id: &str) {
+    pub(crate) fn run_action(&mut self, id: &str) {
         let moment = self.moment();
         let Some(duration) = self.actions.get(id).map(|action| self.duration_of(action)) else {
             return;
@@ -137,7 +137,7 @@ impl Agv {
     }
 
     /// A stage of an action has ended.
-    pub(super) fn stage_finished(&mut self, id: &str) {
+    pub(crate) fn stage_finished(&mut self, id: &str) {
         let missed = !self.connection.online && self.faults.has(F::ActionEndMissedOffline);
         let Some(action) = self.actions.get_mut(id) else { return };
         action.due = None;
@@ -156,7 +156,7 @@ impl Agv {
     }
 
     /// An action has worked for as long as it takes: its effect shows.
-    pub(super) fn complete(&mut self, id: &str) {
+    pub(crate) fn complete(&mut self, id: &str) {
         let Some(action) = self.actions.get(id).cloned() else {
             return;
         };
@@ -172,7 +172,7 @@ impl Agv {
     }
 
     /// Ends an action with success.
-    pub(super) fn finish(&mut self, id: &str, result: Option<String>) {
+    pub(crate) fn finish(&mut self, id: &str, result: Option<String>) {
         let stuck = self.faults.has(F::InstantActionStuck);
         let requests_stay = self.faults.has(F::StateRequestStuck);
         self.forget_pause_after(id);
@@ -191,7 +191,7 @@ impl Agv {
     }
 
     /// Ends an action without success, and says why (IACT-06, BP-03).
-    pub(super) fn fail(&mut self, id: &str, problem: &Problem) {
+    pub(crate) fn fail(&mut self, id: &str, problem: &Problem) {
         if let Some(action) = self.actions.get_mut(id) {
             action.end(Status::Failed);
             if self.config.tolerances.has(T::R2FailuresDescribed) {
@@ -238,7 +238,7 @@ impl Agv {
     }
 
     /// Ends an action without success because a test wants that.
-    pub(super) fn fail_as_told(&mut self, action: &Action, error_type: String) {
+    pub(crate) fn fail_as_told(&mut self, action: &Action, error_type: String) {
         let problem = Problem::unable(action, "the action did not succeed");
         if let Some(action) = self.actions.get_mut(&action.request.id) {
             action.end(Status::Failed);
@@ -350,7 +350,7 @@ impl Agv {
     }
 
     /// Whether the name of a log is in the information instead of the result of its action.
-    pub(super) fn tells_logs(&self) -> bool {
+    pub(crate) fn tells_logs(&self) -> bool {
         self.takes(T::R2LogNameInInformation)
             && !self.takes(T::R1InformationOmitted)
             && !self.takes(T::R4OptionalStateFieldsLeftOut)
@@ -445,7 +445,7 @@ impl Agv {
     }
 
     /// What was held goes on at the next cycle (`resumes-in-a-moment`).
-    pub(super) fn resume_if_due(&mut self) {
+    pub(crate) fn resume_if_due(&mut self) {
         let moment = self.moment();
         if self.resumes_at.take_if(|at| *at <= moment).is_some() && !self.holds.any() {
             self.actions.resume(moment, self.faults);
@@ -453,7 +453,7 @@ impl Agv {
     }
 
     /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
-    pub(super) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
+    pub(crate) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
         let before = self.holds.any();
         let field = self.holds.field;
         let paused = self.holds.pause;
@@ -539,7 +539,7 @@ impl Agv {
     }
 
     /// `init-position-taken-anyway`: the map of a pose that is refused.
-    pub(super) fn take_map_anyway(&mut self, action: &Action) {
+    pub(crate) fn take_map_anyway(&mut self, action: &Action) {
         let init = action.kind.is_some_and(|kind| kind.deed == Deed::InitPosition);
         if init && self.faults.has(F::InitPositionTakenAnyway) {
             self.claimed_map = Some(action.text("mapId").to_owned());

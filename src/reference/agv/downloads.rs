@@ -13,31 +13,31 @@ use super::tolerances::ToleranceName as T;
 
 /// Downloads under way: actionId by token.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Downloads {
+pub(crate) struct Downloads {
     under_way: BTreeMap<u64, String>,
     next: u64,
 }
 
 impl Downloads {
     /// Forgets the download of an action.
-    pub(super) fn forget(&mut self, action_id: &str) {
+    pub(crate) fn forget(&mut self, action_id: &str) {
         self.under_way.retain(|_, id| id != action_id);
     }
 
     /// Whether none is under way.
-    pub(super) fn is_idle(&self) -> bool {
+    pub(crate) fn is_idle(&self) -> bool {
         self.under_way.is_empty()
     }
 
     /// Forgets all downloads.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.under_way.clear();
     }
 }
 
 impl Agv {
     /// A downloadMap action begins: asks for the file, if the map is new and there is room.
-    pub(super) fn begin_download(&mut self, action_id: &str) {
+    pub(crate) fn begin_download(&mut self, action_id: &str) {
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
@@ -94,7 +94,7 @@ impl Agv {
     }
 
     /// The server was heard of.
-    pub(super) fn download_progress(&mut self, token: u64, progress: Download) {
+    pub(crate) fn download_progress(&mut self, token: u64, progress: Download) {
         let Some(action_id) = self.downloads.under_way.get(&token).cloned() else {
             return;
         };
@@ -139,7 +139,7 @@ impl Agv {
     }
 
     /// The map did not arrive; all else stays as it was (MAP-19, MAP-22).
-    pub(super) fn download_failed(&mut self, action_id: &str, reason: &str) {
+    pub(crate) fn download_failed(&mut self, action_id: &str, reason: &str) {
         self.downloads.forget(action_id);
         if self.faults.has(F::R1DownloadFailureHangs) {
             if let Some(action) = self.actions.get_mut(action_id) {

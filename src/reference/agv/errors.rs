@@ -9,11 +9,11 @@ use crate::clock::Moment;
 use super::faults::{FaultName as F, Faults};
 
 /// At most this many errors are reported; older ones give way.
-pub(super) const MAX_ERRORS: usize = 20;
+pub(crate) const MAX_ERRORS: usize = 20;
 
 /// When an error ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Life {
+pub(crate) enum Life {
     /// When a new order is accepted (ORD-REJ-03, ORD-REJ-08).
     UntilNewOrder,
     /// At a time, or when a new order is accepted.
@@ -30,20 +30,20 @@ pub(super) enum Life {
 
 /// One active error.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct ActiveError {
-    pub(super) error_type: String,
-    pub(super) fatal: bool,
-    pub(super) references: Vec<(String, String)>,
-    pub(super) description: String,
-    pub(super) life: Life,
+pub(crate) struct ActiveError {
+    pub(crate) error_type: String,
+    pub(crate) fatal: bool,
+    pub(crate) references: Vec<(String, String)>,
+    pub(crate) description: String,
+    pub(crate) life: Life,
 }
 
 /// All active errors.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Errors {
-    active: Vec<ActiveError>,
+pub(crate) struct Errors {
+    pub(crate) active: Vec<ActiveError>,
     /// What a faulty vehicle says instead of an error, from a moment on.
-    corrected: Option<(Moment, ActiveError, ActiveError)>,
+    pub(crate) corrected: Option<(Moment, ActiveError, ActiveError)>,
 }
 
 /// How long a faulty vehicle stands by a wrong report.
@@ -51,7 +51,7 @@ const CORRECTION: Duration = Duration::from_millis(800);
 
 impl Errors {
     /// Adds an error; one with the same type and references is replaced.
-    pub(super) fn raise(&mut self, error: ActiveError) {
+    pub(crate) fn raise(&mut self, error: ActiveError) {
         self.active
             .retain(|other| other.error_type != error.error_type || other.references != error.references);
         if self.active.len() >= MAX_ERRORS
@@ -63,7 +63,7 @@ impl Errors {
     }
 
     /// Reports that something was refused. A faulty vehicle does it wrong at first.
-    pub(super) fn refused(&mut self, right: ActiveError, now: Moment, faults: Faults) {
+    pub(crate) fn refused(&mut self, right: ActiveError, now: Moment, faults: Faults) {
         let mut wrong = right.clone();
         if faults.has(F::RefusalLevelCorrected) {
             wrong.fatal = !right.fatal;
@@ -81,7 +81,7 @@ impl Errors {
     }
 
     /// A new order was accepted.
-    pub(super) fn new_order(&mut self) {
+    pub(crate) fn new_order(&mut self) {
         self.corrected = None;
         self.active.retain(|error| {
             matches!(
@@ -92,12 +92,12 @@ impl Errors {
     }
 
     /// `r2-rejection-cleared-by-instant-action`: forgets what was refused.
-    pub(super) fn forget_refusals(&mut self) {
+    pub(crate) fn forget_refusals(&mut self) {
         self.active.retain(|error| error.life != Life::UntilNewOrder);
     }
 
     /// `r4-new-rejection-replaces-old-warning`: forgets the orders that were refused.
-    pub(super) fn forget_refused_orders(&mut self) {
+    pub(crate) fn forget_refused_orders(&mut self) {
         let of_order = |error: &ActiveError| {
             let mut references = error.references.iter();
             references.any(|(key, value)| key == "topic" && value == "order")
@@ -106,34 +106,34 @@ impl Errors {
     }
 
     /// What the error of that type references, if there is one (`r6-no-order-to-cancel-keeps-first-id` only).
-    pub(super) fn references_of(&self, error_type: &str) -> Option<Vec<(String, String)>> {
+    pub(crate) fn references_of(&self, error_type: &str) -> Option<Vec<(String, String)>> {
         let mut listed = self.active.iter();
         let found = listed.find(|error| error.error_type == error_type)?;
         Some(found.references.clone())
     }
 
     /// Whether anything that was refused is still listed.
-    pub(super) fn lists_refusals(&self) -> bool {
+    pub(crate) fn lists_refusals(&self) -> bool {
         self.active.iter().any(|error| error.life == Life::UntilNewOrder)
     }
 
     /// The emergency stop was released.
-    pub(super) fn released(&mut self) {
+    pub(crate) fn released(&mut self) {
         self.active.retain(|error| error.life != Life::WhileStopped);
     }
 
     /// The vehicle is where it belongs again.
-    pub(super) fn back_inside(&mut self) {
+    pub(crate) fn back_inside(&mut self) {
         self.active.retain(|error| error.life != Life::WhileOutside);
     }
 
     /// The defect was put right.
-    pub(super) fn cleared(&mut self) {
+    pub(crate) fn cleared(&mut self) {
         self.active.retain(|error| error.life != Life::WhileDefective);
     }
 
     /// Drops what has run out.
-    pub(super) fn expire(&mut self, now: Moment) {
+    pub(crate) fn expire(&mut self, now: Moment) {
         if let Some((_, wrong, right)) = self.corrected.take_if(|(due, _, _)| *due <= now) {
             self.active.retain(|error| *error != wrong);
             self.raise(right);
@@ -143,7 +143,7 @@ impl Errors {
     }
 
     /// When the next error runs out.
-    pub(super) fn next_end(&self) -> Option<Moment> {
+    pub(crate) fn next_end(&self) -> Option<Moment> {
         let ends = self.active.iter().filter_map(|error| match error.life {
             Life::Until(end) => Some(end),
             _ => None,
@@ -152,81 +152,27 @@ impl Errors {
     }
 
     /// Whether nothing is wrong.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.active.is_empty()
     }
 
     /// Forgets everything.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.active.clear();
         self.corrected = None;
     }
-
-    /// The array of the state.
-    pub(super) fn picture(&self, faults: Faults) -> Value {
-        let hidden = match faults.has(F::R1NewestErrorOnly) {
-            true => self.active.len().saturating_sub(1),
-            false => 0,
-        };
-        let worst = faults.has(F::R2FatalHidesWarnings) && self.active.iter().any(|error| error.fatal);
-        let shown = self.active.iter().skip(hidden).filter(|error| error.fatal || !worst);
-        shown.map(|error| picture_of(error, faults)).collect()
-    }
 }
 
-fn picture_of(error: &ActiveError, faults: Faults) -> Value {
-    let references: Vec<Value> = error
-        .references
-        .iter()
-        .map(|(key, value)| {
-            let number = value
-                .parse::<u64>()
-                .ok()
-                .filter(|_| faults.has(F::ReferenceValueNumeric));
-            let value = number.map_or_else(|| json!(value), |number| json!(number));
-            if faults.has(F::R1ReferencesNamedKeyValue) {
-                json!({ "key": key, "value": value })
-            } else {
-                json!({ "referenceKey": key, "referenceValue": value })
-            }
+impl ActiveError {
+    /// The error as a state lists it.
+    pub(crate) fn picture(&self) -> Value {
+        let references = self.references.iter();
+        let references = references.map(|(key, value)| json!({ "referenceKey": key, "referenceValue": value }));
+        json!({
+            "errorType": self.error_type,
+            "errorDescription": self.description,
+            "errorLevel": if self.fatal { "FATAL" } else { "WARNING" },
+            "errorReferences": references.collect::<Vec<_>>(),
         })
-        .collect();
-    let level = match error.fatal {
-        true => "FATAL",
-        false
-            if faults.has(F::R3MapErrorLevelCritical)
-                && error.references.iter().any(|(key, _)| key == "mapVersion") =>
-        {
-            "CRITICAL"
-        }
-        // The error of a failed action names its type; that of a refusal does not, or names the message too.
-        false
-            if faults.has(F::R6FailedActionErrorLevelError)
-                && error.references.iter().any(|(key, _)| key == "actionType")
-                && !error.references.iter().any(|(key, _)| key == "topic") =>
-        {
-            "ERROR"
-        }
-        false if faults.has(F::ErrorLevelUnknown) => "ERROR",
-        false => "WARNING",
-    };
-    let mut picture = json!({
-        "errorType": error.error_type,
-        "errorDescription": error.description,
-        "errorLevel": level,
-    });
-    let own = error.life == Life::WhileDefective;
-    if let Some(fields) = picture
-        .as_object_mut()
-        .filter(|_| own && faults.has(F::R2OwnErrorLevelMissing))
-    {
-        fields.remove("errorLevel");
     }
-    if faults.has(F::ReferencesAsMap) {
-        let map = error.references.iter().map(|(key, value)| (key.clone(), json!(value)));
-        picture["errorReferences"] = Value::Object(map.collect());
-    } else {
-        picture["errorReferences"] = Value::Array(references);
-    }
-    picture
 }

@@ -5,9 +5,8 @@ use serde_json::{Map, Value, json};
 use super::ability::SLOWEST;
 use super::action_kinds::{self, ActionKind, Deed, LOAD_POSITIONS, MAX_HEIGHT};
 use super::errors::MAX_ERRORS;
-use super::faults::FaultName as F;
-use super::instant::MAX_INSTANT_ACTIONS;
 use super::path::{HALF_LENGTH, HALF_WIDTH};
+use super::points::Part;
 use super::read::MAX_STRING;
 use super::tolerances::ToleranceName as T;
 use super::{Agv, AgvConfig};
@@ -40,22 +39,13 @@ const ON_A_LINE: [&str; 4] = [
 
 impl Agv {
     /// Publishes the factsheet.
-    pub(super) fn publish_factsheet(&mut self) {
-        if self.faults.has(F::NoFactsheet) {
-            return;
-        }
-        let mut body = self.shown_factsheet(self.true_factsheet());
-        if self.faults.has(F::R2FactsheetWithoutGeometry) {
-            body.remove("agvGeometry");
-        }
-        if self.faults.has(F::FactsheetWithoutLimits) {
-            body.remove("protocolLimits");
-        }
-        self.publish("factsheet", body, &[]);
+    pub(crate) fn publish_factsheet(&mut self) {
+        let body = self.shown_factsheet(self.true_factsheet());
+        self.publish("factsheet", body);
     }
 
     /// What it says about itself.
-    pub(super) fn true_factsheet(&self) -> Map<String, Value> {
+    pub(crate) fn true_factsheet(&self) -> Map<String, Value> {
         let Value::Object(mut body) = self.factsheet() else {
             return Map::new();
         };
@@ -79,27 +69,20 @@ impl Agv {
             factsheet["localizationParameters"] = json!({});
         }
         if self.config.has("vehicleConfig") {
-            let version = if self.faults.has(F::VersionsNumeric) {
-                json!(1.0)
-            } else {
-                json!(env!("CARGO_PKG_VERSION"))
-            };
-            factsheet["vehicleConfig"] = if self.faults.has(F::R1VersionsAsMap) {
-                json!({ "versions": { "softwareVersion": version } })
-            } else {
-                json!({ "versions": [{ "key": "softwareVersion", "value": version }] })
-            };
-            let leased = self.faults.has(F::R3AddressChanges);
-            if leased || self.takes(T::R3NetworkTold) {
-                let host = if leased { 20 + self.states_sent % 200 } else { 20 };
+            let version = env!("CARGO_PKG_VERSION");
+            factsheet["vehicleConfig"] = json!({ "versions": [{ "key": "softwareVersion", "value": version }] });
+            if self.takes(T::R3NetworkTold) {
                 factsheet["vehicleConfig"]["network"] = json!({
                     "dnsServers": ["10.1.0.1"],
                     "ntpServers": ["10.1.0.2"],
-                    "localIpAddress": format!("10.1.0.{host}"),
+                    "localIpAddress": "10.1.0.20",
                     "netmask": "255.255.255.0",
                     "defaultGateway": "10.1.0.1",
                 });
             }
+        }
+        if let Value::Object(body) = &mut factsheet {
+            self.says(Part::Factsheet, body);
         }
         factsheet
     }
@@ -113,20 +96,16 @@ impl Agv {
         json!({
             "seriesName": "Reference AGV",
             "seriesDescription": "A simulated vehicle with two driven wheels and a lift",
-            "agvKinematic": if self.faults.has(F::FactsheetKinematicsUnknown) { "DIFFERENTIAL" } else { "DIFF" },
-            "agvClass": if self.faults.has(F::R1ClassUnknown) { "AMR" } else { "CARRIER" },
+            "agvKinematic": "DIFF",
+            "agvClass": "CARRIER",
             "maxLoadMass": 500.0,
-            "localizationTypes": if self.faults.has(F::R3LocalizationTypesAsText) {
-                json!("NATURAL")
-            } else {
-                json!([if self.config.line_guided() { "RFID" } else { "NATURAL" }])
-            },
+            "localizationTypes": [if self.config.line_guided() { "RFID" } else { "NATURAL" }],
             "navigationTypes": [navigation],
         })
     }
 
     fn physical_parameters(&self) -> Value {
-        let mut parameters = json!({
+        json!({
             "speedMin": SLOWEST,
             "speedMax": self.config.speed,
             "angularSpeedMin": SLOWEST,
@@ -135,30 +114,14 @@ impl Agv {
             "decelerationMax": 2.0,
             "heightMin": self.config.height.min(0.3),
             "heightMax": self.config.height,
-        });
-        if !self.faults.has(F::FactsheetWithoutSize) {
-            parameters["width"] = json!(2.0 * HALF_WIDTH);
-            parameters["length"] = json!(2.0 * HALF_LENGTH);
-        }
-        if self.faults.has(F::SpeedMinAboveMax) {
-            parameters["speedMin"] = json!(self.config.speed + 1.0);
-        }
-        parameters
+            "width": 2.0 * HALF_WIDTH,
+            "length": 2.0 * HALF_LENGTH,
+        })
     }
 
     fn protocol_limits(&self) -> Value {
         let nodes = self.config.max_nodes;
-        let min_state_interval = match self.config.min_state_interval.as_secs_f64() {
-            _ if self.faults.has(F::MinStateIntervalIgnored) => 5.0,
-            // In milliseconds, and never 0: that would promise nothing.
-            seconds if self.faults.has(F::R6FactsheetTimesInMilliseconds) => seconds.max(0.1) * 1000.0,
-            seconds => seconds,
-        };
-        let min_order_interval = match self.takes(T::OrdersSpaced) {
-            true if self.faults.has(F::R6FactsheetTimesInMilliseconds) => 250.0,
-            true => 0.25,
-            false => 0.0,
-        };
+        let min_order_interval = if self.takes(T::OrdersSpaced) { 0.25 } else { 0.0 };
         let mut limits = json!({
             "maxStringLens": {
                 "msgLen": self.config.max_message,
@@ -179,7 +142,7 @@ impl Agv {
             },
             "timing": {
                 "minOrderInterval": min_order_interval,
-                "minStateInterval": min_state_interval,
+                "minStateInterval": self.config.min_state_interval.as_secs_f64(),
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },
         });
@@ -192,32 +155,13 @@ impl Agv {
                     .for_each(|limit| *limit = json!(0));
             }
         }
-        if self.faults.has(F::OwnLimitExceeded) || self.faults.has(F::R1ActionStatesLimitExceeded) {
-            limits["maxArrayLens"]["state.actionStates"] = json!(1);
-        }
-        if self.faults.has(F::R1ArrayLimitsNested) {
-            limits["maxArrayLens"] = json!({
-                "order": { "nodes": nodes, "edges": nodes.saturating_sub(1) },
-                "instantActions": MAX_INSTANT_ACTIONS,
-            });
-        }
         if let Some(interval) = self.config.visualization_interval {
             limits["timing"]["visualizationInterval"] = json!(interval.as_secs_f64());
-        }
-        if self.faults.has(F::FactsheetWithoutTiming)
-            && let Some(fields) = limits.as_object_mut()
-        {
-            fields.remove("timing");
         }
         limits
     }
 
     fn protocol_features(&self) -> Value {
-        let support = if self.faults.has(F::FactsheetSupportYes) {
-            "YES"
-        } else {
-            "SUPPORTED"
-        };
         let usual = if self.config.line_guided() {
             ON_A_LINE.as_slice()
         } else {
@@ -237,16 +181,9 @@ impl Agv {
             .iter()
             .chain(special)
             .chain(zones)
-            .map(|name| match self.faults.has(F::R2OptionalParametersAsNames) {
-                true => json!(name),
-                false => json!({ "parameter": name, "support": support }),
-            })
+            .map(|name| json!({ "parameter": name, "support": "SUPPORTED" }))
             .collect();
-        let missing = self.faults.has(F::FactsheetActionMissing);
-        let unlisted = self.faults.has(F::StateRequestUnlisted);
         let actions: Vec<Value> = action_kinds::offered(&self.config)
-            .filter(|kind| !(missing && kind.deed == Deed::CancelOrder))
-            .filter(|kind| !(unlisted && kind.deed == Deed::StateRequest))
             .map(|kind| self.action_picture(kind))
             .collect();
         let reversed = self.takes(super::tolerances::ToleranceName::R1FactsheetListsReversed);
@@ -258,71 +195,20 @@ impl Agv {
         } else {
             (parameters, actions)
         };
-        let mut features = json!({ "optionalParameters": parameters, "agvActions": actions });
-        if self.faults.has(F::OptionalParametersMissing)
-            && let Some(fields) = features.as_object_mut()
-        {
-            fields.remove("optionalParameters");
-        }
-        features
+        json!({ "optionalParameters": parameters, "agvActions": actions })
     }
 
     fn action_picture(&self, kind: &ActionKind) -> Value {
-        let mut scopes: Vec<&str> = match self.faults.has(F::R6FactsheetAllScopesForAll) {
-            true => vec!["INSTANT", "NODE", "EDGE"],
-            false => kind.scopes.iter().map(|scope| scope.literal()).collect(),
-        };
-        for (deed, scope, fault) in [
-            (Deed::StartPause, "NODE", F::StartPauseOnNodes),
-            (Deed::Pick, "INSTANT", F::PickAsInstantAction),
-            (Deed::Pick, "INSTANT", F::R1PickListedInstant),
-            (Deed::FinePositioning, "INSTANT", F::PositioningAsInstantAction),
-            (Deed::StartCharging, "EDGE", F::ChargingOnEdges),
-        ] {
-            if kind.deed == deed && self.faults.has(fault) {
-                scopes.push(scope);
-            }
-        }
-        let lower = self.faults.has(F::FactsheetScopeLowerCase);
-        let scopes: Vec<String> = scopes
-            .into_iter()
-            .map(|scope| {
-                if lower {
-                    scope.to_ascii_lowercase()
-                } else {
-                    scope.to_owned()
-                }
-            })
-            .collect();
-        let renamed = kind.deed == Deed::Pick && self.faults.has(F::PickParameterRenamed);
-        let unknown = self.faults.has(F::ParameterTypeUnknown);
-        let sized = self.faults.has(F::R6FactsheetParameterTypeFloat);
+        let scopes: Vec<&str> = kind.scopes.iter().map(|scope| scope.literal()).collect();
         let mut picture = Map::new();
-        let capital = matches!(kind.deed, Deed::StartPause | Deed::StopPause) && self.faults.has(F::VendorPauseListed);
-        let name = if capital {
-            kind.name.replacen('s', "S", 1)
-        } else {
-            kind.name.to_owned()
-        };
-        picture.insert("actionType".into(), json!(name));
+        picture.insert("actionType".into(), json!(kind.name));
         picture.insert("actionDescription".into(), json!(kind.description));
-        if self.faults.has(F::R1ScopesInOneText) {
-            picture.insert("actionScopes".into(), json!(scopes.join(",")));
-        } else {
-            picture.insert("actionScopes".into(), json!(scopes));
-        }
+        picture.insert("actionScopes".into(), json!(scopes));
         if !kind.parameters.is_empty() {
             let parameters = kind.parameters.iter().map(|parameter| {
                 let mut picture = json!({
-                    "key": match parameter.key {
-                        "stationType" if renamed => "station_type",
-                        key => key,
-                    },
-                    "valueDataType": match parameter.data_type {
-                        _ if unknown => "DOUBLE",
-                        "FLOAT" | "NUMBER" if sized => "FLOAT64",
-                        data_type => data_type,
-                    },
+                    "key": parameter.key,
+                    "valueDataType": parameter.data_type,
                     "isOptional": parameter.optional,
                 });
                 if let Some(fields) = picture
@@ -340,72 +226,46 @@ impl Agv {
             picture.insert("resultDescription".into(), json!(result));
         }
         if self.config.has("vehicleConfig") {
-            let types = match self.faults.has(F::R2BlockingTypesLowerCase) {
-                true => json!(["none", "soft", "hard"]),
-                false => json!(["NONE", "SOFT", "HARD"]),
-            };
-            picture.insert("blockingTypes".into(), types);
+            picture.insert("blockingTypes".into(), json!(["NONE", "SOFT", "HARD"]));
         }
         Value::Object(picture)
     }
 
     fn geometry(&self) -> Value {
-        let typeless = self.faults.has(F::WheelWithoutType);
         let wheel = |y: f64| {
-            let mut wheel = json!({
+            json!({
                 "type": "DRIVE",
                 "isActiveDriven": true,
                 "isActiveSteered": false,
                 "position": { "x": 0.0, "y": y },
                 "diameter": 0.2,
                 "width": 0.05,
-            });
-            if let Some(fields) = wheel.as_object_mut().filter(|_| typeless) {
-                fields.remove("type");
-            }
-            wheel
+            })
         };
         let point = |x: f64, y: f64| json!({ "x": x, "y": y });
-        let mut contour = vec![
+        let contour = [
             point(HALF_LENGTH, HALF_WIDTH),
             point(-HALF_LENGTH, HALF_WIDTH),
             point(-HALF_LENGTH, -HALF_WIDTH),
             point(HALF_LENGTH, -HALF_WIDTH),
         ];
-        if self.faults.has(F::PolygonCrossed) {
-            contour.swap(1, 2);
-        }
         json!({
             "wheelDefinitions": [wheel(0.35), wheel(-0.35)],
-            "envelopes2d": if self.faults.has(F::R1EnvelopeUnnamed) {
-                json!([{ "polygonPoints": contour }])
-            } else {
-                json!([{ "set": "contour", "polygonPoints": contour }])
-            },
+            "envelopes2d": [{ "set": "contour", "polygonPoints": contour }],
         })
     }
 
     fn load_specification(&self) -> Value {
-        let typeless = self.faults.has(F::LoadSetWithoutType);
         let set = |name: &str, load_type: &str| {
-            let mut set = json!({
+            json!({
                 "setName": name,
                 "loadType": load_type,
                 "loadPositions": LOAD_POSITIONS,
                 "maxWeight": 500.0,
                 "maxLoadhandlingHeight": MAX_HEIGHT,
-            });
-            if let Some(fields) = set.as_object_mut().filter(|_| typeless) {
-                fields.remove("loadType");
-            }
-            set
+            })
         };
-        let second = if self.faults.has(F::LoadSetTwice) {
-            "DEFAULT"
-        } else {
-            "SMALL"
-        };
-        json!({ "loadPositions": LOAD_POSITIONS, "loadSets": [set("DEFAULT", "EPAL"), set(second, "KLT")] })
+        json!({ "loadPositions": LOAD_POSITIONS, "loadSets": [set("DEFAULT", "EPAL"), set("SMALL", "KLT")] })
     }
 }
 

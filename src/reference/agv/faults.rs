@@ -24,104 +24,23 @@ macro_rules! faults {
 
 with_blind_faults! { faults!
     // Transport
-    OrderForgottenOnLinkLoss "order-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-02"] "Throws its order away when the link breaks.";
     PauseStuckAfterCut "pause-stuck-after-cut" ["ACT-13"] "Reports stopPause FINISHED and stays paused when the link was lost in the pause.";
     PauseStuckAfterRefusal "pause-stuck-after-refusal" ["ACT-13"] "Reports stopPause FINISHED and stays paused when it has refused an order or an update in the pause.";
-    UpdateForgottenOnLinkLoss "update-forgotten-on-link-loss" ["MQTT-03", "STATE-12", "STATE-MSG-13"] "Goes back to the first orderUpdateId of its order when the link breaks.";
-    ActionsForgottenOnLinkLoss "actions-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-10"] "Forgets the actions of its order when the link breaks.";
     ActionEndMissedOffline "action-end-missed-offline" ["MQTT-04"] "Leaves an action RUNNING for ever that ends while the link is down.";
     StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
     HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07", "MQTT-04"] "Drives into the horizon while the link is down.";
-    OldMqtt "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1.";
-    StateQosOne "state-qos-1" ["MQTT-07"] "Publishes the state with QoS 1.";
-    FactsheetQosTwo "factsheet-qos-2" ["MQTT-07"] "Publishes the factsheet with QoS 2.";
-    ConnectionQosZero "connection-qos-0" ["MQTT-08"] "Publishes the connection topic with QoS 0.";
-    NeverReconnects "never-reconnects" ["MQTT-10", "STATE-02"] "Does not connect again after a broken link.";
-    NulAfterJson "nul-after-json" ["MQTT-02", "JSON-10", "STATE-02"] "Sends the terminating zero byte of its string with every periodic state.";
-    MisspelledTopic "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore.";
-    StatesTopic "states-topic" ["TOPIC-01"] "Publishes its states on a topic called states.";
-    OtherSerialNumber "other-serial-number" ["TOPIC-04", "HDR-05"] "Names another serial number in the header than in the topic.";
-    NoFactsheet "no-factsheet" ["TOPIC-11", "ACT-40"] "Never publishes a factsheet.";
-    OtherMajorVersion "other-major-version" ["TOPIC-03", "TOPIC-02"] "Publishes its visualization below another major version.";
     EchoesOrder "echoes-order" ["TOPIC-15"] "Publishes the accepted order back on the order topic.";
-    InstantActionsNotSubscribed "instant-actions-not-subscribed" ["TOPIC-10"] "Does not subscribe to instantActions.";
-    NotSubscribedAgain "not-subscribed-again" ["TOPIC-10", "MQTT-10"] "Does not subscribe again when it reconnects.";
-    SerialNumberWithSpace "serial-number-with-space" ["TOPIC-05", "HDR-05"] "Writes its serial number with a space in the header.";
 
     // Header and JSON
-    HeaderWithoutManufacturer "header-without-manufacturer" ["HDR-01", "HDR-05"] "Leaves the manufacturer out of the header of its states.";
-    HeaderNested "header-nested" ["HDR-01", "CONN-10"] "Packs the header of connection messages into an object of its own.";
-    VisualizationWithoutHeader "visualization-without-header" ["VIS-01", "HDR-01"] "Publishes the visualization without a header.";
-    FactsheetWithoutHeader "factsheet-without-header" ["HDR-01"] "Publishes the factsheet without a header.";
-    ManufacturerEmpty "manufacturer-empty" ["HDR-05"] "Leaves the manufacturer empty in its states.";
-    ManufacturerWithSlash "manufacturer-with-slash" ["TOPIC-06", "TOPIC-04"] "Writes its manufacturer with a slash in the header.";
-    HeaderIdConstant "header-id-constant" ["HDR-02"] "Sends every state with the same headerId.";
-    HeaderIdShared "header-id-shared" ["HDR-02"] "Counts one headerId over all topics.";
-    HeaderIdResetByReconnect "header-id-reset-by-reconnect" ["HDR-02"] "Counts from 0 again after a link that was only broken.";
-    HeaderIdAsText "header-id-as-text" ["JSON-06", "HDR-02"] "Sends the headerId as a string.";
-    TimestampLocal "timestamp-local" ["HDR-03"] "Gives its timestamps in local time with an offset.";
-    TimestampWithoutZone "timestamp-without-zone" ["HDR-03"] "Gives its timestamps without the Z.";
-    TimestampUnix "timestamp-unix" ["HDR-03", "JSON-06"] "Gives its timestamps as seconds since 1970.";
-    TimestampStandsStill "timestamp-stands-still" ["HDR-03"] "Gives every message the time at which it was switched on.";
-    TimestampLocalAsUtc "timestamp-local-as-utc" ["HDR-03"] "Writes its local time with a Z.";
-    VersionShort "version-short" ["HDR-04"] "Gives the protocol version without the patch number.";
-    FieldMisspelled "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore.";
-    ModeLowerCase "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case.";
-    LatinOneText "latin-1-text" ["JSON-03", "STATE-02"] "Encodes the text of its periodic states in Latin-1.";
-    BooleanAsText "boolean-as-text" ["JSON-07", "STATE-MSG-15", "ACT-19"] "Sends charging as a word in quotes.";
-    NanVelocity "nan-velocity" ["JSON-08", "MQTT-02", "STATE-02"] "Writes NaN as turning speed into its periodic states.";
-    NanAsText "nan-as-text" ["JSON-08", "STATE-MSG-05"] "Writes the word NaN as turning speed into its periodic states.";
-    ReachFractional "reach-fractional" ["JSON-09", "STATE-MSG-15", "JSON-06"] "Estimates its reach in fractions of a metre.";
-    DuplicateKey "duplicate-key" ["JSON-10"] "Repeats the key driving in its periodic states, with another value.";
-    IdWithSpace "id-with-space" ["JSON-04", "ORD-CANCEL-15"] "Reports the id of its map with a space.";
 
     // Connection
-    NoWill "no-will" ["CONN-01", "CONN-02", "CONN-03"] "Connects without a last will.";
-    WillOnStateTopic "will-on-state-topic" ["CONN-01"] "Registers its last will on the state topic.";
-    WillOffline "will-offline" ["CONN-02"] "Says OFFLINE in its last will.";
-    WillWithoutHeader "will-without-header" ["CONN-02", "HDR-01"] "Leaves the header out of its last will.";
-    WillQosZero "will-qos-0" ["CONN-03"] "Registers its last will with QoS 0.";
-    WillNotRetained "will-not-retained" ["CONN-03", "CONN-06"] "Registers its last will without the retain flag.";
-    KeepAliveOff "keep-alive-off" ["CONN-04"] "Connects with the keep-alive off.";
-    KeepAliveLong "keep-alive-long" ["CONN-04"] "Connects with a keep-alive of ten minutes.";
-    NoOnline "no-online" ["CONN-05", "CONN-11", "TOPIC-11"] "Never says that it is ONLINE.";
-    ConnectionNotRetained "connection-not-retained" ["CONN-06"] "Publishes ONLINE and OFFLINE without the retain flag.";
-    NoOffline "no-offline" ["CONN-07"] "Disconnects without saying OFFLINE.";
-    NoDisconnect "no-disconnect" ["CONN-08"] "Closes the socket after OFFLINE without a DISCONNECT.";
     CrashesOnMalformedOrder "crashes-on-malformed-order" ["ORD-REJ-02", "ORD-REJ-17"] "Ends its connection over an order that it cannot read, and comes back.";
-    ConnectionStateUnderscore "connection-state-underscore" ["CONN-02", "CONN-10", "JSON-02"] "Spells CONNECTIONBROKEN with an underscore.";
-    ConnectionStateConnected "connection-state-connected" ["CONN-10", "CONN-05", "JSON-02"] "Says CONNECTED instead of ONLINE.";
-    NoOnlineAfterReconnect "no-online-after-reconnect" ["CONN-11"] "Says ONLINE only the first time it connects.";
 
     OnlineLate "online-late" ["CONN-05", "CONN-11"] "Says ONLINE only 25 seconds after it reconnected.";
-    OfflineThenBroken "offline-then-broken" ["CONN-10", "CONN-08"] "Says CONNECTIONBROKEN itself after OFFLINE.";
 
     // Factsheet
-    FactsheetNotRetained "factsheet-not-retained" ["FACT-01"] "Publishes the factsheet without the retain flag.";
-    FactsheetWithoutLimits "factsheet-without-limits" ["FACT-02", "FACT-05"] "Leaves protocolLimits out of the factsheet.";
-    FactsheetKinematicsUnknown "factsheet-kinematics-unknown" ["FACT-03", "JSON-02"] "Gives DIFFERENTIAL as its kinematics.";
-    FactsheetWithoutSize "factsheet-without-size" ["FACT-04", "JSON-10"] "Leaves width and length out of the factsheet.";
-    SpeedMinAboveMax "speed-min-above-max" ["FACT-04"] "States a lowest speed above its highest.";
-    WheelWithoutType "wheel-without-type" ["FACT-08", "JSON-10"] "Leaves the type of its wheels out of the factsheet.";
-    LoadSetWithoutType "load-set-without-type" ["FACT-09", "JSON-10"] "Leaves the type of the load out of its load sets.";
-    FactsheetWithoutTiming "factsheet-without-timing" ["FACT-05", "JSON-10"] "Leaves the timing out of its limits.";
-    FactsheetSupportYes "factsheet-support-yes" ["FACT-06"] "Says YES where the support of a parameter is asked for.";
-    OptionalParametersMissing "optional-parameters-missing" ["OPT-04", "FACT-06"] "Leaves optionalParameters out of the factsheet.";
-    FactsheetScopeLowerCase "factsheet-scope-lower-case" ["FACT-07", "JSON-02"] "Spells the scopes of its actions in lower case.";
     ListedActionRefused "listed-action-refused" ["ACT-01", "ACT-35", "ACT-36"] "Refuses finePositioning and detectObject although its factsheet lists them.";
-    FactsheetActionMissing "factsheet-action-missing" ["FACT-07"] "Offers cancelOrder but does not list it.";
-    PolygonCrossed "polygon-crossed" ["FACT-08"] "Draws its contour as a polygon that crosses itself.";
-    LoadSetTwice "load-set-twice" ["FACT-09"] "Uses one name for two load sets.";
-    ParameterTypeUnknown "parameter-type-unknown" ["BP-05", "FACT-07", "JSON-02"] "Calls the type of its parameters DOUBLE.";
-    VersionsNumeric "versions-numeric" ["FACT-10", "JSON-06"] "Gives its software version as a number.";
-    OwnLimitExceeded "own-limit-exceeded" ["FACT-11"] "States room for one action in its states and sends more.";
-    MinStateIntervalIgnored "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it.";
-    PickAsInstantAction "pick-as-instant-action" ["ACT-09"] "Declares pick as an instant action.";
-    PositioningAsInstantAction "positioning-as-instant-action" ["ACT-09"] "Declares finePositioning as an instant action.";
-    ChargingOnEdges "charging-on-edges" ["ACT-09"] "Declares startCharging as an action for edges.";
-    StateRequestUnlisted "state-request-unlisted" ["FACT-07"] "Offers stateRequest but does not list it.";
     StateRequestListedRefused "state-request-listed-refused" ["FACT-07", "ACT-26"] "Does not understand stateRequest although its factsheet lists it.";
-    StartPauseOnNodes "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes.";
 
     // Order
     NodeSkipped "node-skipped" ["ORD-01", "STATE-06", "NODE-03"] "Leaves plain nodes between others out of its reports.";
@@ -135,9 +54,6 @@ with_blind_faults! { faults!
     HorizonDemanded "horizon-demanded" ["ORD-10"] "Refuses new orders without a horizon.";
     GraphUnchecked "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense.";
     SingleNodeRefused "single-node-refused" ["ORD-13"] "Refuses orders with one node.";
-    DrivingAtDecisionPoint "driving-at-decision-point" ["ORD-UPD-01", "STATE-MSG-08"] "Says that it drives while it waits at the decision point.";
-    DrivingWhileWaiting "driving-while-waiting" ["STATE-MSG-08"] "Says that it drives when its order is done.";
-    TurnsWithoutDriving "turns-without-driving" ["STATE-MSG-08"] "Does not say that it drives while it turns on the spot.";
     StitchingNodeOverwritten "stitching-node-overwritten" ["ORD-UPD-07"] "Takes over the actions an update brings for the stitching node.";
     UpdateJoinedByNumber "update-joined-by-number" ["ORD-FLOW-08"] "Joins an update by its sequenceId, whatever the node.";
     HorizonAppended "horizon-appended" ["ORD-UPD-08"] "Keeps the old horizon when an update brings a new one.";
@@ -152,12 +68,9 @@ with_blind_faults! { faults!
     FarOrderAccepted "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is.";
     StartRefusalSilent "start-refusal-silent" ["ORD-REJ-17"] "Raises no error when the first node of an order is out of reach.";
     OldActionStatesKept "old-action-states-kept" ["ORD-FLOW-05", "STATE-MSG-11"] "Keeps the action states of the old order.";
-    HorizonNotReported "horizon-not-reported" ["ORD-FLOW-06", "STATE-12"] "Leaves the horizon out of its node and edge states.";
-    HorizonPositionsCopied "horizon-positions-copied" ["ORD-FLOW-06"] "Gives the nodes of the horizon in its states the place of the first node that is listed.";
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
     UpdateIdKept "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId.";
-    UpdateIdCounted "update-id-counted" ["ORD-FLOW-09", "STATE-MSG-02"] "Shows an orderUpdateId that is one too high once an update was taken over.";
     UpdateIdsComparedAcrossOrders "update-ids-compared-across-orders" ["ORD-FLOW-06", "ORD-04", "ORD-13"] "Refuses a new order whose orderUpdateId is lower than that of the last order.";
     UpdateIdCarriedOver "update-id-carried-over" ["ORD-FLOW-06", "STATE-12"] "Reports a new order with the orderUpdateId of the last one.";
     OnlyFirstUpdate "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before.";
@@ -272,9 +185,6 @@ with_blind_faults! { faults!
     MaxRotationSpeedIgnored "max-rotation-speed-ignored" ["ORD-MSG-25"] "Turns with its own speed whatever the edge permits.";
     TraversedEarly "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there.";
     AxesMirrored "axes-mirrored" ["MAP-01"] "Reports its position with y to the right.";
-    PositionFrozen "position-frozen" ["MAP-01"] "Reports the position at which it was switched on wherever it is.";
-    DegreesReported "degrees-reported" ["MAP-02", "STATE-MSG-05", "ORD-CANCEL-15"] "Reports its orientation in degrees.";
-    VelocityMirrored "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards.";
 
     TurnsOnEdge "turns-on-edge" ["ORD-MSG-24", "ORD-MSG-12"] "Turns to the orientation of an edge when it is on it already.";
     MaxHeightIgnored "max-height-ignored" ["ORD-MSG-21", "OPT-02"] "Accepts edges too low for it.";
@@ -293,16 +203,11 @@ with_blind_faults! { faults!
     PlannedPathWithoutEnds "planned-path-without-ends" ["ORD-MSG-30"] "Reports control points that are not those of its own curve.";
     KnotsTooFew "knots-too-few" ["ORD-MSG-29"] "Leaves the last knot out of the trajectory it reports.";
     TrajectoryWithoutPoints "trajectory-without-points" ["ORD-MSG-28", "JSON-10"] "Reports the trajectory it planned without control points.";
-    ZoneSetInvented "zone-set-invented" ["ORD-MSG-04", "STATE-MSG-03"] "Goes over to a zone set of its own when an order names one.";
     ZoneSetUnchecked "zone-set-unchecked" ["STATE-MSG-03"] "Takes over orders with zone sets it does not have, and goes on with its own.";
 
     // Maps
-    MapListedTwice "map-listed-twice" ["MAP-07"] "Lists the map it uses twice.";
     UnknownMapAccepted "unknown-map-accepted" ["MAP-08"] "Accepts orders on maps it does not have.";
-    PositionMapStale "position-map-stale" ["MAP-11", "ORD-CANCEL-15"] "Names a map in its position that is not on board.";
-    MapStatusMisspelled "map-status-misspelled" ["MAP-12", "MAP-24"] "Says ACTIVE where ENABLED is meant.";
     DisabledMapUsed "disabled-map-used" ["MAP-13"] "Drives on maps that are disabled.";
-    MapsReportedEmpty "maps-reported-empty" ["MAP-15", "MAP-20"] "Reports no maps although it drives on one.";
     DownloadNeverRunning "download-never-running" ["MAP-17"] "Keeps downloadMap INITIALIZING while it downloads.";
     DownloadFinishedEarly "download-finished-early" ["MAP-18", "MAP-21", "MAP-17"] "Reports downloadMap FINISHED when the first byte arrives.";
     DownloadFailureFinished "download-failure-finished" ["MAP-19"] "Reports downloadMap FINISHED when the server does not have the map.";
@@ -338,16 +243,12 @@ with_blind_faults! { faults!
 
     // Actions
     ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07", "ORD-06"] "Never begins the actions of an order.";
-    VendorPauseListed "vendor-pause-listed" ["ACT-05"] "Lists its pause as StartPause and StopPause.";
-    PickParameterRenamed "pick-parameter-renamed" ["ACT-06"] "Calls the station type of a pick station_type in its factsheet.";
     UndescribedStatus "undescribed-status" ["ACT-41"] "Reports instant actions INITIALIZING that have no preparation.";
-    PickPreparedAsRunning "pick-prepared-as-running" ["ACT-33", "ASTATE-02"] "Reports a pick RUNNING while it only prepares for it.";
     FieldDoesNotPause "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated.";
     FieldPauseStuck "field-pause-stuck" ["ACT-34", "ASTATE-04"] "Does not go on with its actions when its protective field is free again.";
     EdgeActionOutlivesEdge "edge-action-outlives-edge" ["ACT-02", "NODE-05"] "Lets the actions of an edge run on behind its end.";
     LastEdgeActionOutlivesEdge "last-edge-action-outlives-edge" ["NODE-05", "ACT-02"] "Ends only the first of several actions of an edge when it leaves it.";
     EdgeListCut "edge-list-cut" ["ACT-01"] "Performs only the first of several actions of an edge, and fails the others.";
-    EdgeActionsUnlisted "edge-actions-unlisted" ["ASTATE-01"] "Lists the actions of an edge only when they begin.";
     StuckAfterEdgeAction "stuck-after-edge-action" ["BLOCK-07", "ORD-06"] "Does not drive on after a blocking action of an edge.";
     EdgeConditionStays "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them.";
     ScopeUnchecked "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions.";
@@ -355,15 +256,11 @@ with_blind_faults! { faults!
     PausesCounted "pauses-counted" ["ACT-13", "ACT-11"] "Counts its pauses, and ends them only with as many stopPause.";
     StopPauseIdleFails "stop-pause-idle-fails" ["ACT-11"] "Fails a stopPause while it is not paused.";
     PauseDrivesOn "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses.";
-    DrivingInPause "driving-in-pause" ["ACT-12", "ACT-15", "STATE-MSG-08"] "Says that it drives as long as it is paused with an order.";
-    PauseFlagMissing "pause-flag-missing" ["ACT-13"] "Does not report that it is paused.";
     PauseDropsOrder "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused.";
     PauseNotLifted "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on.";
-    PauseLostOnLinkLoss "pause-lost-on-link-loss" ["ACT-12", "ACT-13"] "Ends its pause when the link breaks.";
     OrderEndsPause "order-ends-pause" ["ACT-12"] "Drives off with a new order although it is paused.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Pauses and goes on by message although a switch or the button at the vehicle forbids it.";
     BlockedPauseTaken "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot.";
-    ButtonPauseUnreported "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button.";
     ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
     ChargingEndUnreported "charging-end-unreported" ["ACT-19"] "Reports that it charges after stopCharging is FINISHED.";
     ChargingEndsEarly "charging-ends-early" ["ACT-22"] "Reports that it does not charge any more while it cannot take orders yet.";
@@ -399,7 +296,6 @@ with_blind_faults! { faults!
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
     FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
-    InstantActionUnlisted "instant-action-unlisted" ["IACT-03", "STATE-MSG-09", "ORD-CANCEL-18"] "Performs instant actions without an action state.";
     StateRequestStuck "state-request-stuck" ["ACT-26", "IACT-04"] "Leaves stateRequest RUNNING for ever.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
@@ -413,14 +309,7 @@ with_blind_faults! { faults!
     OnlyFirstInstantAction "only-first-instant-action" ["IACT-07", "IACT-03"] "Performs only the first action of an instantActions message.";
 
     // State
-    StateSilence "state-silence" ["STATE-02"] "Sends states only every 45 seconds when nothing happens.";
-    SilentWhileHeld "silent-while-held" ["STATE-02"] "Sends states only every 45 seconds while it waits for a release.";
-    SilentWhilePaused "silent-while-paused" ["STATE-02"] "Sends states only every 45 seconds while it is paused.";
-    SilentWhileActing "silent-while-acting" ["STATE-02"] "Sends states only every 45 seconds while an action runs.";
-    SilentByHand "silent-by-hand" ["STATE-02"] "Sends states only every 45 seconds in MANUAL.";
     StatesByClock "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens.";
-    StateIntervalExceeded "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says.";
-    SilentAfterReconnect "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected.";
     OrderWithoutState "order-without-state" ["STATE-03"] "Does not send a state when an order arrives.";
     UpdateWithoutState "update-without-state" ["STATE-03"] "Does not send a state when an order update arrives.";
     LoadWithoutState "load-without-state" ["STATE-04", "ACT-28", "ACT-01"] "Does not send a state when its load changes.";
@@ -431,65 +320,23 @@ with_blind_faults! { faults!
     ActionsWithoutState "actions-without-state" ["STATE-09"] "Does not send a state when an action proceeds.";
     MapsWithoutState "maps-without-state" ["STATE-10"] "Does not send a state when its maps change.";
     StateBursts "state-bursts" ["STATE-11"] "Sends every state five times.";
-    TraversedNodesListed "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last.";
-    FinishedOrderListed "finished-order-listed" ["STATE-13"] "Keeps the last node in its states when the order is complete.";
-    LastEdgeListed "last-edge-listed" ["STATE-13"] "Keeps the last edge in its states when the order is complete.";
-    LastRouteListed "last-route-listed" ["STATE-13", "NODE-03"] "Keeps the last node and the last edge in its states when the order is complete.";
-    NewBaseRequestAlways "new-base-request-always" ["STATE-16"] "Asks for a new base all the time.";
-    NewBaseRequestStays "new-base-request-stays" ["STATE-16"] "Asks for a new base until its next order, once it has done so.";
-    SafetyStateMissing "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states.";
-    ModeMissing "mode-missing" ["STATE-MSG-01", "STATE-01", "JSON-10"] "Leaves operatingMode out of its states.";
-    ModeNumeric "mode-numeric" ["MODE-01", "JSON-10", "JSON-06"] "Gives a number as its operating mode.";
-    EmptyListsNull "empty-lists-null" ["JSON-10", "JSON-06", "STATE-MSG-01"] "Writes null for lists of nodes, edges and actions that are empty.";
-    OrderIdResetWhenDone "order-id-reset-when-done" ["STATE-MSG-02", "ORD-CANCEL-08"] "Empties the orderId when the order is complete.";
-    OrderIdPrefixed "order-id-prefixed" ["ORD-FLOW-06", "STATE-MSG-02"] "Shows orderIds with its own serial number in front.";
-    UpdateIdResetWhenDone "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete.";
     RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
-    LastNodeClearedWhenDone "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete.";
-    OrderIdForgottenOnRequest "order-id-forgotten-on-request" ["STATE-MSG-02", "STATE-13"] "Answers a stateRequest without its orderId.";
-    LastNodeUnknownOnRequest "last-node-unknown-on-request" ["STATE-MSG-04"] "Answers a stateRequest without its last node.";
-    RouteRepeatedOnRequest "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done.";
-    PositionAsText "position-as-text" ["STATE-MSG-05", "JSON-06", "ORD-CANCEL-15"] "Reports its coordinates as strings.";
-    LoadsAlwaysEmpty "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one.";
     LoadForgottenWithOrder "load-forgotten-with-order" ["STATE-MSG-06", "ACT-29"] "Shows no load any more when it takes over a new order.";
-    LoadWeightNegative "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load.";
-    DrivingUnreported "driving-unreported" ["STATE-MSG-08", "STATE-08"] "Never says that it drives.";
-    DrivingAsText "driving-as-text" ["JSON-07", "JSON-10", "STATE-MSG-08"] "Sends driving as a word in quotes.";
-    DrivingKept "driving-kept" ["STATE-MSG-08", "STATE-08", "ORD-UPD-01"] "Says that it drives from its first order on, also when it stands.";
-    DrivingWhileLifting "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts.";
     FinishedInstantForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
     LastInstantActionOnly "last-instant-action-only" ["STATE-MSG-10", "STATE-MSG-09"] "Removes finished instant actions from its states when another one arrives.";
-    InstantActionListedTwice "instant-action-listed-twice" ["STATE-MSG-09"] "Lists instant actions twice.";
     FinishedActionsRemoved "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done.";
     RunningInstantDropped "running-instant-dropped" ["STATE-MSG-11"] "Removes running instant actions from its states when a new order is accepted.";
-    NodeStatesWithoutSequence "node-states-without-sequence" ["STATE-MSG-13", "STATE-12"] "Leaves the sequenceId out of its node states.";
-    HorizonReportedReleased "horizon-reported-released" ["STATE-MSG-13"] "Reports the nodes and edges of the horizon as released.";
-    DistanceNegative "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node.";
-    DistanceNotReset "distance-not-reset" ["STATE-MSG-18"] "Counts the distance since its last node from the beginning of its order.";
-    StatusDone "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant.";
-    StatusLowerCase "status-lower-case" ["STATE-MSG-14", "JSON-02", "JSON-10"] "Spells the statuses of actions in lower case.";
-    ChargeGoodBad "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent.";
-    ChargeMissing "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state.";
-    EmergencyStopSpelled "emergency-stop-spelled" ["STATE-MSG-17", "JSON-02"] "Says Off where no emergency stop is active.";
-    EmergencyStopNull "emergency-stop-null" ["STATE-MSG-17", "JSON-10", "JSON-02"] "Writes null where no emergency stop is active.";
-    EmergencyStopUnreported "emergency-stop-unreported" ["STATE-MSG-17"] "Does not report an emergency stop.";
 
     // Traversal
     TraversalSplit "traversal-split" ["NODE-03"] "Removes the node state and updates the last node in two states.";
     LastNodeStale "last-node-stale" ["NODE-03", "STATE-MSG-04", "STATE-06"] "Reports the new lastNodeId with the old lastNodeSequenceId.";
     NodeActionsEarly "node-actions-early" ["NODE-04", "ASTATE-02"] "Begins the actions of a node when it sets out for it.";
     LoopActionsEarly "loop-actions-early" ["ASTATE-02", "NODE-04"] "Performs the actions of a second visit of a node on the first.";
-    EdgeStatesStay "edge-states-stay" ["NODE-05", "STATE-12"] "Keeps the edge it has left in its states.";
     EdgeActionsLate "edge-actions-late" ["NODE-06", "ACT-02"] "Begins the actions of an edge at its end.";
     EdgeActionsOnNode "edge-actions-on-node" ["NODE-07"] "Begins the actions of an edge while it is held on the node before.";
 
     // Action life cycle and blocking
-    HorizonActionsMissing "horizon-actions-missing" ["ASTATE-01"] "Lists the actions of the horizon only when they are released.";
-    SingleNodeActionUnlisted "single-node-action-unlisted" ["ASTATE-01"] "Does not list the actions of orders with one node.";
     HorizonActionsBegun "horizon-actions-begun" ["ASTATE-02"] "Begins the actions of the horizon when it stops at the decision point.";
-    RunningFromStart "running-from-start" ["ASTATE-02"] "Reports all actions RUNNING when the order is accepted.";
-    InitializingFromStart "initializing-from-start" ["ASTATE-03", "ASTATE-02"] "Reports all actions INITIALIZING when the order is accepted.";
-    PausedWithoutPause "paused-without-pause" ["ASTATE-04"] "Reports actions PAUSED that only wait for others.";
     PauseToWaiting "pause-to-waiting" ["ASTATE-05"] "Puts running actions back to WAITING in a pause.";
     FailsAfterFinished "fails-after-finished" ["ASTATE-06", "ORD-CANCEL-12"] "Reports finished actions FAILED when their order is cancelled.";
     ListReversed "list-reversed" ["BLOCK-01"] "Performs the actions of a node from the last to the first.";
@@ -502,24 +349,17 @@ with_blind_faults! { faults!
     StuckAfterBlocking "stuck-after-blocking" ["BLOCK-07", "ORD-06", "NODE-07"] "Does not drive on after a blocking action.";
 
     // Errors and modes
-    ErrorsOmitted "errors-omitted" ["STATE-MSG-01", "ERR-01", "JSON-10"] "Leaves the errors array out when there is no error.";
-    ErrorLevelUnknown "error-level-unknown" ["ERR-02", "ORD-CANCEL-19"] "Reports warnings with the level ERROR.";
     WarningBlocks "warning-blocks" ["ERR-03", "ORD-06", "ORD-FLOW-12"] "Does not drive while it reports a warning.";
     EmergencyStopWarning "emergency-stop-warning" ["ERR-04"] "Reports the emergency stop as a WARNING.";
-    ReferenceValueNumeric "reference-value-numeric" ["ERR-05", "ORD-REJ-14"] "Gives numbers as reference values of errors.";
-    ErrorsOmittedOnRequest "errors-omitted-on-request" ["ORD-REJ-03", "ORD-REJ-08", "ERR-01"] "Answers a stateRequest without its errors.";
     OwnErrorForgotten "own-error-forgotten" ["ERR-04", "ERR-01"] "Forgets an error of its own a moment later, although its cause is still there.";
     OwnErrorClearedByOrder "own-error-cleared-by-order" ["ERR-01"] "Forgets an error of its own with the next order, although its cause is still there.";
     OwnErrorKept "own-error-kept" ["ERR-01", "ERR-04"] "Keeps its errors for a minute, also when their cause is gone.";
     FatalDrives "fatal-drives" ["ERR-04"] "Drives on with a FATAL error.";
     OwnErrorMild "own-error-mild" ["ERR-04"] "Reports defects that keep it from running as a WARNING.";
     ReferencesOfLastOrder "references-of-last-order" ["ORD-REJ-14", "BP-02"] "Names the order and update it has, and not those it refuses.";
-    ReferencesAsMap "references-as-map" ["BP-04", "ERR-05", "ORD-CANCEL-20"] "Gives the references of errors as one object.";
-    InfoLevelWarning "info-level-warning" ["INFO-01", "JSON-02"] "Reports an information with the level WARNING.";
     SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
     SemiautomaticEndsOrder "semiautomatic-ends-order" ["MODE-02"] "Gives its order up when it is switched from AUTOMATIC to SEMIAUTOMATIC.";
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";
-    ModeOffByOne "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list.";
     ManualDrivesOrders "manual-drives-orders" ["MODE-02"] "Takes orders over in MANUAL, and drives them there.";
     ManualDrivesOn "manual-drives-on" ["MODE-05", "MODE-02"] "Keeps driving its order after it was switched to MANUAL, SERVICE or TEACHIN.";
     ManualKeepsOrder "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards.";
@@ -529,12 +369,6 @@ with_blind_faults! { faults!
     ManualLocks "manual-locks" ["MODE-02"] "Refuses the first order after it was driven by hand.";
     ManualPositionStale "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL.";
     SemiautomaticFaster "semiautomatic-faster" ["MODE-03"] "Drives faster in SEMIAUTOMATIC.";
-    VisualizationSlow "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate.";
-    VisualizationBeside "visualization-beside" ["VIS-01"] "Shows itself two metres beside where its states say it is.";
-    VisualizationMillimetres "visualization-millimetres" ["MAP-02", "VIS-01"] "Gives its position in the visualization in millimetres.";
-    VisualizationMillimetresUnderWay "visualization-millimetres-under-way" ["MAP-02"] "Gives its position in the visualization in millimetres while it drives.";
-    VisualizationWithoutPosition "visualization-without-position" ["VIS-01"] "Leaves the position out of the visualization.";
-    VisualizationMissing "visualization-missing" ["VIS-02", "TOPIC-12"] "States a visualization interval and publishes none.";
 }
 
 /// The fault of that name.
@@ -545,11 +379,11 @@ pub fn find(name: &str) -> Option<&'static Fault> {
 
 /// A set of faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Faults([u128; 8]);
+pub(crate) struct Faults([u128; 8]);
 
 impl Faults {
     /// The set of the named faults; `Err` with the first unknown name.
-    pub(super) fn named(names: &[&str]) -> Result<Self, String> {
+    pub(crate) fn named(names: &[&str]) -> Result<Self, String> {
         let mut set = Self::default();
         for name in names {
             let position = FAULTS.iter().chain(BLIND_FAULTS).position(|fault| fault.name == *name);
@@ -560,7 +394,7 @@ impl Faults {
     }
 
     /// Whether the fault is on.
-    pub(super) fn has(self, fault: FaultName) -> bool {
+    pub(crate) fn has(self, fault: FaultName) -> bool {
         let index = fault as usize;
         self.0[index / 128] & (1 << (index % 128)) != 0
     }
@@ -585,9 +419,9 @@ mod tests {
 
     #[test]
     fn a_set_holds_exactly_the_faults_it_was_named() {
-        let set = Faults::named(&["no-will", "visualization-slow"]).unwrap_or_default();
-        assert!(set.has(FaultName::NoWill) && set.has(FaultName::VisualizationSlow));
-        assert!(!set.has(FaultName::WillOffline));
+        let set = Faults::named(&["echoes-order", "pause-stuck-after-cut"]).unwrap_or_default();
+        assert!(set.has(FaultName::EchoesOrder) && set.has(FaultName::PauseStuckAfterCut));
+        assert!(!set.has(FaultName::OnlineLate));
         assert_eq!(Faults::named(&["no-such"]), Err("no-such".to_owned()));
     }
 }

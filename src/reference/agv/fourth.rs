@@ -18,46 +18,46 @@ use crate::clock::Moment;
 use crate::nurbs::Path;
 
 /// How long a vehicle brakes that needs long for it.
-pub(super) const BRAKING: Duration = Duration::from_secs(2);
+pub(crate) const BRAKING: Duration = Duration::from_secs(2);
 
 /// How long the only receive buffer is occupied by an order.
 const OCCUPIED: Duration = Duration::from_millis(100);
 
 /// So many states are kept while there is no link.
-pub(super) const BUFFER: usize = 50;
+pub(crate) const BUFFER: usize = 50;
 
 /// What is remembered.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Fourth {
+pub(crate) struct Fourth {
     /// sequenceId of the decision point of the first message of the order.
     first_base: u32,
     /// Behind these sequenceIds everything comes from updates, and from the last update.
-    pub(super) joints: Option<(u32, u32)>,
+    pub(crate) joints: Option<(u32, u32)>,
     /// When the last order message came.
-    pub(super) order_at: Option<Moment>,
+    pub(crate) order_at: Option<Moment>,
     /// actionIds whose result was told.
-    pub(super) results_told: Vec<String>,
+    pub(crate) results_told: Vec<String>,
     /// When it shows that it does not charge any more.
-    pub(super) uncharged_at: Option<Moment>,
+    pub(crate) uncharged_at: Option<Moment>,
     /// mapId and mapVersion of a map that is enabled when the order has ended.
     enables: Option<(String, String)>,
     /// States that could not be sent, and the timestamp of each.
-    pub(super) buffered: Vec<(String, Map<String, Value>)>,
+    pub(crate) buffered: Vec<(String, Map<String, Value>)>,
     /// What was still to be traversed when the link broke.
-    pub(super) before_cut: VecDeque<Stop>,
+    pub(crate) before_cut: VecDeque<Stop>,
     /// Nodes that were traversed without a link and are listed all the same.
-    pub(super) relisted: Vec<Stop>,
+    pub(crate) relisted: Vec<Stop>,
     /// sequenceIds of edges whose actions run on.
     edges_left: Vec<u32>,
     /// It brakes for a pause.
-    pub(super) braking: bool,
+    pub(crate) braking: bool,
     /// actionIds of further cancelOrder actions that end with the first.
     cancels: Vec<String>,
 }
 
 impl Fourth {
     /// A new order was taken over.
-    pub(super) fn new_order(&mut self, base_end: u32) {
+    pub(crate) fn new_order(&mut self, base_end: u32) {
         self.first_base = base_end;
         self.joints = None;
         self.results_told.clear();
@@ -69,14 +69,14 @@ impl Fourth {
 }
 
 /// Whether the edges of the base are one less than its nodes, and a horizon follows.
-pub(super) fn base_counts(order: &Order) -> bool {
+pub(crate) fn base_counts(order: &Order) -> bool {
     let nodes = order.nodes.iter().filter(|node| node.released).count();
     let edges = order.edges.iter().filter(|edge| edge.released).count();
     nodes < order.nodes.len() && edges + 1 == nodes
 }
 
 /// The way from control point to control point of a trajectory.
-pub(super) fn control_polygon(trajectory: &Value) -> Path {
+pub(crate) fn control_polygon(trajectory: &Value) -> Path {
     let points = trajectory.get("controlPoints").and_then(Value::as_array);
     let number = |point: &Value, key: &str| point.get(key).and_then(Value::as_f64);
     Path::through(
@@ -89,7 +89,7 @@ pub(super) fn control_polygon(trajectory: &Value) -> Path {
 
 impl Agv {
     /// What a faulty vehicle cannot read although it is right.
-    pub(super) fn unreadable_for_faulty(&self, message: &Value) -> Option<Defect> {
+    pub(crate) fn unreadable_for_faulty(&self, message: &Value) -> Option<Defect> {
         let whole = self.faults.has(F::R4WholeNumberCoordinatesRefused);
         let foreign = self.faults.has(F::R4NonAsciiDescriptionRefused);
         if !whole && !foreign {
@@ -134,19 +134,19 @@ impl Agv {
     }
 
     /// Whether the order came just before, and is still in the only receive buffer.
-    pub(super) fn receive_buffer_is_full(&self) -> bool {
+    pub(crate) fn receive_buffer_is_full(&self) -> bool {
         let occupied = |at: Moment| self.moment().since(at) < OCCUPIED;
         self.faults.has(F::R4DropsMessageRightAfterAnother) && self.fourth.order_at.is_some_and(occupied)
     }
 
     /// Whether it has been updated once and is still on its way to the decision point it had first.
-    pub(super) fn waits_for_first_base(&self) -> bool {
+    pub(crate) fn waits_for_first_base(&self) -> bool {
         let mut nodes = self.book.nodes.iter();
         self.book.updated && nodes.any(|stop| stop.node.sequence_id == self.fourth.first_base)
     }
 
     /// An update is taken over: remembers where it joins.
-    pub(super) fn note_joint(&mut self) {
+    pub(crate) fn note_joint(&mut self) {
         let joint = self.book.base_end.1;
         let first = self.fourth.joints.map_or(joint, |(first, _)| first);
         self.fourth.joints = Some((first, joint));
@@ -154,7 +154,7 @@ impl Agv {
     }
 
     /// Forgets the base behind the next node.
-    pub(super) fn shorten_base(&mut self) {
+    pub(crate) fn shorten_base(&mut self) {
         let Some(next) = self.book.nodes.front().filter(|stop| stop.node.released) else {
             return;
         };
@@ -170,7 +170,7 @@ impl Agv {
     }
 
     /// Whether theta is out of reach for somebody who forgets that angles repeat themselves.
-    pub(super) fn turned_by_plain_difference(&self, node: &Node, theta: f64) -> bool {
+    pub(crate) fn turned_by_plain_difference(&self, node: &Node, theta: f64) -> bool {
         let Some(position) = &node.position else { return false };
         let Some(wanted) = position.theta else { return false };
         let allowed = position.allowed_deviation_theta.unwrap_or(0.0);
@@ -180,13 +180,13 @@ impl Agv {
     }
 
     /// Whether a new order begins where the last one ended, and the old number is kept for it.
-    pub(super) fn keeps_sequence(&self, stop: &Stop) -> bool {
+    pub(crate) fn keeps_sequence(&self, stop: &Stop) -> bool {
         let stays = stop.node.sequence_id == 0 && self.book.previous.0 == stop.node.id;
         stays && self.faults.has(F::R4LastSequenceOfOldOrderKept)
     }
 
     /// Whether the actions of an edge that is left go on because the vehicle does.
-    pub(super) fn lets_edge_actions_run_on(&mut self, sequence_id: u32) -> bool {
+    pub(crate) fn lets_edge_actions_run_on(&mut self, sequence_id: u32) -> bool {
         let passes = self.book.nodes.front().is_some_and(|next| next.node.released);
         let runs_on = passes && self.faults.has(F::R4EdgeActionEndsWithTheOrderOnly);
         if runs_on {
@@ -196,7 +196,7 @@ impl Agv {
     }
 
     /// At the end of the base also the actions of edges left before end.
-    pub(super) fn end_edge_actions_where_it_stops(&mut self) {
+    pub(crate) fn end_edge_actions_where_it_stops(&mut self) {
         if self.book.nodes.front().is_some_and(|next| next.node.released) {
             return;
         }
@@ -206,7 +206,7 @@ impl Agv {
     }
 
     /// The results in a state that is sent will not be told again. They are not missed in the next state either.
-    pub(super) fn note_results(&mut self, kept: &mut Map<String, Value>) {
+    pub(crate) fn note_results(&mut self, kept: &mut Map<String, Value>) {
         let told = self.actions.iter().filter(|action| action.result.is_some());
         let told: Vec<String> = told.map(|action| action.request.id.clone()).collect();
         self.fourth.results_told = told;
@@ -217,7 +217,7 @@ impl Agv {
     }
 
     /// Whether a map is only enabled when the order has ended.
-    pub(super) fn enables_later(&mut self, map_id: &str, version: &str) -> bool {
+    pub(crate) fn enables_later(&mut self, map_id: &str, version: &str) -> bool {
         let later = self.faults.has(F::R4MapEnabledDuringDriveChangesNothingUntilIdle);
         if later {
             self.fourth.enables = Some((map_id.to_owned(), version.to_owned()));
@@ -226,20 +226,20 @@ impl Agv {
     }
 
     /// Whether it does not pause because it has no order.
-    pub(super) fn has_nothing_to_pause(&self) -> bool {
+    pub(crate) fn has_nothing_to_pause(&self) -> bool {
         let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
         idle && self.faults.has(F::R4PauseFailsWithoutOrder)
     }
 
     /// An action ends during a pause: it drives on as if it had stood for the action only.
-    pub(super) fn forget_pause_after(&mut self, id: &str) {
+    pub(crate) fn forget_pause_after(&mut self, id: &str) {
         let of_node = |action: &Action| matches!(action.origin, Origin::Node(_));
         let ended = self.holds.pause && self.actions.get(id).is_some_and(of_node);
         self.book.heedless |= ended && self.faults.has(F::R4PauseForgottenAfterNodeAction);
     }
 
     /// Whether it shows for some seconds that it charges although it does not any more.
-    pub(super) fn shows_charging_longer(&mut self) -> bool {
+    pub(crate) fn shows_charging_longer(&mut self) -> bool {
         let longer = self.charging && self.faults.has(F::R4StopChargingFlagLate);
         if longer {
             self.fourth.uncharged_at = Some(self.moment() + Duration::from_secs(3));
@@ -248,26 +248,16 @@ impl Agv {
     }
 
     /// The link is back: sends what could not be sent.
-    pub(super) fn replay_buffer(&mut self) {
+    pub(crate) fn replay_buffer(&mut self) {
         for (timestamp, mut body) in std::mem::take(&mut self.fourth.buffered) {
             // What the body says goes before the header.
             body.insert("timestamp".into(), Value::from(timestamp));
-            self.publish("state", body, &[]);
-        }
-    }
-
-    /// A timestamp without the zeros at the end of its fraction.
-    pub(super) fn without_zeros(&self, timestamp: String) -> String {
-        match timestamp.strip_suffix('Z') {
-            Some(digits) if digits.contains('.') && self.faults.has(F::R4TimestampTrailingZerosTrimmed) => {
-                format!("{}Z", digits.trim_end_matches('0').trim_end_matches('.'))
-            }
-            _ => timestamp,
+            self.publish("state", body);
         }
     }
 
     /// Enables a map that was asked for during the order.
-    pub(super) fn enable_what_waited(&mut self) {
+    pub(crate) fn enable_what_waited(&mut self) {
         if self.is_busy() {
             return;
         }
@@ -278,7 +268,7 @@ impl Agv {
     }
 
     /// The link is back: what was traversed without it is listed again.
-    pub(super) fn relist_nodes(&mut self, first: bool) {
+    pub(crate) fn relist_nodes(&mut self, first: bool) {
         if first || !self.faults.has(F::R4ReconnectRelistsTraversedNodes) {
             return;
         }
@@ -291,13 +281,13 @@ impl Agv {
     }
 
     /// Whether the action is a pause that begins with braking.
-    pub(super) fn brakes_long(&self, action: &Action) -> bool {
+    pub(crate) fn brakes_long(&self, action: &Action) -> bool {
         let pause = action.kind.is_some_and(|kind| kind.deed == Deed::StartPause);
         pause && self.takes(T::R4BrakesLongOnPause)
     }
 
     /// Begins to brake; the rest of the leg is planned anew.
-    pub(super) fn brake_if_slow(&mut self, id: &str) {
+    pub(crate) fn brake_if_slow(&mut self, id: &str) {
         let brakes = self.actions.get(id).is_some_and(|action| self.brakes_long(action));
         if brakes && self.motion.is_moving() {
             let moment = self.moment();
@@ -307,7 +297,7 @@ impl Agv {
     }
 
     /// It has braked, or need not any more.
-    pub(super) fn end_braking(&mut self) {
+    pub(crate) fn end_braking(&mut self) {
         if std::mem::take(&mut self.fourth.braking) {
             let moment = self.moment();
             self.motion.halt(moment);
@@ -315,7 +305,7 @@ impl Agv {
     }
 
     /// A further cancelOrder while one is under way.
-    pub(super) fn cancels_together(&mut self, action_id: &str) {
+    pub(crate) fn cancels_together(&mut self, action_id: &str) {
         if let Some(action) = self.actions.get_mut(action_id) {
             action.status = Status::Running;
             self.fourth.cancels.push(action_id.to_owned());
@@ -323,7 +313,7 @@ impl Agv {
     }
 
     /// The cancellation has ended for all who asked for it.
-    pub(super) fn end_further_cancels(&mut self) {
+    pub(crate) fn end_further_cancels(&mut self) {
         for id in std::mem::take(&mut self.fourth.cancels) {
             if let Some(action) = self.actions.get_mut(&id) {
                 action.end(Status::Finished);

@@ -13,14 +13,14 @@ use super::read::{Defect, Fields};
 use super::tolerances::ToleranceName as T;
 
 /// At most this many actions of one message are taken.
-pub(super) const MAX_INSTANT_ACTIONS: usize = 50;
+pub(crate) const MAX_INSTANT_ACTIONS: usize = 50;
 
 /// At most this many instant actions are remembered between two orders; the oldest that have ended give way.
 const MAX_REMEMBERED: usize = 500;
 
 impl Agv {
     /// Takes an instantActions message.
-    pub(super) fn instant_actions_received(&mut self, payload: &[u8]) {
+    pub(crate) fn instant_actions_received(&mut self, payload: &[u8]) {
         if self.deaf {
             return;
         }
@@ -262,7 +262,7 @@ impl Agv {
     }
 
     /// `instant-action-deferred`: begins what had to wait for the end of the order.
-    pub(super) fn begin_deferred(&mut self) -> bool {
+    pub(crate) fn begin_deferred(&mut self) -> bool {
         let after_pause = self.faults.has(F::R1InstantActionsWaitForPause) && !self.holds.pause;
         let after_order = self.faults.has(F::InstantActionDeferred) && !self.is_busy();
         let after_action = self.faults.has(F::R2InstantWaitsForRunningAction) && !self.is_acting();

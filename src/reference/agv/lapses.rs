@@ -6,25 +6,6 @@
 /// Name of a fault, and why it is no more than a lapse.
 pub const LAPSES: &[(&str, &str)] = &[
     (
-        "state-qos-1",
-        "A higher QoS delivers the state as well; the ruling of MQTT-06 and MQTT-07 is a warning.",
-    ),
-    (
-        "factsheet-qos-2",
-        "A higher QoS delivers the factsheet as well; the ruling of MQTT-06 and MQTT-07 is a warning.",
-    ),
-    (
-        "other-serial-number",
-        "Which of topic and header is wrong cannot be told; TOPIC-04, that they agree, is a recommendation.",
-    ),
-    ("other-major-version", "It breaks a recommendation only."),
-    (
-        "duplicate-key",
-        "JSON leaves open what a repeated key means; the check of JSON-10 remarks on it.",
-    ),
-    ("keep-alive-off", "It breaks a recommendation only."),
-    ("keep-alive-long", "It breaks a recommendation only."),
-    (
         "edge-ends-assumed",
         "No sentence obliges a vehicle to check startNodeId and endNodeId; a remark.",
     ),
@@ -41,32 +22,12 @@ pub const LAPSES: &[(&str, &str)] = &[
         "Whether a vehicle ignores a field that its factsheet does not list, or honours it, cannot be seen; the ruling of \
          OPT-02 is a warning.",
     ),
-    (
-        "speed-min-above-max",
-        "A contradiction within the factsheet is remarked on; no sentence forbids it.",
-    ),
-    (
-        "factsheet-action-missing",
-        "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
-    ),
-    (
-        "state-request-unlisted",
-        "An action that is accepted but not listed is reported, not failed: the vehicle does more than it claims.",
-    ),
-    (
-        "min-state-interval-ignored",
-        "FACT-14 contradicts the sending on events; its ruling leaves a warning.",
-    ),
     ("horizon-actions-stay", "It breaks a recommendation only."),
     ("cancel-lets-run", "It breaks a recommendation only."),
     ("cancel-fails-early", "It breaks a recommendation only."),
     (
         "header-unchecked",
         "No sentence says what becomes of an order whose header is broken; that it is malformed is a matter of reading.",
-    ),
-    (
-        "positioning-as-instant-action",
-        "The ruling of ACT-09 leaves a warning.",
     ),
     ("unknown-instant-silent", "It breaks a recommendation only."),
     ("unknown-instant-unreferenced", "It breaks a recommendation only."),
@@ -108,30 +69,12 @@ pub const LAPSES: &[(&str, &str)] = &[
         "To leave the result out is a warning by the ruling of STATE-MSG-12.",
     ),
     ("failure-silent", "It breaks a recommendation only."),
-    (
-        "state-interval-exceeded",
-        "The interval of the factsheet is no limit of the text; below 30 s a warning is all.",
-    ),
     ("state-bursts", "It breaks a recommendation only."),
-    ("new-base-request-always", "It breaks a recommendation only."),
-    ("new-base-request-stays", "It breaks a recommendation only."),
-    ("distance-negative", "It breaks a recommendation only."),
-    ("distance-not-reset", "It breaks a recommendation only."),
     ("own-error-cleared-by-order", "It breaks a recommendation only."),
     (
         "traversal-split",
         "Two states of one moment are remarked on; tests that look at single states are not reached.",
     ),
-    (
-        "visualization-without-position",
-        "The schema requires nothing; by the ruling of VIS-01 what is merely absent is a warning.",
-    ),
-    (
-        "header-id-reset-by-reconnect",
-        "The text leaves open where the count begins; the ruling of HDR-02 makes a new count after a mere reconnect a warning.",
-    ),
-    ("visualization-slow", "It breaks a recommendation only."),
-    ("visualization-missing", "It breaks a recommendation only."),
 ];
 
 /// Why this fault is a lapse; `None` for one that fails.

@@ -59,7 +59,7 @@ fn any(faults: Faults) -> bool {
 }
 
 /// The message as the vehicle takes it.
-pub(super) fn taken(message: &Value, faults: Faults) -> Cow<'_, Value> {
+pub(crate) fn taken(message: &Value, faults: Faults) -> Cow<'_, Value> {
     if !any(faults) || !message.is_object() {
         return Cow::Borrowed(message);
     }

@@ -7,17 +7,17 @@ use super::config::OnboardMap;
 use super::faults::{FaultName as F, Faults};
 
 /// Why something with a map did not work.
-pub(super) type Refusal = &'static str;
+pub(crate) type Refusal = &'static str;
 
 /// All maps on board.
 #[derive(Clone, Debug)]
-pub(super) struct Maps {
+pub(crate) struct Maps {
     all: Vec<OnboardMap>,
     capacity: usize,
 }
 
 impl Maps {
-    pub(super) fn new(all: Vec<OnboardMap>, capacity: usize) -> Self {
+    pub(crate) fn new(all: Vec<OnboardMap>, capacity: usize) -> Self {
         Self { all, capacity }
     }
 
@@ -28,17 +28,17 @@ impl Maps {
     }
 
     /// Whether any version is on board.
-    pub(super) fn on_board(&self, map_id: &str) -> bool {
+    pub(crate) fn on_board(&self, map_id: &str) -> bool {
         self.all.iter().any(|map| map.map_id == map_id)
     }
 
     /// Whether a version is enabled.
-    pub(super) fn enabled(&self, map_id: &str) -> bool {
+    pub(crate) fn enabled(&self, map_id: &str) -> bool {
         self.all.iter().any(|map| map.map_id == map_id && map.enabled)
     }
 
     /// Whether a map can be stored (MAP-23, MAP-30).
-    pub(super) fn room_for(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
+    pub(crate) fn room_for(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
         if self.position(map_id, version).is_some() && !faults.has(F::DuplicateMapAccepted) {
             return Err("the map is on board already");
         }
@@ -58,7 +58,7 @@ impl Maps {
     }
 
     /// Stores a map that was downloaded: disabled (MAP-20).
-    pub(super) fn store(&mut self, map_id: &str, version: &str, faults: Faults) {
+    pub(crate) fn store(&mut self, map_id: &str, version: &str, faults: Faults) {
         if faults.has(F::DownloadDisablesOthers) {
             self.all.iter_mut().for_each(|map| map.enabled = false);
         }
@@ -81,19 +81,19 @@ impl Maps {
     }
 
     /// `r6-reconnect-loses-downloaded-maps`: forgets what was not there from the beginning.
-    pub(super) fn keep_only(&mut self, factory: &[OnboardMap]) {
+    pub(crate) fn keep_only(&mut self, factory: &[OnboardMap]) {
         let same =
             |map: &OnboardMap, other: &OnboardMap| map.map_id == other.map_id && map.map_version == other.map_version;
         self.all.retain(|map| factory.iter().any(|other| same(map, other)));
     }
 
     /// `download-renumbers`, `failed-download-renumbers`: all versions change.
-    pub(super) fn renumber(&mut self) {
+    pub(crate) fn renumber(&mut self) {
         self.all.iter_mut().for_each(|map| map.map_version.push_str(".1"));
     }
 
     /// Enables a version, and disables the others of that mapId (MAP-24).
-    pub(super) fn enable(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
+    pub(crate) fn enable(&mut self, map_id: &str, version: &str, faults: Faults) -> Result<(), Refusal> {
         let latest = self.all.iter().rev().find(|map| map.map_id == map_id);
         let latest = latest.filter(|_| faults.has(F::R4EnableUnknownVersionTakesLatest));
         let latest = latest.map(|map| map.map_version.clone());
@@ -137,37 +137,37 @@ impl Maps {
     }
 
     /// `r1-init-position-enables-all`: enables all versions of a mapId.
-    pub(super) fn enable_all(&mut self, map_id: &str) {
+    pub(crate) fn enable_all(&mut self, map_id: &str) {
         for map in self.all.iter_mut().filter(|map| map.map_id == map_id) {
             map.enabled = true;
         }
     }
 
     /// `r1-enable-in-two-states`: disables all versions of a mapId.
-    pub(super) fn disable_all(&mut self, map_id: &str) {
+    pub(crate) fn disable_all(&mut self, map_id: &str) {
         for map in self.all.iter_mut().filter(|map| map.map_id == map_id) {
             map.enabled = false;
         }
     }
 
     /// Whether exactly this version is on board.
-    pub(super) fn has_version(&self, map_id: &str, version: &str) -> bool {
+    pub(crate) fn has_version(&self, map_id: &str, version: &str) -> bool {
         self.position(map_id, version).is_some()
     }
 
     /// Whether exactly this version is on board and enabled.
-    pub(super) fn is_enabled(&self, map_id: &str, version: &str) -> bool {
+    pub(crate) fn is_enabled(&self, map_id: &str, version: &str) -> bool {
         self.position(map_id, version)
             .is_some_and(|index| self.all[index].enabled)
     }
 
     /// `r1-failed-download-purges`: removes what is not enabled of a mapId.
-    pub(super) fn purge(&mut self, map_id: &str) {
+    pub(crate) fn purge(&mut self, map_id: &str) {
         self.all.retain(|map| map.map_id != map_id || map.enabled);
     }
 
     /// Enables some version of a mapId if none is (for a new pose on it).
-    pub(super) fn enable_any(&mut self, map_id: &str) {
+    pub(crate) fn enable_any(&mut self, map_id: &str) {
         if !self.enabled(map_id)
             && let Some(map) = self.all.iter_mut().rev().find(|map| map.map_id == map_id)
         {
@@ -176,7 +176,7 @@ impl Maps {
     }
 
     /// Removes a map; `used` says which mapIds are needed now (MAP-29, MAP-32, MAP-33).
-    pub(super) fn delete(
+    pub(crate) fn delete(
         &mut self,
         map_id: &str,
         version: &str,
@@ -214,31 +214,18 @@ impl Maps {
     }
 
     /// The array of the state.
-    pub(super) fn picture(&self, faults: Faults) -> Value {
-        if faults.has(F::MapsReportedEmpty) {
-            return json!([]);
-        }
-        let mut pictures: Vec<Value> = self
-            .all
-            .iter()
-            .map(|map| {
-                let status = match map.enabled {
-                    true if faults.has(F::MapStatusMisspelled) => "ACTIVE",
-                    true => "ENABLED",
-                    false => "DISABLED",
-                };
-                json!({ "mapId": map.map_id, "mapVersion": map.map_version, "mapStatus": status })
-            })
-            .collect();
-        if faults.has(F::MapListedTwice) {
-            pictures.extend(pictures.first().cloned());
-        }
-        Value::Array(pictures)
+    pub(crate) fn picture(&self) -> Value {
+        let all = self.all.iter();
+        all.map(|map| {
+            let status = if map.enabled { "ENABLED" } else { "DISABLED" };
+            json!({ "mapId": map.map_id, "mapVersion": map.map_version, "mapStatus": status })
+        })
+        .collect()
     }
 }
 
 /// Whether the file has the announced SHA-256, in hexadecimal; no announcement fits every file (MAP-34).
-pub(super) fn hash_fits(file: &[u8], announced: &str) -> bool {
+pub(crate) fn hash_fits(file: &[u8], announced: &str) -> bool {
     let digest = Sha256::digest(file);
     let mut pairs = announced.as_bytes().chunks(2);
     let byte = |pair: &[u8]| {

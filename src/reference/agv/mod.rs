@@ -11,37 +11,39 @@
 mod blind_faults;
 mod ability;
 mod acceptance;
-mod action_kinds;
-mod actions;
-mod book;
-mod cancel;
+pub(crate) mod action_kinds;
+pub(crate) mod actions;
+pub(crate) mod book;
+pub(crate) mod cancel;
 mod commands;
-mod config;
-mod connection;
+pub(crate) mod config;
+pub(crate) mod connection;
 mod deeds;
-mod downloads;
-mod errors;
+pub(crate) mod downloads;
+pub(crate) mod errors;
 mod factsheet;
 pub mod faults;
-mod fourth;
-mod instant;
+pub(crate) mod fourth;
+pub(crate) mod instant;
 pub mod lapses;
 mod leniency;
-mod maps;
-mod motion;
-mod order_message;
-mod path;
+pub(crate) mod maps;
+pub(crate) mod motion;
+pub(crate) mod order_message;
+pub(crate) mod path;
 mod personas;
-mod progress;
-mod read;
-mod rejection;
-mod report;
-mod sixth;
+pub(crate) mod points;
+pub(crate) mod progress;
+pub(crate) mod read;
+pub(crate) mod rejection;
+pub(crate) mod report;
+pub(crate) mod seam;
+pub(crate) mod sixth;
 mod stations;
 #[cfg(test)]
 mod tests;
 pub mod tolerances;
-mod updates;
+pub(crate) mod updates;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -66,6 +68,7 @@ use maps::Maps;
 use motion::{Motion, Pose};
 use personas::Persona;
 use report::Report;
+use seam::Seam;
 use sixth::Sixth;
 use tolerances::ToleranceName as T;
 
@@ -76,7 +79,7 @@ pub struct UnknownFault(pub String);
 
 /// operatingMode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mode {
+pub(crate) enum Mode {
     Automatic,
     Semiautomatic,
     Manual,
@@ -86,149 +89,151 @@ enum Mode {
 
 impl Mode {
     /// Whether master control commands the vehicle (MODE-02).
-    fn takes_orders(self) -> bool {
+    pub(crate) fn takes_orders(self) -> bool {
         matches!(self, Self::Automatic | Self::Semiautomatic)
     }
 }
 
 /// What keeps the vehicle from moving.
 #[derive(Clone, Copy, Debug, Default)]
-struct Holds {
+pub(crate) struct Holds {
     /// startPause.
-    pause: bool,
+    pub(crate) pause: bool,
     /// The pause button on the vehicle.
-    button: bool,
+    pub(crate) button: bool,
     /// The emergency stop.
-    emergency: bool,
+    pub(crate) emergency: bool,
     /// Something stands in the protective field.
-    field: bool,
+    pub(crate) field: bool,
     /// It is outside its corridor.
-    outside: bool,
+    pub(crate) outside: bool,
     /// A defect that keeps it from running.
-    defect: bool,
+    pub(crate) defect: bool,
     /// Nothing at all (`pause-not-lifted` only).
-    stuck: bool,
+    pub(crate) stuck: bool,
 }
 
 impl Holds {
-    fn any(self) -> bool {
+    pub(crate) fn any(self) -> bool {
         self.pause || self.button || self.emergency || self.field || self.outside || self.defect || self.stuck
     }
 }
 
 /// A load on the vehicle.
 #[derive(Clone, Debug, PartialEq)]
-struct Load {
-    id: String,
-    kind: String,
-    position: String,
+pub(crate) struct Load {
+    pub(crate) id: String,
+    pub(crate) kind: String,
+    pub(crate) position: String,
 }
 
 /// What only vehicles with faults or liberties of round three remember.
 #[derive(Clone, Debug, Default)]
-struct Third {
+pub(crate) struct Third {
     /// mapId and mapVersion of downloads that failed (`r3-failed-download-blocks-retry` only).
-    failed_downloads: Vec<(String, String)>,
+    pub(crate) failed_downloads: Vec<(String, String)>,
     /// mapId and mapVersion of maps that were deleted (`r3-deleted-map-back-after-reconnect` only).
-    deleted_maps: Vec<(String, String)>,
+    pub(crate) deleted_maps: Vec<(String, String)>,
     /// It was given a pose since the last order (`r3-order-after-init-position-refused` only).
-    posed: bool,
+    pub(crate) posed: bool,
     /// It still rolls although it is paused (`r3-pause-finished-before-standing` only).
-    braking: Option<Moment>,
+    pub(crate) braking: Option<Moment>,
     /// When it shows that it charges (`r3-charging-reported-late` only).
-    charging_at: Option<Moment>,
+    pub(crate) charging_at: Option<Moment>,
     /// Actions that were tried once more (`r3-failed-pick-retried` only).
-    retried: Vec<String>,
+    pub(crate) retried: Vec<String>,
     /// Nodes and edges of the last order message that was taken over.
-    content: Option<serde_json::Value>,
+    pub(crate) content: Option<serde_json::Value>,
     /// An order that came twice, and is mentioned.
-    repeated: Option<String>,
+    pub(crate) repeated: Option<String>,
     /// nodeIds of this order that were visited (`r3-loop-second-visit-without-actions` only).
-    visited: BTreeSet<String>,
+    pub(crate) visited: BTreeSet<String>,
     /// Whether it was busy before.
-    busy: bool,
+    pub(crate) busy: bool,
 }
 
 /// The reference AGV.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Agv {
-    third: Third,
-    fourth: Fourth,
-    sixth: Sixth,
-    config: AgvConfig,
-    faults: Faults,
+    /// Who else is asked.
+    pub(crate) seam: Seam,
+    pub(crate) third: Third,
+    pub(crate) fourth: Fourth,
+    pub(crate) sixth: Sixth,
+    pub(crate) config: AgvConfig,
+    pub(crate) faults: Faults,
     /// The time of what is happening.
-    now: Stamp,
-    book: Book,
-    motion: Motion,
-    actions: Actions,
-    maps: Maps,
-    downloads: Downloads,
-    errors: Errors,
-    holds: Holds,
-    mode: Mode,
-    loads: Vec<Load>,
+    pub(crate) now: Stamp,
+    pub(crate) book: Book,
+    pub(crate) motion: Motion,
+    pub(crate) actions: Actions,
+    pub(crate) maps: Maps,
+    pub(crate) downloads: Downloads,
+    pub(crate) errors: Errors,
+    pub(crate) holds: Holds,
+    pub(crate) mode: Mode,
+    pub(crate) loads: Vec<Load>,
     /// Edges on which something stands.
-    obstacles: BTreeSet<String>,
+    pub(crate) obstacles: BTreeSet<String>,
     /// It refuses the next order (`order-error-locks`, `manual-locks` only).
-    locked: bool,
+    pub(crate) locked: bool,
     /// When the last order came (`orders-spaced` only).
-    ordered: Option<Moment>,
+    pub(crate) ordered: Option<Moment>,
     /// `malformed-instant-deafens`: no instant action is heard any more.
-    deaf: bool,
+    pub(crate) deaf: bool,
     /// It has left its corridor and was not put back yet.
-    strayed: bool,
+    pub(crate) strayed: bool,
     /// Where loads are handed over, and whether one stands there.
-    stations: std::collections::BTreeMap<String, bool>,
+    pub(crate) stations: std::collections::BTreeMap<String, bool>,
     /// A load it does not carry any more, and until when it is shown (`drop-reported-late` only).
-    shadow: Option<(Moment, Load)>,
-    charging: bool,
+    pub(crate) shadow: Option<(Moment, Load)>,
+    pub(crate) charging: bool,
     /// It takes no orders until then (`charging-ends-early` only).
-    undocking: Option<Moment>,
+    pub(crate) undocking: Option<Moment>,
     /// A switch keeps it from pausing and from going on.
-    pause_blocked: bool,
+    pub(crate) pause_blocked: bool,
     /// How often it was paused (`pauses-counted` only).
-    pauses: u32,
+    pub(crate) pauses: u32,
     /// Nothing ends the pause any more (`pause-stuck-…` only).
-    pause_outlives: bool,
+    pub(crate) pause_outlives: bool,
     /// Something keeps it from ending its charging.
-    charger_locked: bool,
+    pub(crate) charger_locked: bool,
     /// The order it gave up in a mode for people (`order-taken-up-again` only).
-    remembered: Option<Book>,
+    pub(crate) remembered: Option<Book>,
     /// It has not found its pose (`init-position-uninitialized` only).
-    lost: bool,
+    pub(crate) lost: bool,
     /// The map it says it is on (`init-position-taken-anyway` only).
-    claimed_map: Option<String>,
-    connection: Connection,
-    report: Report,
+    pub(crate) claimed_map: Option<String>,
+    pub(crate) connection: Connection,
+    pub(crate) report: Report,
     /// What has come and was not looked at yet, and when it will be: messages, and what people do.
-    inbox: VecDeque<(Moment, Input)>,
+    pub(crate) inbox: VecDeque<(Moment, Input)>,
     /// It stands still on a node until then (`stops-on-nodes`, `first-node-listed` only).
-    lingers_until: Option<Moment>,
+    pub(crate) lingers_until: Option<Moment>,
     /// When what was held goes on (`resumes-in-a-moment` only).
-    resumes_at: Option<Moment>,
+    pub(crate) resumes_at: Option<Moment>,
     /// Counts states.
-    states_sent: u64,
+    pub(crate) states_sent: u64,
     /// Counts logs.
-    logs: u32,
+    pub(crate) logs: u32,
     /// A load that was picked is not shown before (`r1-pick-reported-late` only).
-    hidden_load: Option<Moment>,
+    pub(crate) hidden_load: Option<Moment>,
     /// The e-stop is shown until the next order (`r1-e-stop-latched` only).
-    latched: bool,
+    pub(crate) latched: bool,
     /// The field is shown violated until the next order (`r2-field-violation-latched` only).
-    field_latched: bool,
+    pub(crate) field_latched: bool,
     /// actionId and name of the last log (`r2-log-name-in-information` only).
-    last_log: Option<(String, String)>,
+    pub(crate) last_log: Option<(String, String)>,
     /// An order that was refused and waits all the same (`r2-refused-order-queued` only).
-    queued: Option<serde_json::Value>,
+    pub(crate) queued: Option<serde_json::Value>,
     /// The last order was lost (`order-after-refusal-lost` only).
-    order_lost: bool,
+    pub(crate) order_lost: bool,
     /// The pause is not shown before this (`r2-paused-flag-late` only).
-    pause_hidden_until: Option<Moment>,
+    pub(crate) pause_hidden_until: Option<Moment>,
     /// What was decided and is still to be handed to the driver.
-    pending: Vec<Output>,
+    pub(crate) pending: Vec<Output>,
     /// How a test told it to behave.
-    persona: Persona,
+    pub(crate) persona: Persona,
 }
 
 impl Agv {
@@ -259,6 +264,7 @@ impl Agv {
         };
         let maps = Maps::new(config.maps.clone(), config.map_capacity);
         Ok(Self {
+            seam: Seam::default(),
             third: Third::default(),
             fourth: Fourth::default(),
             sixth: Sixth::default(),
@@ -313,12 +319,12 @@ impl Agv {
     }
 
     /// The present moment.
-    fn moment(&self) -> Moment {
+    pub(crate) fn moment(&self) -> Moment {
         self.now.moment
     }
 
     /// Reports a warning that has no rule for its end.
-    fn warn(&mut self, error_type: String, references: Vec<(String, String)>, description: String) {
+    pub(crate) fn warn(&mut self, error_type: String, references: Vec<(String, String)>, description: String) {
         let life = match () {
             () if self.faults.has(FaultName::R6ActionErrorsNeverClear) => Life::Always,
             () if self.takes(T::R3ActionErrorsUntilNewOrder) => Life::UntilNewOrder,

@@ -10,22 +10,22 @@ use crate::nurbs::Path;
 
 /// A position and orientation on a map.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pose {
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) theta: f64,
-    pub(super) map_id: String,
+pub(crate) struct Pose {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) theta: f64,
+    pub(crate) map_id: String,
 }
 
 impl Pose {
     /// Distance to a point in metres.
-    pub(super) fn distance(&self, x: f64, y: f64) -> f64 {
+    pub(crate) fn distance(&self, x: f64, y: f64) -> f64 {
         (self.x - x).hypot(self.y - y)
     }
 }
 
 /// An angle brought into -π … π.
-pub(super) fn wrapped(angle: f64) -> f64 {
+pub(crate) fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(2.0 * PI);
     if turned > PI { turned - 2.0 * PI } else { turned }
 }
@@ -49,7 +49,7 @@ enum Leg {
 
 /// Where a vehicle looks while it follows a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Facing {
+pub(crate) enum Facing {
     /// So much beside the direction of the path, in radians.
     Along(f64),
     /// Always there, in radians.
@@ -58,7 +58,7 @@ pub(super) enum Facing {
 
 impl Facing {
     /// The orientation where the path has this direction.
-    pub(super) fn at(self, heading: f64) -> f64 {
+    pub(crate) fn at(self, heading: f64) -> f64 {
         wrapped(match self {
             Self::Along(turned) => heading + turned,
             Self::Fixed(theta) => theta,
@@ -75,18 +75,18 @@ struct Underway {
 
 /// Velocity in vehicle coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Velocity {
-    pub(super) vx: f64,
-    pub(super) omega: f64,
+pub(crate) struct Velocity {
+    pub(crate) vx: f64,
+    pub(crate) omega: f64,
 }
 
 /// The moving vehicle.
 #[derive(Clone, Debug)]
-pub(super) struct Motion {
+pub(crate) struct Motion {
     pose: Pose,
     underway: Option<Underway>,
     /// The node it is heading for is reached, though perhaps not yet traversed.
-    pub(super) reached: bool,
+    pub(crate) reached: bool,
 }
 
 /// Time for a way at a speed: never endless, and in whole microseconds, as moments are.
@@ -98,7 +98,7 @@ fn lasting(way: f64, speed: f64) -> Duration {
 
 impl Motion {
     /// A vehicle that stands.
-    pub(super) fn at(pose: Pose) -> Self {
+    pub(crate) fn at(pose: Pose) -> Self {
         Self {
             pose,
             underway: None,
@@ -107,23 +107,23 @@ impl Motion {
     }
 
     /// Whether it drives or turns.
-    pub(super) fn is_moving(&self) -> bool {
+    pub(crate) fn is_moving(&self) -> bool {
         self.underway.is_some()
     }
 
     /// Whether it turns on the spot.
-    pub(super) fn is_turning(&self) -> bool {
+    pub(crate) fn is_turning(&self) -> bool {
         let leg = self.underway.as_ref().map(|underway| &underway.leg);
         matches!(leg, Some(Leg::Turn { .. }))
     }
 
     /// When the present leg ends.
-    pub(super) fn end(&self) -> Option<Moment> {
+    pub(crate) fn end(&self) -> Option<Moment> {
         self.underway.as_ref().map(|underway| underway.begun + underway.lasts)
     }
 
     /// The pose at a time.
-    pub(super) fn pose(&self, now: Moment) -> Pose {
+    pub(crate) fn pose(&self, now: Moment) -> Pose {
         let mut pose = self.pose.clone();
         let Some(underway) = &self.underway else { return pose };
         let total = underway.lasts.as_secs_f64();
@@ -149,7 +149,7 @@ impl Motion {
     }
 
     /// The velocity now.
-    pub(super) fn velocity(&self) -> Velocity {
+    pub(crate) fn velocity(&self) -> Velocity {
         let Some(underway) = &self.underway else {
             return Velocity::default();
         };
@@ -178,23 +178,23 @@ impl Motion {
     }
 
     /// Puts the vehicle somewhere.
-    pub(super) fn place(&mut self, pose: Pose) {
+    pub(crate) fn place(&mut self, pose: Pose) {
         *self = Self::at(pose);
     }
 
     /// It is on another map now.
-    pub(super) fn set_map(&mut self, map_id: String) {
+    pub(crate) fn set_map(&mut self, map_id: String) {
         self.pose.map_id = map_id;
     }
 
     /// Stops at once, where it is.
-    pub(super) fn halt(&mut self, now: Moment) {
+    pub(crate) fn halt(&mut self, now: Moment) {
         self.pose = self.pose(now);
         self.underway = None;
     }
 
     /// Begins to turn to an orientation, the short way.
-    pub(super) fn turn(&mut self, now: Moment, theta: f64, speed: f64) {
+    pub(crate) fn turn(&mut self, now: Moment, theta: f64, speed: f64) {
         let by = wrapped(theta - self.pose.theta);
         self.underway = Some(Underway {
             leg: Leg::Turn { by },
@@ -204,7 +204,7 @@ impl Motion {
     }
 
     /// Begins to turn to an orientation, the long way.
-    pub(super) fn turn_round(&mut self, now: Moment, theta: f64, speed: f64) {
+    pub(crate) fn turn_round(&mut self, now: Moment, theta: f64, speed: f64) {
         let short = wrapped(theta - self.pose.theta);
         let by = short - 2.0 * PI * short.signum();
         self.underway = Some(Underway {
@@ -215,7 +215,7 @@ impl Motion {
     }
 
     /// Begins to drive straight to a point.
-    pub(super) fn roll(&mut self, now: Moment, to: (f64, f64), speed: f64, backwards: bool, to_node: bool) {
+    pub(crate) fn roll(&mut self, now: Moment, to: (f64, f64), speed: f64, backwards: bool, to_node: bool) {
         let lasts = lasting(self.pose.distance(to.0, to.1), speed);
         self.underway = Some(Underway {
             leg: Leg::Roll { to, backwards, to_node },
@@ -225,7 +225,7 @@ impl Motion {
     }
 
     /// Begins to follow a path.
-    pub(super) fn follow(&mut self, now: Moment, path: Path, speed: f64, facing: Facing, to_node: bool) {
+    pub(crate) fn follow(&mut self, now: Moment, path: Path, speed: f64, facing: Facing, to_node: bool) {
         let lasts = lasting(path.length(), speed);
         self.underway = Some(Underway {
             leg: Leg::Follow { path, facing, to_node },
@@ -235,7 +235,7 @@ impl Motion {
     }
 
     /// Ends the present leg if its time has come; whether the vehicle rolled on it.
-    pub(super) fn finish(&mut self, now: Moment) -> Option<bool> {
+    pub(crate) fn finish(&mut self, now: Moment) -> Option<bool> {
         self.end().filter(|end| *end <= now)?;
         let (rolled, to_node) = match self.underway {
             Some(Underway {

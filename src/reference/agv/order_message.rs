@@ -13,7 +13,7 @@ const FARTHEST: f64 = 1e8;
 
 /// What may go on beside an action (section 6.12).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Blocking {
+pub(crate) enum Blocking {
     /// Driving and other actions.
     None,
     /// Other actions, no driving.
@@ -24,17 +24,17 @@ pub(super) enum Blocking {
 
 /// An action that was asked for.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct ActionRequest {
-    pub(super) path: String,
-    pub(super) action_type: String,
-    pub(super) id: String,
-    pub(super) blocking: Blocking,
-    pub(super) parameters: Vec<(String, Value)>,
+pub(crate) struct ActionRequest {
+    pub(crate) path: String,
+    pub(crate) action_type: String,
+    pub(crate) id: String,
+    pub(crate) blocking: Blocking,
+    pub(crate) parameters: Vec<(String, Value)>,
 }
 
 impl ActionRequest {
     /// The value of a parameter.
-    pub(super) fn parameter(&self, key: &str) -> Option<&Value> {
+    pub(crate) fn parameter(&self, key: &str) -> Option<&Value> {
         self.parameters
             .iter()
             .find(|(name, _)| name == key)
@@ -42,7 +42,7 @@ impl ActionRequest {
     }
 
     /// Reads an action of an order, where every required field must be right.
-    pub(super) fn read(fields: &Fields<'_>) -> Result<Self, Defect> {
+    pub(crate) fn read(fields: &Fields<'_>) -> Result<Self, Defect> {
         let blocking = match fields.literal("blockingType", &["NONE", "SOFT", "HARD"])? {
             0 => Blocking::None,
             1 => Blocking::Soft,
@@ -60,7 +60,7 @@ impl ActionRequest {
 }
 
 /// Reads the optional list of key and value objects.
-pub(super) fn read_parameters(fields: &Fields<'_>) -> Result<Vec<(String, Value)>, Defect> {
+pub(crate) fn read_parameters(fields: &Fields<'_>) -> Result<Vec<(String, Value)>, Defect> {
     if !fields.has("actionParameters") {
         return Ok(Vec::new());
     }
@@ -82,13 +82,13 @@ pub(super) fn read_parameters(fields: &Fields<'_>) -> Result<Vec<(String, Value)
 
 /// nodePosition.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Position {
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) theta: Option<f64>,
-    pub(super) allowed_deviation: Option<f64>,
-    pub(super) allowed_deviation_theta: Option<f64>,
-    pub(super) map_id: String,
+pub(crate) struct Position {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) theta: Option<f64>,
+    pub(crate) allowed_deviation: Option<f64>,
+    pub(crate) allowed_deviation_theta: Option<f64>,
+    pub(crate) map_id: String,
 }
 
 impl Position {
@@ -110,26 +110,26 @@ impl Position {
 
 /// A node of an order.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Node {
-    pub(super) path: String,
-    pub(super) id: String,
-    pub(super) sequence_id: u32,
-    pub(super) released: bool,
-    pub(super) position: Option<Position>,
+pub(crate) struct Node {
+    pub(crate) path: String,
+    pub(crate) id: String,
+    pub(crate) sequence_id: u32,
+    pub(crate) released: bool,
+    pub(crate) position: Option<Position>,
     /// nodePosition as it was sent, to be repeated in the state.
-    pub(super) sent_position: Option<Value>,
-    pub(super) actions: Vec<ActionRequest>,
+    pub(crate) sent_position: Option<Value>,
+    pub(crate) actions: Vec<ActionRequest>,
 }
 
 /// edge.corridor: how far the vehicle may leave its trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Corridor {
+pub(crate) struct Corridor {
     /// Metres to the left.
-    pub(super) left: f64,
+    pub(crate) left: f64,
     /// Metres to the right.
-    pub(super) right: f64,
+    pub(crate) right: f64,
     /// The whole contour has to stay inside, not the kinematic centre alone.
-    pub(super) contour: bool,
+    pub(crate) contour: bool,
 }
 
 impl Corridor {
@@ -148,9 +148,9 @@ impl Corridor {
 
 /// edge.trajectory: what was sent, and the path it means.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Trajectory {
-    pub(super) sent: Value,
-    pub(super) path: Path,
+pub(crate) struct Trajectory {
+    pub(crate) sent: Value,
+    pub(crate) path: Path,
 }
 
 impl Trajectory {
@@ -172,39 +172,39 @@ impl Trajectory {
 
 /// An edge of an order.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Edge {
-    pub(super) path: String,
-    pub(super) id: String,
-    pub(super) sequence_id: u32,
-    pub(super) released: bool,
-    pub(super) start: String,
-    pub(super) end: String,
-    pub(super) max_speed: Option<f64>,
-    pub(super) max_height: Option<f64>,
-    pub(super) max_rotation_speed: Option<f64>,
-    pub(super) orientation: Option<f64>,
+pub(crate) struct Edge {
+    pub(crate) path: String,
+    pub(crate) id: String,
+    pub(crate) sequence_id: u32,
+    pub(crate) released: bool,
+    pub(crate) start: String,
+    pub(crate) end: String,
+    pub(crate) max_speed: Option<f64>,
+    pub(crate) max_height: Option<f64>,
+    pub(crate) max_rotation_speed: Option<f64>,
+    pub(crate) orientation: Option<f64>,
     /// orientationType GLOBAL.
-    pub(super) global: bool,
-    pub(super) rotation_allowed: Option<bool>,
-    pub(super) trajectory: Option<Trajectory>,
-    pub(super) corridor: Option<Corridor>,
-    pub(super) direction: Option<String>,
-    pub(super) actions: Vec<ActionRequest>,
+    pub(crate) global: bool,
+    pub(crate) rotation_allowed: Option<bool>,
+    pub(crate) trajectory: Option<Trajectory>,
+    pub(crate) corridor: Option<Corridor>,
+    pub(crate) direction: Option<String>,
+    pub(crate) actions: Vec<ActionRequest>,
 }
 
 /// An order message of right format.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Order {
-    pub(super) id: String,
-    pub(super) update_id: u32,
-    pub(super) nodes: Vec<Node>,
-    pub(super) edges: Vec<Edge>,
+pub(crate) struct Order {
+    pub(crate) id: String,
+    pub(crate) update_id: u32,
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) edges: Vec<Edge>,
     /// zoneSetId.
-    pub(super) zone_set: Option<String>,
+    pub(crate) zone_set: Option<String>,
     /// Paths of optional fields that not every vehicle has a use for (OPT-02).
-    pub(super) unsupported: Vec<String>,
+    pub(crate) unsupported: Vec<String>,
     /// What is wrong with these fields, for a vehicle that has a use for them.
-    pub(super) defects: Vec<Defect>,
+    pub(crate) defects: Vec<Defect>,
 }
 
 /// Optional fields of an edge that not every vehicle can use.
@@ -212,7 +212,7 @@ const SPECIAL_EDGE_FIELDS: [&str; 4] = ["trajectory", "corridor", "direction", "
 
 impl Order {
     /// Reads an order; `Err` if its format or a type is wrong (ORD-REJ-01).
-    pub(super) fn read(message: &Value) -> Result<Self, Defect> {
+    pub(crate) fn read(message: &Value) -> Result<Self, Defect> {
         let fields = Fields::open(message, "")?;
         read_header(&fields)?;
         let mut unsupported = Vec::new();
@@ -240,7 +240,7 @@ impl Order {
     }
 
     /// The rules between the elements: counts, numbering, neighbours and releases (ORD-11).
-    pub(super) fn graph_defect(&self) -> Option<Defect> {
+    pub(crate) fn graph_defect(&self) -> Option<Defect> {
         let defect = |path: String, reason| Some(Defect { path, reason });
         let Some(first) = self.nodes.first() else {
             return defect("nodes".into(), "is empty");
@@ -276,7 +276,7 @@ impl Order {
     }
 
     /// All actions of nodes and edges.
-    pub(super) fn actions(&self) -> impl Iterator<Item = &ActionRequest> {
+    pub(crate) fn actions(&self) -> impl Iterator<Item = &ActionRequest> {
         let nodes = self.nodes.iter().flat_map(|node| &node.actions);
         nodes.chain(self.edges.iter().flat_map(|edge| &edge.actions))
     }

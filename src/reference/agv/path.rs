@@ -12,10 +12,10 @@ use super::rejection::{Refusal, Rule};
 use crate::nurbs::Path;
 
 /// Half the width of the vehicle, in metres.
-pub(super) const HALF_WIDTH: f64 = 0.4;
+pub(crate) const HALF_WIDTH: f64 = 0.4;
 
 /// Half the length of the vehicle, in metres.
-pub(super) const HALF_LENGTH: f64 = 0.6;
+pub(crate) const HALF_LENGTH: f64 = 0.6;
 
 /// Nearer to its path than this, the vehicle is on it, in metres.
 const ON_PATH: f64 = 0.02;
@@ -40,7 +40,7 @@ const POINTS: u32 = 48;
 
 impl Agv {
     /// The path over the rest of an edge with a trajectory, from where the vehicle is; `None` on a straight edge.
-    pub(super) fn curve_ahead(&self, edge: &Edge, stop: &Stop) -> Option<Path> {
+    pub(crate) fn curve_ahead(&self, edge: &Edge, stop: &Stop) -> Option<Path> {
         let trajectory = edge
             .trajectory
             .as_ref()
@@ -96,12 +96,12 @@ impl Agv {
     }
 
     /// Whether something stands on the edge that the vehicle may not drive round.
-    pub(super) fn is_blocked(&self, edge: &Edge) -> bool {
+    pub(crate) fn is_blocked(&self, edge: &Edge) -> bool {
         self.obstacles.contains(&edge.id) && (edge.trajectory.is_none() || self.detour(edge).is_none())
     }
 
     /// Stops and reports when it is outside its corridor (CORR-06, CORR-07); whether it has found that just now.
-    pub(super) fn watch_corridor(&mut self) -> bool {
+    pub(crate) fn watch_corridor(&mut self) -> bool {
         if self.holds.outside || self.strayed || !self.book.entered {
             return false;
         }
@@ -143,7 +143,7 @@ impl Agv {
     }
 
     /// Somebody pushed it to the left of the way it has before it.
-    pub(super) fn push_out(&mut self, by: Option<f64>) {
+    pub(crate) fn push_out(&mut self, by: Option<f64>) {
         let by = by.unwrap_or(PUSHED);
         let moment = self.moment();
         let mut pose = self.motion.pose(moment);
@@ -156,14 +156,14 @@ impl Agv {
     }
 
     /// It was put where it belongs.
-    pub(super) fn is_back(&mut self) {
+    pub(crate) fn is_back(&mut self) {
         self.strayed = false;
         self.errors.back_inside();
         self.set_holds(|holds| holds.outside = false);
     }
 
     /// What is wrong with the trajectory or the direction of an edge for this vehicle.
-    pub(super) fn check_way(&self, edge: &Edge, ends: Option<(&Node, &Node)>) -> Result<(), Refusal> {
+    pub(crate) fn check_way(&self, edge: &Edge, ends: Option<(&Node, &Node)>) -> Result<(), Refusal> {
         let unable = |field: &str, reason: &str| {
             let path = format!("{}.{field}", edge.path);
             Err(Refusal::at_field(Rule::Unable, reason, &path).naming("edgeId", &edge.id))
@@ -211,7 +211,7 @@ impl Agv {
     }
 
     /// Where the vehicle gets to over an edge: a line-guided one to where the branch leads.
-    pub(super) fn arrives_at(&self, edge: Option<&Edge>, node: &Node) -> Option<Place> {
+    pub(crate) fn arrives_at(&self, edge: Option<&Edge>, node: &Node) -> Option<Place> {
         let branch = edge.and_then(|edge| self.branch(&edge.start, edge.direction.as_deref()?));
         match branch.and_then(|end| self.config.node(end)) {
             Some(end) => Some(Place {
@@ -224,7 +224,7 @@ impl Agv {
     }
 
     /// The node whose mark a line-guided vehicle stands on.
-    pub(super) fn mark_below(&self) -> Option<String> {
+    pub(crate) fn mark_below(&self) -> Option<String> {
         let pose = self.motion.pose(self.moment());
         let mut nodes = self.config.nodes.iter().filter(|_| self.config.line_guided());
         let on = nodes.find(|node| pose.distance(node.x, node.y) <= self.config.tolerance);
@@ -232,7 +232,7 @@ impl Agv {
     }
 
     /// The path a self-planning vehicle reports for an edge (STATE-14).
-    pub(super) fn planned_path(&self, edge: &Edge) -> Option<Value> {
+    pub(crate) fn planned_path(&self, edge: &Edge) -> Option<Value> {
         if self.faults.has(F::TrajectoryWithoutPoints) {
             return Some(json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0] }));
         }

@@ -33,14 +33,14 @@ const SHORT: f64 = 0.08;
 
 impl Agv {
     /// Stands on the first node of a new order for a moment (`first-node-listed` only).
-    pub(super) fn linger_on_first_node(&mut self) {
+    pub(crate) fn linger_on_first_node(&mut self) {
         if self.takes(T::FirstNodeListed) && self.motion.reached {
             self.lingers_until = Some(self.moment() + LINGERING);
         }
     }
 
     /// Draws all consequences that need no time.
-    pub(super) fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         for _ in 0..10_000 {
             let progress = self.watch_corridor()
                 | self.begin_deferred()
@@ -364,7 +364,7 @@ impl Agv {
     }
 
     /// A leg has ended: on an edge with actions that stop the vehicle, they begin now.
-    pub(super) fn leg_finished(&mut self, rolled: bool) {
+    pub(crate) fn leg_finished(&mut self, rolled: bool) {
         if !rolled || self.motion.reached || !self.book.entered {
             return;
         }
@@ -559,7 +559,7 @@ impl Agv {
     }
 
     /// Whether the warning lights are on: as long as it is on the edge (ACT-03).
-    pub(super) fn is_flashing(&self) -> bool {
+    pub(crate) fn is_flashing(&self) -> bool {
         self.actions
             .iter()
             .filter(|action| action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights))
@@ -569,7 +569,7 @@ impl Agv {
     }
 
     /// Whether the vehicle is lifting.
-    pub(super) fn is_lifting(&self) -> bool {
+    pub(crate) fn is_lifting(&self) -> bool {
         let lifts = |deed| matches!(deed, Deed::Pick | Deed::Drop);
         self.actions
             .iter()

@@ -3,27 +3,27 @@
 use serde_json::{Map, Value};
 
 /// Longest id or keyword the vehicle takes, in characters.
-pub(super) const MAX_STRING: usize = 256;
+pub(crate) const MAX_STRING: usize = 256;
 
 /// What is wrong with a message, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Defect {
+pub(crate) struct Defect {
     /// Path of the field, such as `nodes[1].released`.
-    pub(super) path: String,
+    pub(crate) path: String,
     /// What is wrong with it.
-    pub(super) reason: &'static str,
+    pub(crate) reason: &'static str,
 }
 
 /// The fields of one JSON object.
 #[derive(Clone)]
-pub(super) struct Fields<'a> {
+pub(crate) struct Fields<'a> {
     object: &'a Map<String, Value>,
     path: String,
 }
 
 impl<'a> Fields<'a> {
     /// Opens the object at `path`; the root has an empty path.
-    pub(super) fn open(value: &'a Value, path: &str) -> Result<Self, Defect> {
+    pub(crate) fn open(value: &'a Value, path: &str) -> Result<Self, Defect> {
         let Value::Object(object) = value else {
             return Err(Defect {
                 path: path.to_owned(),
@@ -37,7 +37,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The path of a member.
-    pub(super) fn at(&self, key: &str) -> String {
+    pub(crate) fn at(&self, key: &str) -> String {
         if self.path.is_empty() {
             key.to_owned()
         } else {
@@ -53,12 +53,12 @@ impl<'a> Fields<'a> {
     }
 
     /// Whether the member is there at all.
-    pub(super) fn has(&self, key: &str) -> bool {
+    pub(crate) fn has(&self, key: &str) -> bool {
         self.object.contains_key(key)
     }
 
     /// The member as it is.
-    pub(super) fn raw(&self, key: &str) -> Option<&'a Value> {
+    pub(crate) fn raw(&self, key: &str) -> Option<&'a Value> {
         self.object.get(key)
     }
 
@@ -67,7 +67,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A string, possibly empty.
-    pub(super) fn text(&self, key: &str) -> Result<&'a str, Defect> {
+    pub(crate) fn text(&self, key: &str) -> Result<&'a str, Defect> {
         let Value::String(text) = self.required(key)? else {
             return Err(self.wrong(key, "is not a string"));
         };
@@ -78,7 +78,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A string for people, of any length.
-    pub(super) fn prose(&self, key: &str) -> Result<(), Defect> {
+    pub(crate) fn prose(&self, key: &str) -> Result<(), Defect> {
         let text = self.required(key)?.is_string();
         if text {
             Ok(())
@@ -88,7 +88,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A string that identifies something.
-    pub(super) fn id(&self, key: &str) -> Result<String, Defect> {
+    pub(crate) fn id(&self, key: &str) -> Result<String, Defect> {
         match self.text(key)? {
             "" => Err(self.wrong(key, "is empty")),
             text => Ok(text.to_owned()),
@@ -96,7 +96,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A whole number of 32 bits. `5.0` counts as whole.
-    pub(super) fn uint32(&self, key: &str) -> Result<u32, Defect> {
+    pub(crate) fn uint32(&self, key: &str) -> Result<u32, Defect> {
         let value = self.required(key)?;
         if !value.is_number() {
             return Err(self.wrong(key, "is not a number"));
@@ -105,14 +105,14 @@ impl<'a> Fields<'a> {
     }
 
     /// A Boolean.
-    pub(super) fn boolean(&self, key: &str) -> Result<bool, Defect> {
+    pub(crate) fn boolean(&self, key: &str) -> Result<bool, Defect> {
         self.required(key)?
             .as_bool()
             .ok_or_else(|| self.wrong(key, "is not a Boolean"))
     }
 
     /// A number.
-    pub(super) fn number(&self, key: &str) -> Result<f64, Defect> {
+    pub(crate) fn number(&self, key: &str) -> Result<f64, Defect> {
         self.required(key)?
             .as_f64()
             .filter(|number| number.is_finite())
@@ -120,7 +120,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A number within bounds, both included.
-    pub(super) fn number_in(&self, key: &str, low: f64, high: f64) -> Result<f64, Defect> {
+    pub(crate) fn number_in(&self, key: &str, low: f64, high: f64) -> Result<f64, Defect> {
         let number = self.number(key)?;
         if number < low || number > high {
             return Err(self.wrong(key, "is out of range"));
@@ -129,7 +129,7 @@ impl<'a> Fields<'a> {
     }
 
     /// An optional member, read by `read` if it is there.
-    pub(super) fn optional<T>(
+    pub(crate) fn optional<T>(
         &self,
         key: &str,
         read: impl FnOnce(&Self, &str) -> Result<T, Defect>,
@@ -142,7 +142,7 @@ impl<'a> Fields<'a> {
     }
 
     /// One of the literals; its index.
-    pub(super) fn literal(&self, key: &str, literals: &[&str]) -> Result<usize, Defect> {
+    pub(crate) fn literal(&self, key: &str, literals: &[&str]) -> Result<usize, Defect> {
         let text = self.text(key)?;
         literals
             .iter()
@@ -151,7 +151,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The objects of an array.
-    pub(super) fn objects(&self, key: &str) -> Result<Vec<Fields<'a>>, Defect> {
+    pub(crate) fn objects(&self, key: &str) -> Result<Vec<Fields<'a>>, Defect> {
         let Value::Array(elements) = self.required(key)? else {
             return Err(self.wrong(key, "is not an array"));
         };

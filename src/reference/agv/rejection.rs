@@ -12,7 +12,7 @@ use super::tolerances::ToleranceName as T;
 
 /// Which rule refused an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Rule {
+pub(crate) enum Rule {
     Malformed,
     Unable,
     Memory,
@@ -27,7 +27,7 @@ pub(super) enum Rule {
 
 /// An order that is not taken over.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Refusal {
+pub(crate) struct Refusal {
     rule: Rule,
     reason: String,
     /// What in the message is wrong.
@@ -35,7 +35,7 @@ pub(super) struct Refusal {
 }
 
 impl Refusal {
-    pub(super) fn new(rule: Rule, reason: &str) -> Self {
+    pub(crate) fn new(rule: Rule, reason: &str) -> Self {
         Self {
             rule,
             reason: reason.to_owned(),
@@ -43,21 +43,21 @@ impl Refusal {
         }
     }
 
-    pub(super) fn is_malformed(&self) -> bool {
+    pub(crate) fn is_malformed(&self) -> bool {
         self.rule == Rule::Malformed
     }
 
     /// Whether the vehicle has no time for the order.
-    pub(super) fn is_of_busy(&self) -> bool {
+    pub(crate) fn is_of_busy(&self) -> bool {
         self.rule == Rule::OtherOrderActive
     }
 
-    pub(super) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
+    pub(crate) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
         self.culprits.push((key.to_owned(), value.into()));
         self
     }
 
-    pub(super) fn at_field(rule: Rule, reason: &str, path: &str) -> Self {
+    pub(crate) fn at_field(rule: Rule, reason: &str, path: &str) -> Self {
         Self::new(rule, reason).naming("field", path)
     }
 }
@@ -71,7 +71,7 @@ impl From<Defect> for Refusal {
 
 impl Agv {
     /// Reports a refusal; nothing else changes (ORD-FLOW-12).
-    pub(super) fn refuse(&mut self, message: &Value, refusal: Refusal) {
+    pub(crate) fn refuse(&mut self, message: &Value, refusal: Refusal) {
         self.refusal_side_effects(message, refusal.rule);
         self.locked |= refusal.rule == Rule::Unable && self.faults.has(F::OrderErrorLocks);
         let silent = match refusal.rule {
@@ -277,7 +277,7 @@ impl Agv {
 }
 
 /// References that identify the message, as far as it can be read (BP-02).
-pub(super) fn message_references(message: &Value) -> Vec<(String, String)> {
+pub(crate) fn message_references(message: &Value) -> Vec<(String, String)> {
     let mut references = vec![("topic".to_owned(), "order".to_owned())];
     for key in ["headerId", "orderId", "orderUpdateId"] {
         match message.get(key) {

@@ -8,37 +8,40 @@ mod route;
 
 use std::time::Duration;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
 use crate::clock::Moment;
 
 use super::Agv;
 use super::faults::FaultName as F;
+use super::points::{Event, Part, Span};
 use super::tolerances::ToleranceName as T;
 
 /// What has been reported.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Report {
+pub(crate) struct Report {
     /// An order message arrived (STATE-03).
-    pub(super) order_received: bool,
+    pub(crate) order_received: bool,
     /// It was an update, and it was taken over (`update-without-state` only).
-    pub(super) update_received: bool,
+    pub(crate) update_received: bool,
     /// A state was asked for (ACT-26).
-    pub(super) requested: bool,
+    pub(crate) requested: bool,
+    /// The state that is sent now is sent because it is time.
+    pub(crate) periodic: bool,
     /// No state before the next periodic one (`state-request-unanswered`).
-    pub(super) silenced: bool,
+    pub(crate) silenced: bool,
     /// The last state, without its header, and when it was sent.
-    last: Option<(Moment, Map<String, Value>)>,
+    pub(crate) last: Option<(Moment, Map<String, Value>)>,
     /// A state is due and only waits for the minimum interval.
-    delayed: bool,
-    next_visualization: Option<Moment>,
+    pub(crate) delayed: bool,
+    pub(crate) next_visualization: Option<Moment>,
     /// No state before this (`silent-after-reconnect` only).
-    silent_until: Option<Moment>,
+    pub(crate) silent_until: Option<Moment>,
 }
 
 impl Report {
     /// Whether the state that is sent now answers a request, and is not the first one.
-    pub(super) fn answers_request(&self) -> bool {
+    pub(crate) fn answers_request(&self) -> bool {
         self.requested && self.last.is_some()
     }
 }
@@ -111,14 +114,12 @@ impl Changes {
 
 impl Agv {
     /// Begins to report on a new connection.
-    pub(super) fn start_reporting(&mut self, first: bool) {
+    pub(crate) fn start_reporting(&mut self) {
         self.report.last = None;
         self.report.requested = true;
-        let silent = !first && self.faults.has(F::SilentAfterReconnect);
-        self.report.silent_until = silent.then(|| self.moment() + Duration::from_secs(35));
-        if !silent && self.takes(T::R2FirstStateLate) {
-            self.report.silent_until = Some(self.moment() + Duration::from_millis(1_200));
-        }
+        let late = self.takes(T::R2FirstStateLate);
+        self.report.silent_until = late.then(|| self.moment() + Duration::from_millis(1_200));
+        self.happens(Event::Reporting);
         self.report.next_visualization = self.visualization_interval().map(|_| self.moment());
     }
 
@@ -129,39 +130,13 @@ impl Agv {
     }
 
     fn state_interval(&self) -> Duration {
-        self.usual_interval()
+        self.lasts(Span::BetweenStates, self.stated_interval())
             .max(self.persona.state_interval.unwrap_or_default())
-    }
-
-    fn usual_interval(&self) -> Duration {
-        let idle = !self.is_busy() && self.faults.has(F::R1SilentWhenIdle);
-        if idle || self.faults.has(F::StateSilence) || self.is_silent_now() {
-            Duration::from_secs(45)
-        } else if self.faults.has(F::StateIntervalExceeded) {
-            self.stated_interval() * 2 + Duration::from_secs(2)
-        } else {
-            self.stated_interval()
-        }
-    }
-
-    /// Whether a faulty vehicle is too busy with what it does to send states.
-    fn is_silent_now(&self) -> bool {
-        let held = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
-        let acts = || {
-            self.actions
-                .iter()
-                .any(|action| action.of_order() && action.status.is_active())
-        };
-        (held && self.faults.has(F::SilentWhileHeld))
-            || (self.holds.pause && self.faults.has(F::SilentWhilePaused))
-            || (self.mode == super::Mode::Manual && self.faults.has(F::SilentByHand))
-            || (self.holds.emergency && self.faults.has(F::R2SilentInEmergency))
-            || (self.faults.has(F::SilentWhileActing) && acts())
     }
 
     /// The interval the factsheet promises. A faulty vehicle that keeps events to itself has a long one, so that
     /// its periodic states do not make up for them.
-    pub(super) fn stated_interval(&self) -> Duration {
+    pub(crate) fn stated_interval(&self) -> Duration {
         if KEPT_EVENTS.iter().any(|fault| self.faults.has(*fault)) {
             LONGEST
         } else {
@@ -170,12 +145,12 @@ impl Agv {
     }
 
     fn visualization_interval(&self) -> Option<Duration> {
-        let factor = if self.faults.has(F::VisualizationSlow) { 3 } else { 1 };
-        self.config.visualization_interval.map(|interval| interval * factor)
+        let stated = self.config.visualization_interval;
+        stated.map(|interval| self.lasts(Span::BetweenVisualizations, interval))
     }
 
     /// When the next message goes out by the clock.
-    pub(super) fn next_report(&self) -> Option<Moment> {
+    pub(crate) fn next_report(&self) -> Option<Moment> {
         if !self.connection.online {
             return None;
         }
@@ -207,12 +182,12 @@ impl Agv {
     }
 
     /// As short as an event can be that has to be in a state.
-    pub(super) fn brief(&self) -> Duration {
+    pub(crate) fn brief(&self) -> Duration {
         super::cancel::MOMENT.max(self.min_state_interval() * 2)
     }
 
     /// Publishes what is due.
-    pub(super) fn flush(&mut self) {
+    pub(crate) fn flush(&mut self) {
         if !self.connection.online {
             self.report.order_received = false;
             self.report.requested = false;
@@ -249,8 +224,7 @@ impl Agv {
         if self.report.silent_until.is_some_and(|until| until > moment) || self.silent_in_manual() {
             return;
         }
-        let mut body = self.state_picture();
-        self.distort_answer(&mut body);
+        let body = self.state_picture();
         let Some((sent, last)) = &self.report.last else {
             self.send_state(body, false);
             return;
@@ -269,25 +243,6 @@ impl Agv {
             } else {
                 self.send_state(body, false);
             }
-        }
-    }
-
-    /// What a faulty vehicle says only when it is asked.
-    fn distort_answer(&self, body: &mut Map<String, Value>) {
-        if !self.report.requested || self.report.last.is_none() {
-            return;
-        }
-        if self.faults.has(F::OrderIdForgottenOnRequest) {
-            body.insert("orderId".into(), json!(""));
-        }
-        if self.faults.has(F::ErrorsOmittedOnRequest) {
-            body.insert("errors".into(), json!([]));
-        }
-        if self.faults.has(F::LastNodeUnknownOnRequest) {
-            body.insert("lastNodeId".into(), json!(""));
-        }
-        if self.faults.has(F::RouteRepeatedOnRequest) && self.book.nodes.is_empty() {
-            body.insert("nodeStates".into(), self.last_node_state());
         }
     }
 
@@ -325,39 +280,12 @@ impl Agv {
         held || swallowed
     }
 
-    fn send_state(&mut self, mut body: Map<String, Value>, periodic: bool) {
+    fn send_state(&mut self, body: Map<String, Value>, periodic: bool) {
         let mut kept = body.clone();
         if self.faults.has(F::R4ResultDescriptionOnlyInFirstState) {
             self.note_results(&mut kept);
         }
-        let mut mangle: Vec<(&str, &[u8])> = Vec::new();
-        if periodic && self.faults.has(F::LatinOneText) {
-            let information = json!([{ "infoType": "place", "infoDescription": "Lagerpl@tz", "infoLevel": "INFO" }]);
-            body.insert("information".into(), information);
-            mangle.push(("Lagerpl@tz", b"Lagerpl\xe4tz"));
-        }
-        if periodic && self.faults.has(F::NanVelocity) {
-            body.insert("velocity".into(), json!({ "vx": 0.0, "vy": 0.0, "omega": "@" }));
-            mangle.push(("\"@\"", b"NaN"));
-        }
-        if periodic && self.faults.has(F::NanAsText) {
-            body.insert("velocity".into(), json!({ "vx": 0.0, "vy": 0.0, "omega": "NaN" }));
-        }
-        if self.charging && self.faults.has(F::R1ReachUnlimited) {
-            mangle.push(("\"reach\":8000", b"\"reach\":1e999"));
-        }
-        if periodic && self.faults.has(F::DuplicateKey) {
-            let other: &[u8] = if self.motion.is_moving() {
-                b"{\"driving\":false,"
-            } else {
-                b"{\"driving\":true,"
-            };
-            mangle.push(("{", other));
-        }
-        if periodic && self.faults.has(F::NulAfterJson) {
-            body.insert("end".into(), json!("@"));
-            mangle.push((",\"end\":\"@\"}", b"}\0"));
-        }
+        self.report.periodic = periodic;
         let times = match () {
             () if self.faults.has(F::StateBursts) => 5,
             () if self.takes(T::EveryStateTwice) => 2,
@@ -366,7 +294,7 @@ impl Agv {
         if !self.swallows_state() {
             let body = self.shown_state(body);
             for _ in 0..times {
-                self.publish("state", body.clone(), &mangle);
+                self.publish("state", body.clone());
             }
         }
         let next_visualization = self.report.next_visualization;
@@ -385,53 +313,13 @@ impl Agv {
     }
 
     fn publish_visualization(&mut self) {
-        let stands = !self.motion.is_moving() && self.faults.has(F::R1VisualizationOnlyMoving);
-        if stands || self.faults.has(F::VisualizationMissing) {
-            return;
-        }
         let mut body = Map::new();
         if !self.config.line_guided() {
-            let mut position = self.position_picture();
-            let mut change = |key: &str, change: fn(f64) -> f64| {
-                if let Some(value) = position.get(key).and_then(Value::as_f64) {
-                    position[key] = json!(change(value));
-                }
-            };
-            if self.faults.has(F::R4VisualizationThetaInDegrees) {
-                change("theta", f64::to_degrees);
-            }
-            if self.faults.has(F::R6VisualizationTheta0To2pi) {
-                change("theta", |theta| theta.rem_euclid(2.0 * std::f64::consts::PI));
-            }
-            if self.faults.has(F::VisualizationBeside) {
-                change("x", |x| x + 2.0);
-            }
-            let under_way = self.motion.is_moving() && self.faults.has(F::VisualizationMillimetresUnderWay);
-            if under_way || self.faults.has(F::VisualizationMillimetres) {
-                change("x", |x| x * 1000.0);
-                change("y", |y| y * 1000.0);
-            }
-            if !self.faults.has(F::VisualizationWithoutPosition) {
-                body.insert("agvPosition".into(), position);
-            }
+            body.insert("agvPosition".into(), self.position_picture());
         }
-        if self.faults.has(F::R1VisualizationWithoutMap)
-            && let Some(Value::Object(pose)) = body.get_mut("agvPosition")
-        {
-            pose.remove("mapId");
-        }
-        let velocity = self.velocity_picture();
-        if self.faults.has(F::R3VisualizationVelocityScalar) {
-            body.insert("velocity".into(), velocity["vx"].clone());
-        } else {
-            body.insert("velocity".into(), velocity);
-        }
-        if self.faults.has(F::R2VisualizationPoseAtRoot)
-            && let Some(Value::Object(pose)) = body.remove("agvPosition")
-        {
-            body.extend(pose);
-        }
+        body.insert("velocity".into(), self.velocity_picture());
+        self.says(Part::Visualization, &mut body);
         let body = self.shown_visualization(body);
-        self.publish("visualization", body, &[]);
+        self.publish("visualization", body);
     }
 }

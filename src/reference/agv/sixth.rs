@@ -17,10 +17,10 @@ use crate::clock::Moment;
 use crate::reference::Output;
 
 /// How long a vehicle plans that plans before it drives.
-pub(super) const PLANNING: Duration = Duration::from_millis(2_500);
+pub(crate) const PLANNING: Duration = Duration::from_millis(2_500);
 
 /// How long a download waits for its turn.
-pub(super) const QUEUING: Duration = Duration::from_secs(3);
+pub(crate) const QUEUING: Duration = Duration::from_secs(3);
 
 /// How long what was paused is WAITING before it begins anew.
 const ANEW: Duration = Duration::from_millis(300);
@@ -30,7 +30,7 @@ const EARLY: f64 = 0.9;
 
 /// What is remembered.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sixth {
+pub(crate) struct Sixth {
     /// sequenceIds of later visits that were taken for the first one.
     hidden: BTreeSet<u32>,
     /// Where actions were paused that begin anew, and when they do.
@@ -42,52 +42,45 @@ pub(super) struct Sixth {
 
 impl Sixth {
     /// A new order was taken over.
-    pub(super) fn new_order(&mut self) {
+    pub(crate) fn new_order(&mut self) {
         self.hidden.clear();
         self.again.clear();
         self.again_at = None;
     }
 
     /// Whether a node still to be traversed is not listed any more.
-    pub(super) fn is_hidden(&self, sequence_id: u32) -> bool {
+    pub(crate) fn is_hidden(&self, sequence_id: u32) -> bool {
         self.hidden.contains(&sequence_id)
     }
 
     /// Whether actions are to begin anew.
-    pub(super) fn waits_again(&self) -> bool {
+    pub(crate) fn waits_again(&self) -> bool {
         !self.again.is_empty()
     }
 
     /// When something of this is due.
-    pub(super) fn next_event(&self) -> Option<Moment> {
+    pub(crate) fn next_event(&self) -> Option<Moment> {
         let fetches = self.fetches.iter().map(|(due, ..)| *due);
         fetches.chain(self.again_at).min()
     }
 }
 
 impl Connection {
-    /// `r6-offline-repeats-header-id`: the next message has the headerId of the one before.
-    pub(super) fn repeat_header_id(&mut self) {
-        if let Some(next) = self.header_ids.get_mut("connection") {
-            *next = next.wrapping_sub(1);
-        }
-    }
-
     /// `r4-header-id-restarts-with-order`: counts its states from 0 again.
-    pub(super) fn restart_header_id(&mut self) {
+    pub(crate) fn restart_header_id(&mut self) {
         self.header_ids.insert("state", 0);
     }
 }
 
 impl Agv {
     /// `r6-failed-action-blocks-next-order`: whether an action of the completed order has failed.
-    pub(super) fn order_has_failed_action(&self) -> bool {
+    pub(crate) fn order_has_failed_action(&self) -> bool {
         let failed = |action: &Action| action.of_order() && action.status == Status::Failed;
         !self.book.cancelled && self.actions.iter().any(failed)
     }
 
     /// `r6-loop-clears-both-visits`: a node was reached, and with it all that have its nodeId.
-    pub(super) fn hide_later_visits(&mut self, reached: &Stop) {
+    pub(crate) fn hide_later_visits(&mut self, reached: &Stop) {
         if self.faults.has(F::R6LoopClearsBothVisits) {
             let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == reached.node.id);
             self.sixth.hidden.extend(again.map(|ahead| ahead.node.sequence_id));
@@ -95,7 +88,7 @@ impl Agv {
     }
 
     /// `r6-rejected-update-leaves-actions`: what an update brings is listed before it is looked at.
-    pub(super) fn list_actions_of_refused_update(&mut self, message: &Value) {
+    pub(crate) fn list_actions_of_refused_update(&mut self, message: &Value) {
         let Ok(order) = Order::read(message) else { return };
         if order.id != self.book.order_id {
             return;
@@ -113,7 +106,7 @@ impl Agv {
     }
 
     /// `r6-resumed-action-waits-again`: remembers where actions are paused that go on now.
-    pub(super) fn note_what_waits_again(&mut self) {
+    pub(crate) fn note_what_waits_again(&mut self) {
         if !self.faults.has(F::R6ResumedActionWaitsAgain) {
             return;
         }
@@ -126,7 +119,7 @@ impl Agv {
     }
 
     /// Begins anew what was paused, unless it is paused once more.
-    pub(super) fn begin_what_waits_again(&mut self) {
+    pub(crate) fn begin_what_waits_again(&mut self) {
         let moment = self.moment();
         if self.sixth.again_at.take_if(|at| *at <= moment).is_none() || self.holds.any() {
             return;
@@ -137,7 +130,7 @@ impl Agv {
     }
 
     /// `r6-edge-action-starts-before-leaving`: whether the actions of the next edge do not wait for a HARD action here.
-    pub(super) fn begins_edge_actions_on_node(&self) -> bool {
+    pub(crate) fn begins_edge_actions_on_node(&self) -> bool {
         let here = Origin::Node(self.book.last_sequence);
         let hard = |action: &Action| {
             let waits = action.origin == here && action.status == Status::Waiting;
@@ -148,14 +141,14 @@ impl Agv {
     }
 
     /// Actions of the order that have not begun.
-    pub(super) fn waiting_order_actions(&self) -> Vec<String> {
+    pub(crate) fn waiting_order_actions(&self) -> Vec<String> {
         let waiting = |action: &&Action| action.of_order() && action.status == Status::Waiting;
         let waiting = self.actions.iter().filter(waiting);
         waiting.map(|action| action.request.id.clone()).collect()
     }
 
     /// `r6-manual-leaves-actions-waiting`: they wait although their order is gone.
-    pub(super) fn leave_waiting(&mut self, ids: &[String]) {
+    pub(crate) fn leave_waiting(&mut self, ids: &[String]) {
         for action in self
             .actions
             .iter_mut()
@@ -169,7 +162,7 @@ impl Agv {
     ///
     /// Not where it has something to do or to look somewhere, nor where a corridor begins (NODE-02): then it has to be
     /// on the node itself.
-    pub(super) fn early_by(&self, stop: &Stop) -> Option<f64> {
+    pub(crate) fn early_by(&self, stop: &Stop) -> Option<f64> {
         let sequence_id = stop.node.sequence_id;
         let passes = sequence_id < self.book.base_end.1 && self.book.cancel.is_none();
         let mut ahead = self.book.edges.iter().filter(|edge| edge.sequence_id > sequence_id);
@@ -181,7 +174,7 @@ impl Agv {
     }
 
     /// Asks for a file, now or when it is its turn.
-    pub(super) fn fetch(&mut self, token: u64, url: String, queued: bool) {
+    pub(crate) fn fetch(&mut self, token: u64, url: String, queued: bool) {
         if queued {
             let due = self.moment() + QUEUING;
             self.sixth.fetches.push((due, token, url));
@@ -191,7 +184,7 @@ impl Agv {
     }
 
     /// Asks for the files whose turn has come.
-    pub(super) fn fetch_what_waited(&mut self) {
+    pub(crate) fn fetch_what_waited(&mut self) {
         let moment = self.moment();
         let (due, later) = std::mem::take(&mut self.sixth.fetches)
             .into_iter()

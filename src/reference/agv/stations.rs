@@ -20,7 +20,7 @@ impl Agv {
     }
 
     /// A load or a charger is an object (ACT-35).
-    pub(super) fn detect(&self, action: &Action) -> Outcome {
+    pub(crate) fn detect(&self, action: &Action) -> Outcome {
         let site = self.site(action);
         let there = self.stations.get(&site) == Some(&true) || self.config.chargers.contains(&site);
         let there = there && !self.faults.has(F::DetectionFails);
@@ -37,7 +37,7 @@ impl Agv {
     }
 
     /// A station or a charger is a target (ACT-36).
-    pub(super) fn align(&self, action: &Action) -> Result<(), Problem> {
+    pub(crate) fn align(&self, action: &Action) -> Result<(), Problem> {
         let site = self.site(action);
         let target = self.stations.contains_key(&site) || self.config.chargers.contains(&site);
         let target = target && !self.faults.has(F::PositioningFails);
@@ -72,7 +72,7 @@ impl Agv {
         }
     }
 
-    pub(super) fn pick(&mut self, action: &Action) -> Result<(), Problem> {
+    pub(crate) fn pick(&mut self, action: &Action) -> Result<(), Problem> {
         let site = self.site(action);
         let reason = match self.stations.get(&site) {
             _ if !self.loads.is_empty() => Some("the vehicle carries a load already"),
@@ -108,7 +108,7 @@ impl Agv {
         Ok(())
     }
 
-    pub(super) fn put_down(&mut self, action: &Action) -> Result<(), Problem> {
+    pub(crate) fn put_down(&mut self, action: &Action) -> Result<(), Problem> {
         let wanted = action.text("loadId");
         let found = self
             .loads
@@ -137,7 +137,7 @@ impl Agv {
     }
 
     /// What does not charge has nothing to end (ACT-11); what cannot be ended has failed (ACT-20).
-    pub(super) fn stop_charging(&mut self, action: &Action) -> Result<(), Problem> {
+    pub(crate) fn stop_charging(&mut self, action: &Action) -> Result<(), Problem> {
         if self.charging && self.charger_locked {
             if self.faults.has(F::ChargingEndFailureFinished) {
                 return Ok(());
@@ -166,7 +166,7 @@ impl Agv {
     }
 
     /// The charger is at a node: there is none where the vehicle drives (ACT-20).
-    pub(super) fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
+    pub(crate) fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
         self.fourth.uncharged_at = None;
         if self.motion.is_moving() || !self.config.chargers.contains(&self.book.last_node) {
             if self.faults.has(F::ChargingFailureFinished) {

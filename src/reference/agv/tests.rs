@@ -20,6 +20,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::clock::{Moment, Stamp};
+use crate::reference::deviations::agv as deviations;
 use crate::reference::{ConnectOptions, Device, Download, Input, Output, Publication};
 
 use super::{Agv, AgvConfig, ErrorNames, OnboardMap};
@@ -91,7 +92,7 @@ impl Bench {
             utc,
         };
         Self {
-            agv: Agv::new(config, faults).unwrap(),
+            agv: deviations::built(config, faults).unwrap(),
             now,
             outputs: Vec::new(),
             header_id: 0,

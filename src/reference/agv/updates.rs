@@ -9,7 +9,7 @@ use super::tolerances::ToleranceName as T;
 
 impl Agv {
     /// Rows 8 and 10: whether the update continues the order.
-    pub(super) fn check_update(&self, order: &mut Order) -> Result<(), Refusal> {
+    pub(crate) fn check_update(&self, order: &mut Order) -> Result<(), Refusal> {
         let busy = self.is_busy();
         let cancelled = self.book.cancel.is_some() || self.book.cancelled;
         let ended = self.book.cancel.is_some() && self.faults.has(F::CancelEndedByUpdate);
@@ -81,7 +81,7 @@ impl Agv {
     }
 
     /// Rows 8 and 10: takes over an update.
-    pub(super) fn continue_with(&mut self, mut order: Order) {
+    pub(crate) fn continue_with(&mut self, mut order: Order) {
         if !self.is_busy() && self.faults.has(F::R6ContinuationClearsActionStates) {
             self.actions.retain(|action| !action.status.is_terminal());
         }

@@ -4,6 +4,9 @@
 //! hold at the seam of its role only, and is called what it does. What most deviations change is what a message
 //! says; [`words`] makes that short.
 
+#[macro_use]
+mod records;
+pub mod agv;
 pub mod master_control;
 pub mod record;
 pub mod words;

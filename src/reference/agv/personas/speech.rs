@@ -61,7 +61,7 @@ impl Agv {
         let text = match (arguments.get("text"), arguments.get("payload")) {
             (Some(Value::String(text)), _) => text.clone(),
             (_, Some(Value::Object(body))) => {
-                self.publish(name, body.clone(), &[]);
+                self.publish(name, body.clone());
                 return;
             }
             (_, Some(payload)) => payload.to_string(),

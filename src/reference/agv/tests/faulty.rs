@@ -1,9 +1,9 @@
 use super::*;
-use crate::reference::agv::FAULTS;
+use crate::reference::deviations::agv::FAULTS;
 
 #[test]
 fn a_vehicle_with_any_single_fault_lives_through_a_day() {
-    for fault in FAULTS {
+    for fault in FAULTS.iter() {
         let mut bench = Bench::with(config(), &[fault.name]);
         super::scenarios::day(&mut bench);
         bench.wait(30.0);
@@ -73,13 +73,13 @@ fn every_fault_shows_in_some_scenario() {
 
 #[test]
 fn an_unknown_fault_is_refused_by_name() {
-    let error = Agv::new(config(), &["no-will", "no-such-fault"]).unwrap_err();
+    let error = deviations::built(config(), &["no-will", "no-such-fault"]).unwrap_err();
     assert_eq!(error.to_string(), "the reference AGV has no fault `no-such-fault`");
 }
 
 #[test]
 fn every_fault_breaks_a_requirement_and_says_what_is_wrong() {
-    for fault in FAULTS {
+    for fault in FAULTS.iter() {
         assert!(!fault.breaks.is_empty() && fault.wrong.ends_with('.'), "{}", fault.name);
     }
     assert!(FAULTS.len() >= 80);

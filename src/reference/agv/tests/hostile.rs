@@ -122,7 +122,7 @@ proptest! {
         fault in prop::option::of(any::<prop::sample::Index>()),
         interval in 0_u64..600,
     ) {
-        let faults: Vec<&str> = fault.iter().map(|index| index.get(crate::reference::agv::FAULTS).name).collect();
+        let faults: Vec<&str> = fault.iter().map(|index| index.get(&deviations::FAULTS).name).collect();
         let min_state_interval = Duration::from_millis(interval.saturating_sub(300));
         let mut bench = Bench::with(AgvConfig { min_state_interval, ..config() }, &faults);
         for ((topic, mut body), place, value, pause) in script {

@@ -17,8 +17,6 @@
     reason = "records are short closures of a few given shapes"
 )]
 
-#[macro_use]
-mod records;
 mod actions;
 mod base;
 mod cancellation;

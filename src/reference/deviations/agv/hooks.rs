@@ -1,0 +1,267 @@
+//! What records are made of: a memory, and what is done at some points of the seam.
+
+use std::time::Duration;
+
+use serde_json::{Map, Value, json};
+
+use crate::reference::ConnectOptions;
+use crate::reference::agv::Agv;
+use crate::reference::agv::actions::Action;
+use crate::reference::agv::book::Stop;
+use crate::reference::agv::errors::ActiveError;
+use crate::reference::agv::order_message::Edge;
+use crate::reference::agv::seam::{Deviation, Event, Head, Outgoing, Part, Permission, Span};
+use crate::reference::deviations::words::Words;
+
+/// A part of a message.
+pub(super) type Object = Map<String, Value>;
+
+/// A deviation with a memory of its own.
+pub(super) struct Hooks<M> {
+    memory: M,
+    joins: Option<fn(&Agv, &mut ConnectOptions)>,
+    heads: Option<fn(&mut M, &mut Agv, Head, &mut Object)>,
+    sends: Option<fn(&mut M, &mut Agv, &mut Outgoing) -> bool>,
+    writes: Option<fn(&Agv, &Outgoing, &mut Vec<u8>)>,
+    allows: Option<fn(&M, &Agv, Permission<'_>, bool) -> bool>,
+    lasts: Option<fn(&Agv, Span, Duration) -> Duration>,
+    happens: Option<fn(&mut M, &mut Agv, Event)>,
+    words: Option<Worded>,
+}
+
+/// The part of a message that is worded otherwise.
+#[derive(Clone, Copy)]
+enum Worded {
+    State(fn(&Agv, &mut Object)),
+    Position(fn(&Agv, &mut Object)),
+    Velocity(fn(&Agv, &mut Object)),
+    Visualization(fn(&Agv, &mut Object)),
+    Factsheet(fn(&Agv, &mut Object)),
+    Node(fn(&Agv, &Stop, &mut Object) -> bool),
+    Edge(fn(&Agv, &Edge, &mut Object) -> bool),
+    Route(fn(&Agv, u32, &mut Object) -> bool),
+    Action(fn(&Agv, &Action, &mut Object) -> bool),
+    Error(fn(&Agv, &ActiveError, &mut Object)),
+}
+
+/// One that remembers something.
+pub(super) fn keep<M: Default>() -> Box<Hooks<M>> {
+    holding(M::default())
+}
+
+/// One that remembers nothing.
+pub(super) fn plain() -> Box<Hooks<()>> {
+    keep()
+}
+
+fn worded(words: Worded) -> Box<Hooks<()>> {
+    let mut hooks = plain();
+    hooks.words = Some(words);
+    hooks
+}
+
+macro_rules! parts {
+    ($($name:ident $part:ident: $type:ty, $what:literal;)+) => {
+        $(#[doc = $what] pub(super) fn $name(change: $type) -> Box<Hooks<()>> {
+            worded(Worded::$part(change))
+        })+
+    };
+}
+
+parts! {
+    state State: fn(&Agv, &mut Object), "Words its state otherwise.";
+    position Position: fn(&Agv, &mut Object), "Words its position otherwise, in states and visualizations.";
+    velocity Velocity: fn(&Agv, &mut Object), "Words its velocity otherwise, in states and visualizations.";
+    visualization Visualization: fn(&Agv, &mut Object), "Words its visualization otherwise.";
+    factsheet Factsheet: fn(&Agv, &mut Object), "Words its factsheet otherwise.";
+    node Node: fn(&Agv, &Stop, &mut Object) -> bool, "Words a node state otherwise, or leaves it out.";
+    edge Edge: fn(&Agv, &Edge, &mut Object) -> bool, "Words an edge state otherwise, or leaves it out.";
+    route Route: fn(&Agv, u32, &mut Object) -> bool, "The same for nodes and edges, told by their sequenceId.";
+    action Action: fn(&Agv, &Action, &mut Object) -> bool, "Words an action state otherwise, or leaves it out.";
+    error Error: fn(&Agv, &ActiveError, &mut Object), "Words an error otherwise.";
+}
+
+/// Words the header otherwise, of the message of a topic name.
+pub(super) fn header(change: fn(&mut Agv, Head, &mut Object)) -> Box<Hooks<fn(&mut Agv, Head, &mut Object)>> {
+    holding(change).heads(|change, agv, head, header| change(agv, head, header))
+}
+
+/// Connects otherwise.
+pub(super) fn joining(change: fn(&Agv, &mut ConnectOptions)) -> Box<Hooks<()>> {
+    let mut hooks = plain();
+    hooks.joins = Some(change);
+    hooks
+}
+
+/// Words its last will otherwise.
+pub(super) fn will(change: fn(&mut Object)) -> Box<dyn Deviation> {
+    struct Will(fn(&mut Object));
+    impl Deviation for Will {
+        fn joins(&mut self, _: &Agv, options: &mut ConnectOptions) {
+            if let Some(will) = &mut options.will
+                && let Ok(mut words) = serde_json::from_slice(&will.payload)
+            {
+                (self.0)(&mut words);
+                will.payload = Value::Object(words).to_string().into_bytes();
+            }
+        }
+    }
+    Box::new(Will(change))
+}
+
+/// Sends the messages of a topic otherwise.
+pub(super) fn sending(change: fn(&mut Agv, &mut Outgoing)) -> Box<Hooks<fn(&mut Agv, &mut Outgoing)>> {
+    holding(change).sends(|change, agv, outgoing| {
+        change(agv, outgoing);
+        true
+    })
+}
+
+/// Holds back some messages, told by their topic name and content.
+pub(super) fn unsaid(which: fn(&Agv, &str, &Object) -> bool) -> Box<Hooks<fn(&Agv, &str, &Object) -> bool>> {
+    holding(which).allows(|which, agv, what, usual| match what {
+        Permission::Say(name, body) => usual && !which(agv, name, body),
+        Permission::Disconnect => usual,
+    })
+}
+
+/// Does something when something happens.
+pub(super) fn when(event: Event, then: fn(&mut Agv)) -> Box<Hooks<(Event, fn(&mut Agv))>> {
+    holding((event, then)).happens(|(wanted, then), agv, event| {
+        if event == *wanted {
+            then(agv);
+        }
+    })
+}
+
+/// Takes as long as no good vehicle does from one state to the next, while something is so.
+pub(super) fn silent(while_so: fn(&Agv) -> bool) -> Box<dyn Deviation> {
+    struct Silent(fn(&Agv) -> bool);
+    impl Deviation for Silent {
+        fn lasts(&self, agv: &Agv, what: Span, usual: Duration) -> Duration {
+            match what == Span::BetweenStates && (self.0)(agv) {
+                true => Duration::from_secs(45),
+                false => usual,
+            }
+        }
+    }
+    Box::new(Silent(while_so))
+}
+
+fn holding<M>(memory: M) -> Box<Hooks<M>> {
+    Box::new(Hooks {
+        memory,
+        joins: None,
+        heads: None,
+        sends: None,
+        writes: None,
+        allows: None,
+        lasts: None,
+        happens: None,
+        words: None,
+    })
+}
+
+macro_rules! setters {
+    ($($name:ident: $type:ty,)+) => {
+        $(pub(super) fn $name(mut self: Box<Self>, hook: $type) -> Box<Self> {
+            self.$name = Some(hook);
+            self
+        })+
+    };
+}
+
+impl<M> Hooks<M> {
+    setters! {
+        heads: fn(&mut M, &mut Agv, Head, &mut Object),
+        sends: fn(&mut M, &mut Agv, &mut Outgoing) -> bool,
+        writes: fn(&Agv, &Outgoing, &mut Vec<u8>),
+        allows: fn(&M, &Agv, Permission<'_>, bool) -> bool,
+        lasts: fn(&Agv, Span, Duration) -> Duration,
+        happens: fn(&mut M, &mut Agv, Event),
+    }
+}
+
+impl<M: Send> Deviation for Hooks<M> {
+    fn joins(&mut self, agv: &Agv, options: &mut ConnectOptions) {
+        if let Some(join) = self.joins {
+            join(agv, options);
+        }
+    }
+
+    fn says(&self, agv: &Agv, part: Part<'_>, words: &mut Object) -> bool {
+        match (self.words, part) {
+            (Some(Worded::State(change)), Part::State)
+            | (Some(Worded::Position(change)), Part::Position)
+            | (Some(Worded::Velocity(change)), Part::Velocity)
+            | (Some(Worded::Visualization(change)), Part::Visualization)
+            | (Some(Worded::Factsheet(change)), Part::Factsheet) => change(agv, words),
+            (Some(Worded::Node(change)), Part::Node(stop)) => return change(agv, stop, words),
+            (Some(Worded::Edge(change)), Part::Edge(edge)) => return change(agv, edge, words),
+            (Some(Worded::Route(change)), Part::Node(stop)) => return change(agv, stop.node.sequence_id, words),
+            (Some(Worded::Route(change)), Part::Edge(edge)) => return change(agv, edge.sequence_id, words),
+            (Some(Worded::Action(change)), Part::Action(action)) => return change(agv, action, words),
+            (Some(Worded::Error(change)), Part::Error(error)) => change(agv, error, words),
+            _ => {}
+        }
+        true
+    }
+
+    fn heads(&mut self, agv: &mut Agv, head: Head, header: &mut Object) {
+        if let Some(change) = self.heads {
+            change(&mut self.memory, agv, head, header);
+        }
+    }
+
+    fn publishes(&mut self, agv: &mut Agv, outgoing: &mut Outgoing) -> bool {
+        self.sends.is_none_or(|send| send(&mut self.memory, agv, outgoing))
+    }
+
+    fn writes(&self, agv: &Agv, outgoing: &Outgoing, text: &mut Vec<u8>) {
+        if let Some(write) = self.writes {
+            write(agv, outgoing, text);
+        }
+    }
+
+    fn allows(&self, agv: &Agv, what: Permission<'_>, usual: bool) -> bool {
+        self.allows.map_or(usual, |allow| allow(&self.memory, agv, what, usual))
+    }
+
+    fn lasts(&self, agv: &Agv, what: Span, usual: Duration) -> Duration {
+        self.lasts.map_or(usual, |last| last(agv, what, usual))
+    }
+
+    fn happens(&mut self, agv: &mut Agv, event: Event) {
+        if let Some(happen) = self.happens {
+            happen(&mut self.memory, agv, event);
+        }
+    }
+}
+
+/// Changes a number that is there.
+pub(super) fn number(words: &mut Object, key: &str, change: fn(f64) -> f64) {
+    if let Some(value) = words.get(key).and_then(Value::as_f64) {
+        words.set(key, change(value));
+    }
+}
+
+/// Changes a text that is there.
+pub(super) fn text(words: &mut Object, key: &str, change: impl FnOnce(&str) -> String) {
+    words.change(key, |value| {
+        if let Value::String(text) = value {
+            *value = json!(change(text));
+        }
+    });
+}
+
+/// Puts bytes in place of the first occurrence of others.
+pub(super) fn replace(text: &mut Vec<u8>, from: &[u8], to: &[u8]) {
+    if let Some(at) = text.windows(from.len().max(1)).position(|window| window == from) {
+        text.splice(at..at + from.len(), to.iter().copied());
+    }
+}
+
+/// Whether nothing of the order is left to be driven or done.
+pub(super) fn is_done(agv: &Agv) -> bool {
+    agv.book.nodes.is_empty() && !agv.actions.order_unfinished()
+}
