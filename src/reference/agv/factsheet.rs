@@ -61,8 +61,8 @@ impl Agv {
             "physicalParameters": self.physical_parameters(),
             "protocolLimits": self.protocol_limits(),
             "protocolFeatures": self.protocol_features(),
-            "agvGeometry": self.geometry(),
-            "loadSpecification": self.load_specification(),
+            "agvGeometry": Self::geometry(),
+            "loadSpecification": Self::load_specification(),
         });
         if self.config.has("localizationParameters") {
             // Required by the elder schema, and empty for a vehicle without further parameters.
@@ -231,7 +231,7 @@ impl Agv {
         Value::Object(picture)
     }
 
-    fn geometry(&self) -> Value {
+    fn geometry() -> Value {
         let wheel = |y: f64| {
             json!({
                 "type": "DRIVE",
@@ -255,7 +255,7 @@ impl Agv {
         })
     }
 
-    fn load_specification(&self) -> Value {
+    fn load_specification() -> Value {
         let set = |name: &str, load_type: &str| {
             json!({
                 "setName": name,

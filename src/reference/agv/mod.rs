@@ -233,7 +233,7 @@ pub struct Agv {
     /// What was decided and is still to be handed to the driver.
     pub(crate) pending: Vec<Output>,
     /// How a test told it to behave.
-    pub(crate) persona: Persona,
+    persona: Persona,
 }
 
 impl Agv {
