@@ -112,7 +112,6 @@ fn what_must_not_come_is_found_under_the_older_name_of_the_array() {
     let pack = library.rules.packs.latest();
     for (fault, test, requirement) in [
         ("pick-at-once", "actions/order-only", "ACT-08"),
-        ("pick-at-once", "capabilities/scope", "FACT-15"),
         ("scope-ignored", "instant-actions/not-offered", "FACT-15"),
         (
             "position-during-order",
@@ -129,7 +128,9 @@ fn what_must_not_come_is_found_under_the_older_name_of_the_array() {
         request.faults = vec!["actions-renamed".to_owned(), fault.to_owned()];
         let result = run_silently(&library, pack, request).expect("a run").result;
         let found = decided(&result).into_iter().any(|(decider, verdict)| {
-            verdict == Verdict::Fail && decider.requirement == requirement && decider.place.starts_with(test)
+            matches!(verdict, Verdict::Fail | Verdict::Warning)
+                && decider.requirement == requirement
+                && decider.place.starts_with(test)
         });
         assert!(found, "{fault} is not found by {test}");
     }
