@@ -345,10 +345,11 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
     for decider in deciders.iter().skip(1) {
         let _ = writeln!(text, "               {decider}");
     }
-    let breaking: Vec<&str> = all_faults()
+    let mut breaking: Vec<&str> = all_faults()
         .filter(|fault| fault.breaks.contains(&id))
         .map(|fault| fault.name)
         .collect();
+    breaking.sort_unstable();
     if !breaking.is_empty() {
         let _ = writeln!(text, "proved with    {}", breaking.join(", "));
     }
