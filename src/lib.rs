@@ -45,8 +45,10 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod audit;
 pub mod bench;
 pub mod broker;
+pub mod capture;
 pub mod checks;
 pub mod cli;
 pub mod clock;

@@ -10,12 +10,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Modules by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer.
-const LAYERS: [(&str, u8); 29] = [
+const LAYERS: [(&str, u8); 31] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
     ("run", 5),
     ("qualify", 5),
+    ("audit", 5),
     ("simulate", 5),
     ("report", 5),
     ("engine", 4),
@@ -31,6 +32,7 @@ const LAYERS: [(&str, u8); 29] = [
     ("pattern", 2),
     ("checks", 2),
     ("journal", 2),
+    ("capture", 2),
     ("pack", 1),
     ("profile", 1),
     ("course", 1),

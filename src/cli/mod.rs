@@ -1,6 +1,7 @@
 //! The command line: parse, call, map the outcome to an exit code. One file per command.
 
 pub mod args;
+mod audit;
 mod device;
 pub mod exit;
 mod list;
@@ -42,6 +43,7 @@ pub fn main() -> ExitCode {
         Command::Certify(arguments) => run::certify_command(arguments),
         Command::List(arguments) => list::list(arguments),
         Command::Explain(arguments) => list::explain(arguments),
+        Command::Audit(arguments) => audit::audit(arguments),
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments),

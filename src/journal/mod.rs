@@ -28,7 +28,7 @@ use crate::clock::Stamp;
 pub struct Entry {
     /// The record as it stands in the journal.
     pub record: Record,
-    parsed: OnceLock<Parsed>,
+    parsed: OnceLock<Arc<Parsed>>,
     view: OnceLock<Value>,
 }
 
@@ -41,6 +41,17 @@ impl Entry {
             parsed: OnceLock::new(),
             view: OnceLock::new(),
         })
+    }
+
+    /// Wraps another record of the same payload, which is not parsed again.
+    #[must_use]
+    pub fn beside(other: &Self, record: Record) -> Arc<Self> {
+        let entry = Self::new(record);
+        if let Some(parsed) = other.shared() {
+            // It is empty: nobody else has seen it yet.
+            let _ = entry.parsed.set(Arc::clone(parsed));
+        }
+        entry
     }
 
     /// The number of the record.
@@ -80,8 +91,12 @@ impl Entry {
     /// The payload parsed as JSON, once.
     #[must_use]
     pub fn parsed(&self) -> Option<&Parsed> {
+        self.shared().map(Arc::as_ref)
+    }
+
+    fn shared(&self) -> Option<&Arc<Parsed>> {
         let payload = self.payload()?;
-        Some(self.parsed.get_or_init(|| Parsed::of(payload)))
+        Some(self.parsed.get_or_init(|| Arc::new(Parsed::of(payload))))
     }
 
     /// The payload as a JSON value; `None` when there is none or it is not JSON.

@@ -6,6 +6,7 @@
 
 mod decide;
 mod departure;
+mod grounds;
 mod hidden;
 mod holds;
 mod limit;
@@ -13,8 +14,10 @@ mod mend;
 mod monitor;
 mod own_errors;
 mod reactions;
+mod rules;
 mod run;
 mod scene;
+mod side;
 mod step;
 mod test;
 mod timeline;
@@ -22,7 +25,10 @@ mod watches;
 mod window;
 
 pub use monitor::MonitorJudge;
-pub use run::{JudgeError, RESULT_FORMAT, Rules, RunJudge, judge};
+pub use rules::{JudgeError, Rules};
+pub use run::{RESULT_FORMAT, RunJudge, judge};
+pub use side::SideJudge;
 pub use step::Progress;
 pub use test::{Ground, TestJudge};
 pub use timeline::{Timeline, client_of, number_of};
+pub use watches::Observed;

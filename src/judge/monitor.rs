@@ -198,6 +198,11 @@ impl MonitorJudge {
         seen.map(str::to_owned).collect()
     }
 
+    /// Takes what was found since it was taken last.
+    pub(super) fn take(&mut self) -> Vec<MonitorFinding> {
+        std::mem::take(&mut self.findings)
+    }
+
     /// Why nothing of it can be judged, though it should be.
     pub(super) fn open(&self) -> Option<&str> {
         self.open.as_deref()

@@ -11,53 +11,24 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::decide::mood;
+use super::grounds::Grounds;
 use super::hidden::Hidden;
 use super::mend::mended;
 use super::reactions::Reactions;
+use super::rules::{JudgeError, Rules};
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
 use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, Reading, RunHeader, Waiver};
-use crate::pack::{Catalogue, Decided, Packs, Role};
+use crate::pack::{Decided, Role};
 use crate::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
-use crate::suite::Suites;
 use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};
 
 /// Format of `result.json`.
 pub const RESULT_FORMAT: &str = "vda5050-tck.result/1";
-
-/// The rules a run is judged by.
-#[derive(Clone)]
-pub struct Rules {
-    /// All protocol versions.
-    pub packs: Arc<Packs>,
-    /// The requirements.
-    pub catalogue: Arc<Catalogue>,
-    /// Tests and monitors.
-    pub suites: Arc<Suites>,
-    /// SHA-256 over suites, schemas and requirements.
-    pub sha256: String,
-}
-
-/// Why a journal cannot be judged.
-#[derive(Debug, thiserror::Error, PartialEq, Eq)]
-pub enum JudgeError {
-    /// It does not begin with `RunBegun`.
-    #[error("the journal does not begin with the record of a run")]
-    NoHeader,
-    /// It was made for a protocol version this program does not have.
-    #[error("the journal is about protocol version {0}, which this program does not have")]
-    Version(String),
-    /// It is about a side of the interface nobody knows.
-    #[error("the journal is about the role `{0}`, which there is not")]
-    Role(String),
-    /// It names a test the suites do not have.
-    #[error("the journal names the test `{0}`, which the suites do not have")]
-    UnknownTest(String),
-}
 
 /// A run being judged.
 pub struct RunJudge {
@@ -86,32 +57,7 @@ impl RunJudge {
             return Err(JudgeError::NoHeader);
         };
         let header = (**header).clone();
-        let pack = rules
-            .packs
-            .get(&header.protocol)
-            .ok_or_else(|| JudgeError::Version(header.protocol.clone()))?;
-        let role = [Role::Agv, Role::MasterControl]
-            .into_iter()
-            .find(|role| role.word() == header.role)
-            .ok_or_else(|| JudgeError::Role(header.role.clone()))?;
-        let bindings = Arc::new(header.bindings.clone());
-        let ground_of = |topics: &BTreeMap<String, String>, manufacturer: &str, serial_number: &str| Ground {
-            pack: Arc::clone(pack),
-            catalogue: Arc::clone(&rules.catalogue),
-            topics: topics.clone(),
-            role,
-            identity: (manufacturer.to_owned(), serial_number.to_owned()),
-            bindings: Arc::clone(&bindings),
-            waivers: Vec::new(),
-        };
-        // What a master control sends names the vehicle it is for.
-        let mut of_vehicles = header
-            .vehicles
-            .iter()
-            .map(|vehicle| ground_of(&vehicle.topics, &vehicle.manufacturer, &vehicle.serial_number));
-        let ground = of_vehicles
-            .next()
-            .unwrap_or_else(|| ground_of(&header.topics, &header.manufacturer, &header.serial_number));
+        let Grounds { role, ground, vehicles } = Grounds::of(rules, &header)?;
         let tap = header.vantage == "tap";
         let monitors: Vec<&Arc<Monitor>> = rules
             .suites
@@ -119,7 +65,7 @@ impl RunJudge {
             .iter()
             .filter(|monitor| monitor.device.is_none_or(|device| device == role))
             .collect();
-        let watches = Watches::begin(&monitors, &ground, of_vehicles.collect(), tap);
+        let watches = Watches::begin(&monitors, &ground, vehicles, tap);
         let reactions = Reactions::of(header.vehicles.len());
         let timeline = if header.vehicles.is_empty() {
             Timeline::new(&header.topics)

@@ -17,9 +17,18 @@ use crate::clock::Moment;
 use crate::journal::Entry;
 use crate::journal::event::{Event, Packet};
 use crate::pattern::Bindings;
-use crate::result::MonitorResult;
+use crate::result::{MonitorFinding, MonitorResult};
 use crate::suite::model::Monitor;
 use crate::verdict::{Accumulated, Verdict};
+
+/// Something a monitor found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observed {
+    /// Id of the monitor.
+    pub monitor: String,
+    /// What it found.
+    pub finding: MonitorFinding,
+}
 
 /// All monitors.
 pub(super) struct Watches {
@@ -174,6 +183,35 @@ impl Watches {
     /// The members that show nothing any more for what monitors have found in this run, with the requirement.
     pub fn accused(&self) -> Vec<(String, String)> {
         self.first.monitors.iter().flat_map(MonitorJudge::accused).collect()
+    }
+
+    /// Takes what was found since it was taken last, so that it is kept nowhere else.
+    pub fn take(&mut self) -> Vec<Observed> {
+        let others = self.others.iter_mut().flat_map(|(_, watch)| &mut watch.monitors);
+        let all = self.first.monitors.iter_mut().chain(others);
+        let found = all.flat_map(|monitor| {
+            let id = monitor.monitor().id.clone();
+            let taken = monitor.take().into_iter();
+            taken.map(move |finding| Observed {
+                monitor: id.clone(),
+                finding,
+            })
+        });
+        found.collect()
+    }
+
+    /// The requirements of which something was judged, with the monitor.
+    pub fn decided(&self) -> Vec<(String, String)> {
+        let others = self.others.iter().flat_map(|(_, watch)| &watch.monitors);
+        let all = self.first.monitors.iter().chain(others);
+        let judged = all.flat_map(|monitor| {
+            let id = &monitor.monitor().id;
+            monitor
+                .judged()
+                .into_iter()
+                .map(move |requirement| (requirement, id.clone()))
+        });
+        judged.collect()
     }
 
     /// What was found, monitor by monitor.

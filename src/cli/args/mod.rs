@@ -3,6 +3,7 @@
 //! Flags that are settings of a device (`--broker`, `--serial` …) are handed to [`crate::profile::load`] as
 //! they stand, so that a value means the same on the command line, in the environment and in a file.
 
+mod audit;
 mod inspect;
 mod run;
 mod simulate;
@@ -14,6 +15,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub use audit::Audit;
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub use run::{Certify, Qualify, Run, Shard};
 pub use simulate::{ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, VehicleArg};
@@ -51,6 +53,8 @@ pub enum Command {
     List(List),
     /// Explain a requirement, test, monitor, check, hook or fault
     Explain(Explain),
+    /// Judge recorded traffic by the monitors: every vehicle and its master control
+    Audit(Audit),
     /// Check files: messages, suites, profiles, layouts or results, told apart by their content
     Validate(Validate),
     /// Be a device on a broker: a reference AGV or a reference master control

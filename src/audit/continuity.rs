@@ -1,0 +1,223 @@
+//! Where messages are missing.
+//!
+//! A gap in the count of a topic is a hole, and so is what only a message explains that the recording does not hold: an
+//! order in a state that was never seen on its way, or an action nobody sent.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use serde_json::Value;
+
+use crate::clock::Moment;
+use crate::pattern::whole;
+
+/// How many orders and actions are kept in mind.
+const SENT: usize = 8192;
+
+/// What a message is for those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// It follows the last one of its topic.
+    Follows,
+    /// There was none before that it could follow.
+    Begins,
+    /// Something is missing since that moment.
+    Hole(Moment),
+}
+
+/// Texts that are known, by their print, bounded.
+#[derive(Debug, Default)]
+struct Sent {
+    known: BTreeSet<u64>,
+    order: VecDeque<u64>,
+}
+
+impl Sent {
+    fn add(&mut self, what: impl Hash) {
+        let print = print(what);
+        if self.known.insert(print) {
+            self.order.push_back(print);
+        }
+        if self.order.len() > SENT
+            && let Some(oldest) = self.order.pop_front()
+        {
+            self.known.remove(&oldest);
+        }
+    }
+
+    fn has(&self, print: u64) -> bool {
+        self.known.contains(&print)
+    }
+}
+
+fn print(what: impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    what.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// See the module.
+#[derive(Debug, Default)]
+pub(super) struct Continuity {
+    last: BTreeMap<String, (Option<u64>, Moment)>,
+    sent: Sent,
+    /// Orders and actions of the last state.
+    shown: Option<BTreeSet<u64>>,
+    /// How many holes there are.
+    pub holes: u64,
+}
+
+impl Continuity {
+    /// Takes in a message that came live.
+    pub fn note(&mut self, name: &str, message: Option<&Value>, now: Moment) -> Step {
+        let id = message.and_then(|message| whole(message.get("headerId")?));
+        if name == "connection" {
+            // The count may begin anew on every topic of the vehicle.
+            self.last
+                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions"));
+            self.shown = None;
+            self.last.insert(name.to_owned(), (id, now));
+            return Step::Begins;
+        }
+        let before = self.last.insert(name.to_owned(), (id, now));
+        let counted = match before {
+            None => Step::Begins,
+            Some((Some(before), _)) if id == Some(next(before)) => Step::Follows,
+            Some((_, since)) => Step::Hole(since),
+        };
+        let step = match (counted, message) {
+            (Step::Hole(since), _) => Step::Hole(since),
+            (step, Some(message)) if name == "state" && !self.explained(message) => {
+                Step::Hole(before.map_or(now, |(_, since)| since)).max_of(step)
+            }
+            (step, _) => step,
+        };
+        if let Step::Hole(_) = step {
+            self.holes += 1;
+            self.forget();
+        }
+        self.learn(name, message);
+        step
+    }
+
+    /// What was sent before does not count any more.
+    pub fn forget(&mut self) {
+        self.sent = Sent::default();
+        self.shown = None;
+    }
+
+    /// Keeps in mind what was sent, and what is shown.
+    pub fn learn(&mut self, name: &str, message: Option<&Value>) {
+        match (name, message) {
+            ("order", Some(order)) => self.order(order),
+            ("instantActions", Some(message)) => self.actions(message, &["actions", "instantActions"]),
+            ("state", Some(state)) => self.shown = Some(shown(state)),
+            _ => {}
+        }
+    }
+
+    /// Whether all that a state shows beyond the one before was sent.
+    fn explained(&self, state: &Value) -> bool {
+        let Some(before) = &self.shown else { return true };
+        shown(state).difference(before).all(|print| self.sent.has(*print))
+    }
+
+    fn order(&mut self, order: &Value) {
+        let id = order.get("orderId").and_then(Value::as_str);
+        let update = order.get("orderUpdateId").and_then(whole);
+        if let (Some(id), Some(update)) = (id, update) {
+            self.sent.add((id, update));
+        }
+        for list in ["nodes", "edges"] {
+            for element in order.get(list).and_then(Value::as_array).into_iter().flatten() {
+                self.actions(element, &["actions"]);
+            }
+        }
+    }
+
+    fn actions(&mut self, holder: &Value, lists: &[&str]) {
+        for list in lists {
+            for action in holder.get(*list).and_then(Value::as_array).into_iter().flatten() {
+                if let Some(id) = action.get("actionId").and_then(Value::as_str) {
+                    self.sent.add(id);
+                }
+            }
+        }
+    }
+}
+
+impl Step {
+    /// A hole is a hole whatever the count says.
+    fn max_of(self, other: Self) -> Self {
+        match self {
+            Self::Hole(_) => self,
+            _ => other,
+        }
+    }
+}
+
+/// The number after this one; the count begins anew behind the largest.
+fn next(id: u64) -> u64 {
+    if id == u64::from(u32::MAX) { 0 } else { id + 1 }
+}
+
+/// Prints of the order and of the actions that a state shows.
+fn shown(state: &Value) -> BTreeSet<u64> {
+    let id = state.get("orderId").and_then(Value::as_str).filter(|id| !id.is_empty());
+    let update = state.get("orderUpdateId").and_then(whole);
+    let order = id.zip(update).map(print);
+    let actions = state
+        .get("actionStates")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten();
+    let actions = actions.filter_map(|action| action.get("actionId").and_then(Value::as_str).map(print));
+    order.into_iter().chain(actions).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn steps(messages: &[(&str, Value)]) -> Vec<Step> {
+        let mut continuity = Continuity::default();
+        let all = messages.iter().enumerate();
+        all.map(|(at, (name, value))| continuity.note(name, Some(value), Moment::from_micros(at as u64)))
+            .collect()
+    }
+
+    #[test]
+    fn a_gap_a_fall_and_a_repeat_are_holes() {
+        let found = steps(&[1, 2, 4, 5, 5, 3].map(|id| ("state", json!({ "headerId": id }))));
+        let hole = |at| Step::Hole(Moment::from_micros(at));
+        assert_eq!(
+            found,
+            [Step::Begins, Step::Follows, hole(1), Step::Follows, hole(3), hole(4)]
+        );
+        let wraps = [u64::from(u32::MAX), 0].map(|id| ("state", json!({ "headerId": id })));
+        assert_eq!(steps(&wraps)[1], Step::Follows);
+    }
+
+    #[test]
+    fn what_nobody_sent_is_a_hole_once() {
+        let state = |id: u64, order: &str| ("state", json!({ "headerId": id, "orderId": order, "orderUpdateId": 0 }));
+        let order = ("order", json!({ "headerId": 1, "orderId": "b", "orderUpdateId": 0 }));
+        let found = steps(&[state(1, "a"), order, state(2, "b"), state(3, "c"), state(4, "c")]);
+        assert_eq!(found[2], Step::Follows);
+        assert_eq!(found[3], Step::Hole(Moment::from_micros(2)));
+        assert_eq!(found[4], Step::Follows);
+    }
+
+    #[test]
+    fn a_connection_lets_the_count_begin_anew() {
+        let found = steps(&[
+            ("state", json!({ "headerId": 9 })),
+            ("connection", json!({ "headerId": 4 })),
+            ("state", json!({ "headerId": 0 })),
+            ("state", json!({ "headerId": 1 })),
+        ]);
+        assert_eq!(found, [Step::Begins, Step::Begins, Step::Begins, Step::Follows]);
+    }
+}

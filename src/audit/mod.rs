@@ -1,0 +1,192 @@
+//! Traffic nobody scripted, judged by the monitors: recordings of a site.
+//!
+//! [`Audit`] is shown message after message and finds vehicles by their topics. Each vehicle, and the master control
+//! that commands it, is judged by itself, by the protocol version its messages name. What a recording cannot show is
+//! not judged: it may begin in the middle, lack messages, hold them twice, or hold what was retained yesterday. [`scope`]
+//! says which monitor is used how, [`continuity`] finds the holes, and [`arrival`] puts messages back into their order.
+
+mod arrival;
+mod continuity;
+mod own_run;
+pub mod page;
+pub mod result;
+mod scope;
+mod side;
+mod topics;
+mod vehicle;
+
+use std::collections::BTreeMap;
+
+use crate::capture::{Message, Place};
+use crate::judge::Rules;
+use crate::suite::model::Monitor;
+
+pub use own_run::{OwnRunError, own_run};
+use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
+use topics::Topics;
+use vehicle::Vehicle;
+
+/// How many vehicles are judged; messages of further ones are counted.
+const VEHICLES: usize = 10_000;
+
+/// What is judged.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// How topics are built, where a site has renamed them.
+    pub topic_template: Option<String>,
+    /// Only these vehicles: serial number, or manufacturer and serial number with a slash between.
+    pub vehicles: Vec<String>,
+    /// Only monitors of these names, or that decide these requirements; a `*` at the end stands for anything.
+    pub only: Vec<String>,
+}
+
+impl Options {
+    fn wants_vehicle(&self, manufacturer: &str, serial_number: &str) -> bool {
+        let named = |wanted: &String| {
+            wanted == serial_number
+                || wanted
+                    .split_once('/')
+                    .is_some_and(|(one, other)| (one, other) == (manufacturer, serial_number))
+        };
+        self.vehicles.is_empty() || self.vehicles.iter().any(named)
+    }
+
+    fn wants_monitor(&self, monitor: &Monitor) -> bool {
+        let fits = |wanted: &str, name: &str| match wanted.strip_suffix('*') {
+            Some(begin) => name.starts_with(begin),
+            None => name == wanted,
+        };
+        let named = |wanted: &String| {
+            let mut checks = monitor.checks.iter();
+            fits(wanted, &monitor.id) || checks.any(|binding| fits(wanted, binding.requirement.as_str()))
+        };
+        self.only.is_empty() || self.only.iter().any(named)
+    }
+}
+
+/// Why nothing can be audited.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum AuditError {
+    /// The template does not name the topic.
+    #[error("the topic template `{0}` has no {{topic}} and no {{serialNumber}}: vehicles cannot be told apart")]
+    Template(String),
+    /// No monitor is left.
+    #[error("no monitor is called `{0}`, and none decides a requirement of that name")]
+    NoMonitor(String),
+}
+
+/// What all vehicles share.
+#[derive(Clone, Copy)]
+struct Scene<'a> {
+    rules: &'a Rules,
+    options: &'a Options,
+    places: &'a Whence,
+}
+
+/// See the module.
+pub struct Audit<'r> {
+    rules: &'r Rules,
+    options: Options,
+    topics: Topics,
+    vehicles: BTreeMap<String, Vehicle>,
+    messages: u64,
+    elsewhere: u64,
+    beyond: u64,
+    places: Whence,
+    first: Option<jiff::Timestamp>,
+    last: Option<jiff::Timestamp>,
+}
+
+impl<'r> Audit<'r> {
+    /// Begins.
+    ///
+    /// # Errors
+    /// What is wrong with the options.
+    pub fn new(rules: &'r Rules, options: Options) -> Result<Self, AuditError> {
+        for wanted in &options.only {
+            let alone = Options {
+                only: vec![wanted.clone()],
+                ..Options::default()
+            };
+            let monitors = &rules.suites.monitors;
+            if !monitors.iter().any(|monitor| alone.wants_monitor(monitor)) {
+                return Err(AuditError::NoMonitor(wanted.clone()));
+            }
+        }
+        Ok(Self {
+            topics: Topics::new(&rules.packs, options.topic_template.as_deref())?,
+            rules,
+            options,
+            vehicles: BTreeMap::new(),
+            messages: 0,
+            elsewhere: 0,
+            beyond: 0,
+            places: Whence::default(),
+            first: None,
+            last: None,
+        })
+    }
+
+    /// Shows it the next message.
+    pub fn observe(&mut self, message: Message) {
+        self.messages += 1;
+        self.first = self.first.or(message.at);
+        self.last = message.at.or(self.last);
+        let Some(named) = self.topics.read(&message.topic) else {
+            self.elsewhere += 1;
+            return;
+        };
+        if !self.options.wants_vehicle(&named.manufacturer, &named.serial_number) {
+            self.elsewhere += 1;
+            return;
+        }
+        let place: Place = message.place;
+        self.places.note(self.messages, place);
+        if !self.vehicles.contains_key(&named.key) {
+            if self.vehicles.len() >= VEHICLES {
+                self.beyond += 1;
+                return;
+            }
+            self.vehicles
+                .insert(named.key.clone(), Vehicle::new(&named, message.at.is_some()));
+        }
+        if let Some(vehicle) = self.vehicles.get_mut(&named.key) {
+            let scene = Scene {
+                rules: self.rules,
+                options: &self.options,
+                places: &self.places,
+            };
+            vehicle.observe(self.messages, &named.name, message, scene);
+        }
+    }
+
+    /// The result; the recording is at its end.
+    #[must_use]
+    pub fn finish(self, recordings: Vec<Recording>) -> AuditResult {
+        let scene = Scene {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+        };
+        let vehicles: Vec<_> = self
+            .vehicles
+            .into_values()
+            .map(|vehicle| vehicle.finish(scene))
+            .collect();
+        AuditResult {
+            format: RESULT_FORMAT.to_owned(),
+            tool: crate::run::tool(),
+            verdict: result::verdict_of(&vehicles),
+            recordings,
+            messages: self.messages,
+            first: self.first.map(|at| format!("{at:.3}")),
+            last: self.last.map(|at| format!("{at:.3}")),
+            elsewhere: self.elsewhere,
+            beyond: self.beyond,
+            vehicles,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,211 @@
+//! One side of a vehicle's traffic: what the vehicle says, or what is said to it.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+use super::Scene;
+use super::result::{FindingResult, Undecided};
+use super::scope::{self, Use};
+use crate::clock::{Moment, Stamp};
+use crate::journal::Entry;
+use crate::journal::event::{Event, Record, RunHeader, Source};
+use crate::judge::{Observed, SideJudge};
+use crate::pack::{Pack, Role};
+use crate::suite::model::Monitor;
+use crate::verdict::Verdict;
+
+/// How many findings wait for their confirmation.
+const OPEN: usize = 256;
+/// How many different findings a side keeps.
+const DIFFERENT: usize = 512;
+
+/// See the module.
+pub(super) struct Side {
+    pub role: Role,
+    header: RunHeader,
+    /// Whether the recording says when messages came.
+    timed: bool,
+    begun: Stamp,
+    each: SideJudge,
+    /// Those that need an unbroken record, from where it is one.
+    unbroken: Option<SideJudge>,
+    kept: BTreeMap<(String, String, Verdict), FindingResult>,
+    /// What holds only if nothing turns out to be missing: since when, and what.
+    open: VecDeque<(Moment, Observed, jiff::Timestamp)>,
+    judged: BTreeMap<String, u64>,
+    decided: BTreeSet<(String, String)>,
+    pub messages: u64,
+}
+
+impl Side {
+    /// Begins; `None` when the rules have no such side.
+    pub fn begin(role: Role, header: RunHeader, begun: Stamp, timed: bool, scene: Scene<'_>) -> Option<Self> {
+        let mut each = start(&header, scene, &|id| scope::of(id) == Some(Use::EachMessage))?;
+        each.observe(&first(&header, begun));
+        Some(Self {
+            role,
+            header,
+            timed,
+            begun,
+            each,
+            unbroken: None,
+            kept: BTreeMap::new(),
+            open: VecDeque::new(),
+            judged: BTreeMap::new(),
+            decided: BTreeSet::new(),
+            messages: 0,
+        })
+    }
+
+    /// Whether the monitors that need an unbroken record are on duty.
+    pub fn watches(&self) -> bool {
+        self.unbroken.is_some()
+    }
+
+    /// Something is missing since then.
+    pub fn broken(&mut self, since: Moment) {
+        self.open.retain(|(at, ..)| *at < since);
+        if let Some(judge) = self.unbroken.take() {
+            self.absorb(&judge);
+        }
+    }
+
+    /// From here on nothing is missing, as far as can be told.
+    pub fn mended(&mut self, scene: Scene<'_>) {
+        if self.unbroken.is_some() {
+            return;
+        }
+        let timed = self.timed;
+        let wanted = move |id: &str| match scope::of(id) {
+            Some(Use::Unbroken) => true,
+            Some(Use::UnbrokenInTime) => timed,
+            _ => false,
+        };
+        self.unbroken = start(&self.header, scene, &wanted).map(|mut judge| {
+            judge.observe(&first(&self.header, self.begun));
+            judge
+        });
+    }
+
+    /// Nothing was missing up to here.
+    pub fn confirmed(&mut self, scene: Scene<'_>) {
+        while let Some((_, observed, utc)) = self.open.pop_front() {
+            self.keep(observed, utc, scene);
+        }
+    }
+
+    /// Shows it a message.
+    pub fn observe(&mut self, entry: &Arc<Entry>, utc: jiff::Timestamp, scene: Scene<'_>) {
+        for observed in self.each.observe(entry) {
+            self.keep(observed, utc, scene);
+        }
+        let found = self
+            .unbroken
+            .as_mut()
+            .map(|judge| judge.observe(entry))
+            .unwrap_or_default();
+        for observed in found {
+            if self.open.len() == OPEN {
+                self.open.pop_front();
+            }
+            self.open.push_back((entry.at().moment, observed, utc));
+        }
+    }
+
+    fn keep(&mut self, observed: Observed, utc: jiff::Timestamp, scene: Scene<'_>) {
+        let Observed { monitor, finding } = observed;
+        let key = (monitor.clone(), finding.requirement.clone(), finding.verdict);
+        let last = format!("{utc:.3}");
+        if let Some(known) = self.kept.get_mut(&key) {
+            known.count += finding.count;
+            known.last = last;
+            return;
+        }
+        if self.kept.len() >= DIFFERENT {
+            return;
+        }
+        let message = finding.first.first().copied().unwrap_or_default();
+        let place = scene.places.of(message);
+        let finding = FindingResult {
+            monitor,
+            requirement: finding.requirement,
+            verdict: finding.verdict,
+            count: finding.count,
+            message,
+            recording: place.map(|place| place.file),
+            line: place.map(|place| place.line),
+            first: last.clone(),
+            last,
+            text: finding.message,
+            interpretation: finding.interpretation,
+        };
+        self.kept.insert(key, finding);
+    }
+
+    fn absorb(&mut self, judge: &SideJudge) {
+        for (id, judged) in judge.judged() {
+            *self.judged.entry(id).or_default() += judged;
+        }
+        self.decided.extend(judge.decided());
+    }
+
+    /// What came out.
+    pub fn finish(mut self, scene: Scene<'_>) -> super::result::SideResult {
+        // What is found at the very end may be explained by what comes next.
+        self.open.clear();
+        if let Some(judge) = self.unbroken.take() {
+            self.absorb(&judge);
+        }
+        for (id, judged) in self.each.judged() {
+            *self.judged.entry(id).or_default() += judged;
+        }
+        self.decided.extend(self.each.decided());
+        let findings = self.kept.into_values().collect();
+        let mut undecided = Vec::new();
+        for monitor in of_side(scene, self.role, &self.header) {
+            let id = monitor.id.clone();
+            let why = match scope::of(&id) {
+                Some(Use::Never(why)) => why,
+                Some(Use::UnbrokenInTime) if !self.timed => "the recording does not say when messages came",
+                _ if self.judged.get(&id).is_none_or(|judged| *judged == 0) => "nothing came that it could judge",
+                _ => continue,
+            };
+            undecided.push(Undecided {
+                monitor: id,
+                why: why.to_owned(),
+            });
+        }
+        let judged = self.judged.values().filter(|judged| **judged > 0).count();
+        super::result::SideResult::new(self.role, self.messages, judged, findings, self.decided, undecided)
+    }
+}
+
+fn start(header: &RunHeader, scene: Scene<'_>, used: &dyn Fn(&str) -> bool) -> Option<SideJudge> {
+    let wanted = |monitor: &Monitor| used(&monitor.id) && scene.options.wants_monitor(monitor);
+    SideJudge::begin(scene.rules, header, &wanted).ok()
+}
+
+/// The record that every journal begins with.
+fn first(header: &RunHeader, at: Stamp) -> Arc<Entry> {
+    Entry::new(Record {
+        seq: 0,
+        at,
+        source: Source::Harness,
+        direction: None,
+        event: Event::RunBegun {
+            header: Box::new(header.clone()),
+        },
+    })
+}
+
+/// The monitors that are meant for this side and version, and wanted.
+fn of_side<'s>(scene: Scene<'s>, role: Role, header: &RunHeader) -> impl Iterator<Item = &'s Arc<Monitor>> {
+    let pack: Option<&Arc<Pack>> = scene.rules.packs.get(&header.protocol);
+    let version = pack.map(|pack| pack.version);
+    let monitors = scene.rules.suites.monitors.iter();
+    monitors.filter(move |monitor| {
+        monitor.device.is_none_or(|device| device == role)
+            && version.is_some_and(|version| monitor.spec.contains(version))
+            && scene.options.wants_monitor(monitor)
+    })
+}

@@ -1,0 +1,400 @@
+//! One vehicle of a recording, with the master control that commands it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use serde_json::{Map, Value, json};
+
+use super::Scene;
+use super::arrival::{Known, Sorted};
+use super::continuity::{Continuity, Step};
+use super::result::VehicleResult;
+use super::side::Side;
+use super::topics::Named;
+use crate::capture::Message;
+use crate::clock::{Moment, Stamp};
+use crate::journal::event::{Direction, Event, MockVehicle, Record, RunHeader, Source};
+use crate::journal::{Entry, Payload};
+use crate::pack::{Pack, Role};
+use crate::pattern::whole;
+use crate::profile::TimeLimits;
+
+/// How many messages wait until the vehicle has said which version it speaks.
+const WAITING: usize = 64;
+
+/// A message on its way through.
+struct Arrived {
+    number: u64,
+    name: String,
+    at: Stamp,
+    stale: bool,
+    entry: Arc<Entry>,
+}
+
+/// The sides, once the version is known.
+struct Sides {
+    pack: Arc<Pack>,
+    all: Vec<Side>,
+}
+
+/// See the module.
+pub(super) struct Vehicle {
+    named: Named,
+    timed: bool,
+    manufacturer: String,
+    serial_number: String,
+    origin: Option<jiff::Timestamp>,
+    now: Moment,
+    known: Known,
+    sorted: BTreeMap<String, Sorted<Arrived>>,
+    /// Topics of which something came.
+    begun: BTreeSet<String>,
+    waiting: Vec<Arrived>,
+    sides: Option<Sides>,
+    /// The version it names, where there are no rules for it.
+    foreign: Option<String>,
+    continuity: Continuity,
+    /// By role: how far the clock of the sender is from that of the recorder.
+    clocks: BTreeMap<&'static str, i64>,
+    counts: BTreeMap<String, u64>,
+    twice: u64,
+    stale: u64,
+}
+
+impl Vehicle {
+    pub fn new(named: &Named, timed: bool) -> Self {
+        Self {
+            manufacturer: named.manufacturer.clone(),
+            serial_number: named.serial_number.clone(),
+            named: named.clone(),
+            timed,
+            origin: None,
+            now: Moment::START,
+            known: Known::default(),
+            sorted: BTreeMap::new(),
+            begun: BTreeSet::new(),
+            waiting: Vec::new(),
+            sides: None,
+            foreign: None,
+            continuity: Continuity::default(),
+            clocks: BTreeMap::new(),
+            counts: BTreeMap::new(),
+            twice: 0,
+            stale: 0,
+        }
+    }
+
+    /// Takes in a message.
+    pub fn observe(&mut self, number: u64, name: &str, message: Message, scene: Scene<'_>) {
+        *self.counts.entry(name.to_owned()).or_default() += 1;
+        let is_first = self.begun.insert(name.to_owned());
+        // Where the recording does not say it, the first message of a topic may be one that was stored.
+        let stale = message.retain.unwrap_or(is_first);
+        if !stale && self.known.again(name, &message.payload) {
+            self.twice += 1;
+            return;
+        }
+        self.stale += u64::from(stale);
+        let payload = Payload::keep(message.payload);
+        let draft = Entry::new(Record {
+            seq: number,
+            at: Stamp {
+                moment: self.now,
+                utc: message.at.unwrap_or_default(),
+            },
+            source: Source::Link,
+            direction: None,
+            event: Event::Message {
+                topic: message.topic,
+                qos: message.qos.unwrap_or_default(),
+                retain: stale,
+                dup: false,
+                payload,
+            },
+        });
+        let at = self.stamp(message.at, draft.json());
+        let id = draft.json().and_then(|message| whole(message.get("headerId")?));
+        let arrived = Arrived {
+            number,
+            name: name.to_owned(),
+            at,
+            stale,
+            entry: draft,
+        };
+        let mut due = Vec::new();
+        if self.timed {
+            for sorted in self.sorted.values_mut() {
+                due.extend(sorted.due(at.moment));
+            }
+        }
+        if stale || !self.timed {
+            due.push(arrived);
+        } else {
+            let sorted = self.sorted.entry(name.to_owned()).or_default();
+            due.extend(sorted.take(id, at.moment, arrived));
+        }
+        due.sort_by_key(|arrived| arrived.at.moment);
+        for arrived in due {
+            self.pass(arrived, scene);
+        }
+    }
+
+    /// When a message came. Without a time of the recorder, what the message says of itself has to do.
+    fn stamp(&mut self, recorded: Option<jiff::Timestamp>, message: Option<&Value>) -> Stamp {
+        let said = || message.and_then(timestamp);
+        let utc = if self.timed { recorded } else { said() };
+        let origin = *self.origin.get_or_insert(utc.unwrap_or_default());
+        let since = utc.map_or(0, |utc| utc.as_microsecond().saturating_sub(origin.as_microsecond()));
+        let since = Moment::from_micros(u64::try_from(since).unwrap_or_default());
+        self.now = self.now.max(since);
+        Stamp {
+            moment: self.now,
+            utc: utc.unwrap_or_default(),
+        }
+    }
+
+    /// A message whose turn it is.
+    fn pass(&mut self, arrived: Arrived, scene: Scene<'_>) {
+        if self.sides.is_some() {
+            self.show(&arrived, scene);
+            return;
+        }
+        if self.foreign.is_some() {
+            return;
+        }
+        let of_vehicle = !matches!(arrived.name.as_str(), "order" | "instantActions");
+        self.waiting.push(arrived);
+        if of_vehicle || self.waiting.len() >= WAITING {
+            self.settle(scene, self.waiting.len() >= WAITING);
+        }
+    }
+
+    /// Finds the version, and judges what waited for it.
+    fn settle(&mut self, scene: Scene<'_>, at_last: bool) {
+        let commands = |arrived: &&Arrived| matches!(arrived.name.as_str(), "order" | "instantActions");
+        let (sent, said): (Vec<&Arrived>, Vec<&Arrived>) = self.waiting.iter().partition(commands);
+        let versions = said.iter().chain(sent.iter().filter(|_| at_last));
+        let mut versions = versions.filter_map(|arrived| version(arrived.entry.json()?));
+        let found = versions.next();
+        let (pack, begun) = match (&found, self.waiting.first()) {
+            (Some(version), Some(first)) => (scene.rules.packs.get(version), first.at),
+            _ => return,
+        };
+        let Some(pack) = pack.cloned() else {
+            self.foreign = found;
+            self.waiting.clear();
+            return;
+        };
+        self.identify();
+        let header = |role: Role| self.header(role, &pack);
+        let roles = [Role::Agv, Role::MasterControl];
+        let sides = roles.map(|role| Side::begin(role, header(role), begun, self.timed, scene));
+        self.sides = Some(Sides {
+            pack,
+            all: sides.into_iter().flatten().collect(),
+        });
+        for arrived in std::mem::take(&mut self.waiting) {
+            self.show(&arrived, scene);
+        }
+    }
+
+    /// Where the topics do not say who the vehicle is, its messages do.
+    fn identify(&mut self) {
+        let said = self.waiting.iter().filter_map(|arrived| arrived.entry.json());
+        for message in said {
+            let text = |member: &str| message.get(member).and_then(Value::as_str).map(str::to_owned);
+            for (own, member) in [
+                (&mut self.manufacturer, "manufacturer"),
+                (&mut self.serial_number, "serialNumber"),
+            ] {
+                if own.is_empty() {
+                    *own = text(member).unwrap_or_default();
+                }
+            }
+        }
+    }
+
+    fn header(&self, role: Role, pack: &Pack) -> RunHeader {
+        let topics = self.named.all(pack.topics().iter().map(|rule| rule.name.as_str()));
+        let identity = json!({ "manufacturer": self.manufacturer, "serialNumber": self.serial_number });
+        let mut bindings = Map::new();
+        bindings.insert("time".to_owned(), Value::Object(TimeLimits::default().bindings()));
+        bindings.insert("device".to_owned(), identity.clone());
+        let vehicle = MockVehicle {
+            manufacturer: self.manufacturer.clone(),
+            serial_number: self.serial_number.clone(),
+            topics: topics.clone(),
+        };
+        let vehicles = if role == Role::MasterControl {
+            bindings.insert("vehicle".to_owned(), identity);
+            vec![vehicle]
+        } else {
+            Vec::new()
+        };
+        RunHeader {
+            format: "vda5050-tck.journal/1".to_owned(),
+            role: role.word().to_owned(),
+            protocol: pack.version.to_string(),
+            manufacturer: self.manufacturer.clone(),
+            serial_number: self.serial_number.clone(),
+            topics,
+            vehicles,
+            vantage: "subscriber".to_owned(),
+            bindings,
+            ..RunHeader::default()
+        }
+    }
+
+    /// Shows a message to both sides.
+    fn show(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+        let Some(Sides { pack, all }) = &mut self.sides else {
+            return;
+        };
+        let Some(rule) = pack.topic(&arrived.name) else { return };
+        let publisher = rule.publisher;
+        let message = arrived.entry.json();
+        if !arrived.stale {
+            let step = self.continuity.note(&arrived.name, message, arrived.at.moment);
+            let begins_anew = arrived.name == "connection";
+            for side in all.iter_mut() {
+                match step {
+                    Step::Hole(since) => side.broken(since),
+                    // Nobody knows what becomes of a vehicle while it is away.
+                    Step::Begins if begins_anew && side.role == Role::MasterControl => side.broken(arrived.at.moment),
+                    Step::Follows if arrived.name == "state" => side.confirmed(scene),
+                    _ => {}
+                }
+            }
+            if step == Step::Follows && all.iter().any(|side| !side.watches()) {
+                self.continuity.forget();
+                self.continuity.learn(&arrived.name, message);
+                for side in all.iter_mut() {
+                    side.broken(Moment::from_micros(u64::MAX));
+                    side.mended(scene);
+                }
+            }
+        }
+        // How far the clocks are apart is not known to be the mistake of the device.
+        let word = publisher.word();
+        let said = message.and_then(timestamp).filter(|_| !arrived.stale);
+        if let Some(said) = said.filter(|_| !self.clocks.contains_key(word)) {
+            let apart = said.as_microsecond().saturating_sub(arrived.at.utc.as_microsecond());
+            self.clocks.insert(word, apart);
+        }
+        for side in all {
+            let own = side.role == publisher;
+            side.messages += u64::from(own);
+            if arrived.stale && !own {
+                continue;
+            }
+            let apart = self.clocks.get(word).copied().unwrap_or_default();
+            let entry = of_side(arrived, own, apart);
+            side.observe(&entry, arrived.at.utc, scene);
+            if own && publisher == Role::Agv {
+                side.confirmed(scene);
+            }
+        }
+    }
+
+    /// What came out.
+    pub fn finish(mut self, scene: Scene<'_>) -> VehicleResult {
+        let mut rest: Vec<Arrived> = self.sorted.values_mut().flat_map(Sorted::all).collect();
+        rest.sort_by_key(|arrived| arrived.number);
+        for arrived in rest {
+            self.pass(arrived, scene);
+        }
+        if self.sides.is_none() && self.foreign.is_none() {
+            self.settle(scene, true);
+        }
+        let (protocol, sides) = match self.sides {
+            Some(Sides { pack, all }) => (
+                Some(pack.version.to_string()),
+                all.into_iter()
+                    .filter(|side| side.messages > 0)
+                    .map(|side| side.finish(scene))
+                    .collect(),
+            ),
+            None => (None, Vec::new()),
+        };
+        let not_judged = protocol.is_none().then(|| match &self.foreign {
+            Some(version) => format!("protocol version {version}, which this program does not have"),
+            None => "no message names a protocol version".to_owned(),
+        });
+        VehicleResult {
+            manufacturer: self.manufacturer,
+            serial_number: self.serial_number,
+            topics: self
+                .named
+                .all(["{topic}"].into_iter())
+                .into_values()
+                .next()
+                .unwrap_or_default(),
+            protocol,
+            not_judged,
+            messages: self.counts,
+            holes: self.continuity.holes,
+            twice: self.twice,
+            retained: self.stale,
+            vantage: "subscriber".to_owned(),
+            sides,
+        }
+    }
+}
+
+/// The record as the side that is judged is shown it: its own messages came, those of the other side were sent.
+fn of_side(arrived: &Arrived, own: bool, apart: i64) -> Arc<Entry> {
+    let Event::Message {
+        topic,
+        qos,
+        retain,
+        dup,
+        payload,
+    } = arrived.entry.event().clone()
+    else {
+        return Arc::clone(&arrived.entry);
+    };
+    let event = if own {
+        Event::Message {
+            topic,
+            qos,
+            retain,
+            dup,
+            payload,
+        }
+    } else {
+        Event::Sent {
+            topic,
+            qos,
+            retain,
+            payload,
+        }
+    };
+    let utc = arrived.at.utc.as_microsecond().saturating_add(apart);
+    let record = Record {
+        seq: arrived.number,
+        at: Stamp {
+            moment: arrived.at.moment,
+            utc: jiff::Timestamp::from_microsecond(utc).unwrap_or(arrived.at.utc),
+        },
+        source: Source::Link,
+        direction: Some(if own {
+            Direction::FromDevice
+        } else {
+            Direction::ToDevice
+        }),
+        event,
+    };
+    Entry::beside(&arrived.entry, record)
+}
+
+/// What a message says of its time.
+fn timestamp(message: &Value) -> Option<jiff::Timestamp> {
+    message.get("timestamp")?.as_str()?.parse().ok()
+}
+
+/// What a message says of its version, if it is one.
+fn version(message: &Value) -> Option<String> {
+    let said = message.get("version")?.as_str()?;
+    let short: String = said.chars().take(32).collect();
+    short.parse::<crate::pack::Version>().ok().map(|_| short)
+}

@@ -1,0 +1,91 @@
+//! Opening recordings: files and standard input, packed with gzip or zstd or not packed.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
+
+use super::CaptureError;
+
+/// How much is read at once.
+const BUFFER: usize = 1 << 16;
+const GZIP: &[u8] = &[0x1f, 0x8b];
+const ZSTD: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
+
+/// Opens a recording; `-` is standard input.
+///
+/// # Errors
+/// What the operating system says, or what is wrong with the packing.
+pub fn open(path: &Path) -> Result<Box<dyn BufRead>, CaptureError> {
+    let name = path.display().to_string();
+    let raw: Result<Box<dyn Read>, io::Error> = if path.as_os_str() == "-" {
+        Ok(Box::new(io::stdin()))
+    } else {
+        File::open(path).map(|file| Box::new(file) as Box<dyn Read>)
+    };
+    raw.and_then(unpacked).map_err(|source| CaptureError { name, source })
+}
+
+/// What is read, unpacked if it is packed.
+///
+/// # Errors
+/// What is wrong with the packing.
+pub fn unpacked(raw: Box<dyn Read>) -> io::Result<Box<dyn BufRead>> {
+    let mut raw = BufReader::with_capacity(BUFFER, raw);
+    // A pipe may give its first bytes one by one.
+    let begin = first_bytes(&mut raw)?;
+    let whole = io::Cursor::new(begin.clone()).chain(raw);
+    Ok(if begin.starts_with(GZIP) {
+        Box::new(BufReader::with_capacity(
+            BUFFER,
+            flate2::bufread::MultiGzDecoder::new(whole),
+        ))
+    } else if begin.starts_with(ZSTD) {
+        let frames = ruzstd::decoding::StreamingDecoder::new(whole)
+            .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.to_string()))?;
+        Box::new(BufReader::with_capacity(BUFFER, frames))
+    } else {
+        Box::new(whole)
+    })
+}
+
+fn first_bytes(raw: &mut impl Read) -> io::Result<Vec<u8>> {
+    let mut begin = Vec::new();
+    raw.by_ref().take(ZSTD.len() as u64).read_to_end(&mut begin)?;
+    Ok(begin)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    fn text_of(bytes: Vec<u8>) -> io::Result<String> {
+        let mut text = String::new();
+        unpacked(Box::new(io::Cursor::new(bytes)))?.read_to_string(&mut text)?;
+        Ok(text)
+    }
+
+    #[test]
+    fn packed_or_not_the_text_is_the_same() {
+        let text = "a/b {}\n".repeat(1000);
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(text.as_bytes()).expect("packed");
+        let zstd = ruzstd::encoding::compress_to_vec(text.as_bytes(), ruzstd::encoding::CompressionLevel::Fastest);
+        assert_eq!(text_of(gzip.finish().expect("packed")).expect("gzip"), text);
+        assert_eq!(text_of(zstd).expect("zstd"), text);
+        assert_eq!(text_of(text.clone().into_bytes()).expect("plain"), text);
+        assert_eq!(text_of(Vec::new()).expect("empty"), "");
+        assert_eq!(text_of(b"{".to_vec()).expect("short"), "{");
+    }
+
+    #[test]
+    fn a_broken_packing_is_an_error() {
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(&[b'x'; 4000]).expect("packed");
+        let mut bytes = gzip.finish().expect("packed");
+        bytes.truncate(bytes.len() - 9);
+        assert!(text_of(bytes).is_err());
+        assert!(text_of(vec![0x28, 0xb5, 0x2f, 0xfd, 1, 2, 3]).is_err());
+    }
+}

@@ -1,0 +1,55 @@
+//! `audit`: judge what was recorded.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Format, SuiteArgs};
+
+const AUDIT_HELP: &str = "\
+Examples:
+  vda5050-tck audit site.jsonl                               what mosquitto_sub -F %J or %j printed
+  mosquitto_sub -v -t 'uagv/#' | vda5050-tck audit -         until it ends
+  vda5050-tck audit monday.jsonl.gz tuesday.jsonl.zst        as one stream, ordered by time
+  vda5050-tck audit log.jsonl --time ts --topic t --payload p
+
+What a recording cannot show is not judged: it may begin in the middle or lack messages.";
+
+/// `audit`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AUDIT_HELP)]
+pub struct Audit {
+    /// Recordings, packed with gzip or zstd or not; `-` is standard input
+    #[arg(value_name = "CAPTURE", required = true)]
+    pub captures: Vec<PathBuf>,
+    /// The member that holds the time; a dot leads inside
+    #[arg(long, value_name = "MEMBER", help_heading = "Lines of another form")]
+    pub time: Option<String>,
+    /// The member that holds the topic
+    #[arg(long, value_name = "MEMBER", help_heading = "Lines of another form")]
+    pub topic: Option<String>,
+    /// The member that holds the payload: an object, a text, or base64
+    #[arg(long, value_name = "MEMBER", help_heading = "Lines of another form")]
+    pub payload: Option<String>,
+    /// Leave out what was recorded before, such as 2026-01-31T08:00:00Z
+    #[arg(long, value_name = "TIME", help_heading = "Selection")]
+    pub from: Option<jiff::Timestamp>,
+    /// Leave out what was recorded after
+    #[arg(long, value_name = "TIME", help_heading = "Selection")]
+    pub to: Option<jiff::Timestamp>,
+    /// Only this vehicle: its serial number, or manufacturer/number; may be repeated
+    #[arg(long, value_name = "VEHICLE", help_heading = "Selection")]
+    pub vehicle: Vec<String>,
+    /// Only this monitor, or what decides this requirement; `state/*` names many; may be repeated
+    #[arg(long, value_name = "NAME", help_heading = "Selection")]
+    pub only: Vec<String>,
+    /// How topics are built, with {serialNumber}, and {interface}, {majorVersion}, {manufacturer} and {topic} where they have them
+    #[arg(long, value_name = "TEMPLATE", help_heading = "Selection")]
+    pub topic_template: Option<String>,
+    /// How results are written to standard output
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+    /// Which suites.
+    #[command(flatten)]
+    pub suites: SuiteArgs,
+}

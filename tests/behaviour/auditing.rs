@@ -1,0 +1,131 @@
+//! `audit`: recordings of several tools, and what is found in them.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::bench::{Bench, QUICK};
+use crate::tool::{Ended, run, run_in};
+
+fn capture(name: &str) -> String {
+    format!("{}/fixtures/captures/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn page(ended: Ended) -> String {
+    let folder = format!("{}/fixtures/captures/", env!("CARGO_MANIFEST_DIR"));
+    ended.stdout.replace(&folder, "")
+}
+
+fn result(ended: &Ended) -> Value {
+    serde_json::from_str(&ended.stdout).unwrap()
+}
+
+#[test]
+fn faultless_traffic_of_both_sides_and_two_versions_is_accused_of_nothing() {
+    insta::assert_snapshot!(
+        "faultless",
+        page(run(&["audit", &capture("two-versions.jsonl")]).code(0))
+    );
+}
+
+#[test]
+fn a_vehicle_that_reports_wrongly_is_found_by_message_and_place() {
+    let ended = run(&["audit", &capture("horizon-missing.jsonl"), "--only", "state/*"]).code(1);
+    insta::assert_snapshot!("found", page(ended));
+}
+
+#[test]
+fn what_mosquitto_sub_prints_is_judged_between_the_lines_of_a_log() {
+    insta::assert_snapshot!("printed", page(run(&["audit", &capture("printed.txt")]).code(0)));
+}
+
+#[test]
+fn vehicles_times_and_monitors_can_be_chosen() {
+    let two = capture("two-versions.jsonl");
+    let only = result(&run(&["audit", &two, "--vehicle", "vda5050-tck/mock-1", "--format", "json"]).code(0));
+    assert_eq!(only["vehicles"].as_array().unwrap().len(), 1);
+    assert_eq!(only["vehicles"][0]["protocol"], "2.1.0");
+    let none = run(&["audit", &two, "--vehicle", "nobody"]).code(4);
+    assert!(none.stdout.contains("No message"), "{}", none.stdout);
+    run(&["audit", &two, "--to", "2000-01-01T00:00:00Z"]).code(4);
+    run(&["audit", &two, "--only", "no/such"]).code(2).says("no/such");
+    run(&["audit", &two, "--topic-template", "hall/{topic}"])
+        .code(2)
+        .says("serialNumber");
+    run(&["audit", &capture("printed.txt"), "--from", "2000-01-01T00:00:00Z"])
+        .code(2)
+        .says("printed.txt:4");
+    run(&["audit", "missing.jsonl"]).code(2).says("missing.jsonl");
+}
+
+#[test]
+fn several_recordings_are_one_stream_and_what_two_recorders_saw_counts_once() {
+    let bench = Bench::new();
+    let text = fs::read_to_string(capture("two-versions.jsonl")).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let part = |name: &str, wanted: &dyn Fn(usize) -> bool| {
+        let all = lines.iter().enumerate().filter(|(at, _)| wanted(*at));
+        let text: String = all.map(|(_, line)| format!("{line}\n")).collect();
+        fs::write(bench.path().join(name), text).unwrap();
+    };
+    part("odd.jsonl", &|at| at % 2 == 1);
+    part("even.jsonl", &|at| at % 2 == 0);
+    part("again.jsonl", &|at| at > 50);
+    let whole = result(&run(&["audit", &capture("two-versions.jsonl"), "--format", "json"]).code(0));
+    let parts = run_in(
+        bench.path(),
+        &["audit", "odd.jsonl", "even.jsonl", "again.jsonl", "--format", "json"],
+    );
+    let parts = result(&parts.code(0));
+    for vehicle in 0..2 {
+        let requirements = |result: &Value| result["vehicles"][vehicle]["sides"][0]["requirements"].clone();
+        assert_eq!(requirements(&whole), requirements(&parts));
+        assert!(parts["vehicles"][vehicle]["twice"].as_u64().unwrap() > 20);
+        assert_eq!(parts["vehicles"][vehicle]["holes"], whole["vehicles"][vehicle]["holes"]);
+    }
+}
+
+#[test]
+fn the_journal_of_a_run_gives_what_the_run_gave() {
+    let bench = Bench::new();
+    bench.run(&["run", "--virtual", "--fault", "header-id-constant", QUICK]);
+    let bundle = bench.bundle();
+    let run_result: Value = serde_json::from_str(&fs::read_to_string(bundle.join("result.json")).unwrap()).unwrap();
+    let journal = bundle.join("journal.jsonl").display().to_string();
+    let audited = result(&run(&["audit", &journal, "--format", "json"]).code(1));
+    let of_run = run_result["monitors"].as_array().unwrap().iter().flat_map(|monitor| {
+        let findings = monitor["findings"].as_array().into_iter().flatten();
+        findings.map(|finding| {
+            (
+                monitor["id"].to_string(),
+                finding["requirement"].to_string(),
+                finding["count"].to_string(),
+            )
+        })
+    });
+    let side = &audited["vehicles"][0]["sides"][0];
+    let of_audit = ["findings", "information"]
+        .into_iter()
+        .flat_map(|kind| side[kind].as_array().unwrap());
+    let of_audit = of_audit.map(|finding| {
+        (
+            finding["monitor"].to_string(),
+            finding["requirement"].to_string(),
+            finding["count"].to_string(),
+        )
+    });
+    let sorted = |mut all: Vec<_>| {
+        all.sort();
+        all
+    };
+    assert_eq!(sorted(of_run.collect()), sorted(of_audit.collect()));
+}
+
+#[test]
+fn what_holds_no_message_is_4_and_says_so() {
+    let bench = Bench::new();
+    fs::write(bench.path().join("log.txt"), "nothing\nhere a/b {}\n").unwrap();
+    run_in(bench.path(), &["audit", "log.txt"])
+        .code(4)
+        .prints("2 of them no message");
+}
