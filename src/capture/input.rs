@@ -40,12 +40,43 @@ pub fn unpacked(raw: Box<dyn Read>) -> io::Result<Box<dyn BufRead>> {
             flate2::bufread::MultiGzDecoder::new(whole),
         ))
     } else if begin.starts_with(ZSTD) {
-        let frames = ruzstd::decoding::StreamingDecoder::new(whole)
-            .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.to_string()))?;
-        Box::new(BufReader::with_capacity(BUFFER, frames))
+        Box::new(BufReader::with_capacity(BUFFER, Frames::new(Box::new(whole))?))
     } else {
         Box::new(whole)
     })
+}
+
+type Packed = Box<dyn BufRead>;
+
+/// Zstd, one frame after the other: what packs in parallel writes many.
+struct Frames {
+    frame: Option<ruzstd::decoding::StreamingDecoder<Packed, ruzstd::decoding::FrameDecoder>>,
+}
+
+impl Frames {
+    fn new(packed: Packed) -> io::Result<Self> {
+        let frame = ruzstd::decoding::StreamingDecoder::new(packed)
+            .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.to_string()))?;
+        Ok(Self { frame: Some(frame) })
+    }
+}
+
+impl Read for Frames {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while let Some(frame) = &mut self.frame {
+            let read = frame.read(buffer)?;
+            if read > 0 || buffer.is_empty() {
+                return Ok(read);
+            }
+            let Some(mut rest) = self.frame.take().map(|frame| frame.into_inner()) else {
+                break;
+            };
+            if !rest.fill_buf()?.is_empty() {
+                *self = Self::new(rest)?;
+            }
+        }
+        Ok(0)
+    }
 }
 
 fn first_bytes(raw: &mut impl Read) -> io::Result<Vec<u8>> {
@@ -73,6 +104,7 @@ mod tests {
         gzip.write_all(text.as_bytes()).expect("packed");
         let zstd = ruzstd::encoding::compress_to_vec(text.as_bytes(), ruzstd::encoding::CompressionLevel::Fastest);
         assert_eq!(text_of(gzip.finish().expect("packed")).expect("gzip"), text);
+        assert_eq!(text_of(zstd.repeat(2)).expect("two frames"), text.repeat(2));
         assert_eq!(text_of(zstd).expect("zstd"), text);
         assert_eq!(text_of(text.clone().into_bytes()).expect("plain"), text);
         assert_eq!(text_of(Vec::new()).expect("empty"), "");

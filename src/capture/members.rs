@@ -68,14 +68,13 @@ fn skip_value(bytes: &[u8], from: usize) -> Option<usize> {
                 continue;
             }
             b'{' | b'[' => depth += 1,
-            b'}' | b']' if depth == 0 => return (at > from).then_some(at),
+            b'}' | b']' | b',' if depth == 0 => return (at > from).then_some(at),
             b'}' | b']' => {
                 depth -= 1;
                 if depth == 0 {
                     return Some(at + 1);
                 }
             }
-            b',' if depth == 0 => return (at > from).then_some(at),
             _ => {}
         }
         at += 1;
