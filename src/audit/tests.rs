@@ -139,8 +139,8 @@ fn what_is_wrong_is_found_with_its_place() {
         (
             Role::Agv,
             "order-acceptance/base-and-horizon",
-            "header-id-constant",
-            "HDR-02",
+            "boolean-as-text",
+            "JSON-07",
         ),
         (Role::MasterControl, "dispatch/", "other-serial-number", "HDR-05"),
     ] {

@@ -162,7 +162,7 @@ impl Vehicle {
         if self.foreign.is_some() {
             return;
         }
-        let of_vehicle = !matches!(arrived.name.as_str(), "order" | "instantActions");
+        let of_vehicle = !arrived.stale && !matches!(arrived.name.as_str(), "order" | "instantActions");
         self.waiting.push(arrived);
         if of_vehicle || self.waiting.len() >= WAITING {
             self.settle(scene, self.waiting.len() >= WAITING);
@@ -173,7 +173,9 @@ impl Vehicle {
     fn settle(&mut self, scene: Scene<'_>, at_last: bool) {
         let commands = |arrived: &&Arrived| matches!(arrived.name.as_str(), "order" | "instantActions");
         let (sent, said): (Vec<&Arrived>, Vec<&Arrived>) = self.waiting.iter().partition(commands);
-        let versions = said.iter().chain(sent.iter().filter(|_| at_last));
+        // What was stored may be from before a change of the vehicle's software.
+        let lately = said.iter().filter(|arrived| at_last || !arrived.stale);
+        let versions = lately.chain(sent.iter().filter(|_| at_last));
         let mut versions = versions.filter_map(|arrived| version(arrived.entry.json()?));
         let found = versions.next();
         let (pack, begun) = match (&found, self.waiting.first()) {
