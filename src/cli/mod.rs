@@ -3,14 +3,18 @@
 pub mod args;
 mod audit;
 mod device;
+mod discover;
 pub mod exit;
 mod list;
+mod plan;
 mod problem;
 mod qualify;
 mod report;
 mod run;
 mod screen;
 mod select;
+mod selection;
+mod shell;
 mod simulate;
 mod validate;
 
@@ -48,6 +52,10 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments),
         Command::Qualify(arguments) => qualify::qualify(arguments),
+        Command::Discover(arguments) => discover::discover(arguments),
+        Command::Init(arguments) => discover::init(arguments),
+        Command::Completions(arguments) => shell::completions(arguments),
+        Command::Man(arguments) => shell::man(arguments),
     };
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();

@@ -8,8 +8,7 @@ use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
 use crate::journal::file::{self, Recording};
 use crate::judge;
-use crate::report::text;
-use crate::report::{compare, json, manifest};
+use crate::report::{compare, json, manifest, overview};
 use crate::run::{Bundle, Library, sources, write_all};
 
 /// `report`.
@@ -48,11 +47,17 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
             super::print(&json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?)?
         }
         Format::Text => {
-            let bundle = text::Bundle {
+            let bundle = overview::Bundle {
                 report: Some(&shown),
                 root: Some(&root),
             };
-            super::print(&text::summary(&result, bundle, super::color()))?
+            super::print(&overview::overview(
+                &result,
+                &quoted,
+                Some(&journal),
+                bundle,
+                super::color(),
+            ))?
         }
     };
     Ok(Exit::of(result.verdict))

@@ -12,7 +12,7 @@ use super::args;
 use super::device::{check_faults, pack_of, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
-use super::screen::Screen;
+use super::screen::{Screen, Show};
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::judge::RunJudge;
@@ -48,7 +48,14 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     let all = library.tests(role, &pack.id);
-    let mut tests = super::select::select(&all, &arguments.tests)?;
+    let mut tests = super::selection::selected(
+        &all,
+        &arguments.tests,
+        &arguments.selection,
+        &arguments.output.out,
+        &library,
+        &pack,
+    )?;
     if let Some(shard) = arguments.shard {
         let mut place = 0;
         tests.retain(|_| {
@@ -101,6 +108,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
             draw,
             run,
             command: std::env::args().collect(),
+            fail_fast: arguments.selection.fail_fast,
         },
         library,
         pack,
@@ -110,6 +118,9 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         certifies: arguments.certifies,
         vehicles: arguments.vehicles.map(|count| count as usize),
     };
+    if arguments.selection.plan {
+        return job.plan(arguments, built_in, &surroundings);
+    }
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -168,7 +179,7 @@ pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
 }
 
 /// Ctrl-C once ends the run in good order, twice at once.
-fn interrupts() -> watch::Receiver<bool> {
+pub(super) fn interrupts() -> watch::Receiver<bool> {
     let (sender, receiver) = watch::channel(false);
     tokio::spawn(async move {
         let mut times = 0;
@@ -197,6 +208,34 @@ impl Job {
         bundle.map_err(environment)
     }
 
+    /// Shows what would be run.
+    fn plan(self, arguments: &args::Run, built_in: bool, surroundings: &Surroundings) -> Result<Exit, Problem> {
+        let mut run = if built_in {
+            SocketRun::built_in(self.built_in_device(arguments)?, &[], &self.library, &self.pack)
+        } else {
+            self.of_profile(arguments, surroundings)?
+        };
+        if self.no_motion {
+            run.device.stand_still(NO_MOTION);
+        }
+        run.request = self.request;
+        super::plan::show(&run.plan(&self.library, &self.pack), self.output.format)
+    }
+
+    fn of_profile(&self, arguments: &args::Run, surroundings: &Surroundings) -> Result<SocketRun, Problem> {
+        let profile = arguments.device.profile.as_deref();
+        let place = Place {
+            folder: profile
+                .and_then(Path::parent)
+                .map_or_else(PathBuf::new, Path::to_path_buf),
+            attended: console::user_attended(),
+            vehicles: self.vehicles,
+        };
+        let mut run = SocketRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
+        run.device.claims_add = !self.certifies;
+        Ok(run)
+    }
+
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
@@ -213,6 +252,7 @@ impl Job {
         run.begun = utc;
         run.run.clone_from(&self.request.run);
         run.command.clone_from(&self.request.command);
+        run.fail_fast = self.request.fail_fast;
         if self.no_motion {
             run.motion = Err(NO_MOTION.to_owned());
         }
@@ -266,16 +306,7 @@ impl Job {
         interrupt: watch::Receiver<bool>,
         surroundings: &Surroundings,
     ) -> Result<Exit, Problem> {
-        let profile = arguments.device.profile.as_deref();
-        let place = Place {
-            folder: profile
-                .and_then(Path::parent)
-                .map_or_else(PathBuf::new, Path::to_path_buf),
-            attended: console::user_attended(),
-            vehicles: self.vehicles,
-        };
-        let mut run = SocketRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
-        run.device.claims_add = !self.certifies;
+        let run = self.of_profile(arguments, surroundings)?;
         self.over_sockets(run, interrupt).await
     }
 
@@ -306,13 +337,17 @@ impl Job {
     }
 
     fn screen(&self, device: &Participant) -> Screen {
-        let results = self.output.format == args::Format::Text;
+        let show = match (self.output.format, self.output.quiet, self.output.failures) {
+            (args::Format::Json, ..) | (_, true, _) => Show::Nothing,
+            (_, _, true) => Show::Failures,
+            _ => Show::All,
+        };
         if self.output.verbose > 0 {
             for setting in &self.effective.settings {
                 eprintln!("{} = {}  ({})", setting.name, setting.value, setting.origin);
             }
         }
-        Screen::new(device.to_string(), self.pack.version.to_string(), results)
+        Screen::new(device.to_string(), self.pack.version.to_string(), show)
     }
 }
 

@@ -16,14 +16,26 @@ use crate::verdict::{Outcome, Verdict};
 pub struct Screen {
     terminal: Terminal<io::Stdout, io::Stderr>,
     title: RunTitle,
+    show: Show,
+}
+
+/// Which tests a person wants to see while a run goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Show {
+    /// Every test.
+    All,
+    /// Those that failed or broke.
+    Failures,
+    /// None; standard output is for the verdict, or for data.
+    Nothing,
 }
 
 impl Screen {
-    /// A screen for a device; `results` is false when standard output is for data only.
+    /// A screen for a device.
     #[must_use]
-    pub fn new(device: String, protocol: String, results: bool) -> Self {
+    pub fn new(device: String, protocol: String, show: Show) -> Self {
         let options = TerminalOptions {
-            results,
+            results: show != Show::Nothing,
             ..TerminalOptions::of_process()
         };
         Self {
@@ -34,6 +46,7 @@ impl Screen {
                 tests: 0,
                 not_applicable: 0,
             },
+            show,
         }
     }
 
@@ -72,9 +85,13 @@ impl run::Progress for Screen {
     }
 
     fn test_ended(&mut self, result: &TestResult) {
+        let verdict = result.verdict.unwrap_or(Verdict::Error);
+        if self.show == Show::Failures && verdict < Verdict::Error {
+            return;
+        }
         self.terminal.test_ended(&TestLine {
             id: result.id.clone(),
-            outcome: Outcome::Judged(result.verdict.unwrap_or(Verdict::Error)),
+            outcome: Outcome::Judged(verdict),
             elapsed: Duration::from_secs_f64(result.seconds.clamp(0.0, 1e6)),
             reason: result.reason.clone(),
         });

@@ -28,7 +28,7 @@ pub fn select(all: &[Arc<Test>], patterns: &[String]) -> Result<Vec<Arc<Test>>, 
 }
 
 /// A pattern is an id, the group or table before a `/` or `[`, or has `*` for anything.
-fn matches(pattern: &str, id: &str) -> bool {
+pub(super) fn matches(pattern: &str, id: &str) -> bool {
     let below = |separator: char| id.strip_prefix(pattern).is_some_and(|rest| rest.starts_with(separator));
     id == pattern || below('/') || below('[') || (pattern.contains('*') && glob(pattern.as_bytes(), id.as_bytes()))
 }

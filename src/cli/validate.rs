@@ -84,7 +84,10 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
     if extension == "toml" || (extension != "json" && looks_like_toml(text)) {
         let folder = path.parent().unwrap_or(Path::new(""));
         return Ok(match profile::check(&Source::new(name, text), folder) {
-            Ok(_) => Found::Good("a profile".to_owned()),
+            Ok(effective) => match super::plan::validated(&effective, library) {
+                Ok(what) => Found::Good(what),
+                Err(all) => Found::Bad(all),
+            },
             Err(all) => Found::Bad(all),
         });
     }

@@ -226,6 +226,7 @@ impl Taken<'_> {
                 .iter()
                 .map(|(deviation, _)| deviation.clone())
                 .collect(),
+            known: self.layer.known.iter().map(|(known, _)| known.clone()).collect(),
             hooks: self
                 .layer
                 .hooks
@@ -257,6 +258,11 @@ impl Taken<'_> {
         settings.extend(self.layer.deviations.iter().map(|(deviation, origin)| Setting {
             name: format!("deviations.{}", deviation.requirement),
             value: deviation.reason.clone(),
+            origin: origin.to_string(),
+        }));
+        settings.extend(self.layer.known.iter().map(|(known, origin)| Setting {
+            name: format!("known.{}", known.id),
+            value: format!("{} (until {})", known.reason, known.until),
             origin: origin.to_string(),
         }));
         settings.extend(self.layer.hooks.iter().map(|(name, (hook, origin))| {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::hooks::Hook;
 use super::value::Value;
-use super::{Deviation, LayoutList};
+use super::{Deviation, KnownFailure, LayoutList};
 use crate::diagnostic::Span;
 
 /// Where a value came from.
@@ -43,6 +43,7 @@ pub(super) struct Layer {
     pub list: Option<(LayoutList, Origin)>,
     pub hooks: BTreeMap<String, (Hook, Origin)>,
     pub deviations: Vec<(Deviation, Origin)>,
+    pub known: Vec<(KnownFailure, Origin)>,
 }
 
 impl Layer {
@@ -70,6 +71,10 @@ impl Layer {
             self.deviations
                 .retain(|(lower, _)| lower.requirement != deviation.requirement);
             self.deviations.push((deviation, origin));
+        }
+        for (known, origin) in upper.known {
+            self.known.retain(|(lower, _)| lower.id != known.id);
+            self.known.push((known, origin));
         }
         self
     }

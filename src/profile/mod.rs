@@ -77,6 +77,8 @@ pub struct Profile {
     pub maps: Vec<PathBuf>,
     /// `[deviations]`, in the order of the file.
     pub deviations: Vec<Deviation>,
+    /// `[known]`, in the order of the file.
+    pub known: Vec<KnownFailure>,
     /// `[hooks]` by name; all are for the role of the device.
     pub hooks: BTreeMap<String, Hook>,
 }
@@ -385,6 +387,19 @@ pub struct LayoutEdge {
     pub end: String,
     /// What a line-guided vehicle is told at the junction where it begins.
     pub direction: Option<String>,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// A failure that a pipeline knows: the verdict stays, and so does the report; only the exit code changes.
+#[derive(Clone, Debug)]
+pub struct KnownFailure {
+    /// A requirement, a test or a monitor; not necessarily one that is there.
+    pub id: String,
+    /// Why it is borne.
+    pub reason: String,
+    /// The last day on which it is, such as `2030-12-31`.
+    pub until: String,
     /// Where it is written.
     pub span: Span,
 }

@@ -4,15 +4,19 @@
 //! [`sources::Sources`] it quotes: the same input gives the same bytes. Running tests and judging them is
 //! left to others.
 
+pub mod advice;
 pub mod clean;
 pub mod compare;
 pub mod coverage;
+pub mod findings;
 pub mod fleet;
 pub mod headline;
 pub mod html;
 pub mod json;
 pub mod junit;
+pub mod known;
 pub mod manifest;
+pub mod overview;
 pub mod sequence;
 pub mod sources;
 pub mod statement;

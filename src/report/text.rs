@@ -1,6 +1,6 @@
 //! What the terminal says about a result, as plain strings.
 //!
-//! One line per test, a block per finding laid out as rustc would lay it out, and the summary at the end.
+//! One line per test, and a block per finding laid out as rustc would lay it out. The overview of a run is in `overview`.
 //! When and where to print is left to the command line. Device strings are cleaned before they get here or
 //! here; colour is added last and only on request.
 
@@ -11,10 +11,9 @@ use console::{Style, measure_text_width};
 use super::clean::{block, line, short};
 use super::headline::reference;
 use super::sources::Sources;
-use super::statement::{self, Counts, many, seconds};
-use super::undecided;
+use super::statement::{self, many, seconds};
 use crate::journal::Journal;
-use crate::result::{Decision, MonitorResult, RunResult, TestResult, Waited};
+use crate::result::{Decision, MonitorResult, TestResult, Waited};
 use crate::verdict::Verdict;
 
 /// Width the times at the end of a line are aligned to, in columns.
@@ -34,7 +33,7 @@ impl Color {
         style.force_styling(self == Self::Always)
     }
 
-    fn verdict(self, verdict: Option<Verdict>) -> Style {
+    pub(super) fn verdict(self, verdict: Option<Verdict>) -> Style {
         let style = Style::new().bold();
         self.style(match verdict {
             Some(Verdict::Pass) => style.green(),
@@ -45,7 +44,7 @@ impl Color {
         })
     }
 
-    fn dim(self) -> Style {
+    pub(super) fn dim(self) -> Style {
         self.style(Style::new().dim())
     }
 
@@ -55,7 +54,7 @@ impl Color {
 }
 
 /// What stands in front of a line: `PASS`, `WARN`, `????`, `ERR`, `FAIL`, `n/a`; six columns with the gap.
-fn tag(verdict: Option<Verdict>) -> &'static str {
+pub(super) fn tag(verdict: Option<Verdict>) -> &'static str {
     match verdict {
         Some(Verdict::Pass) => "PASS  ",
         Some(Verdict::Warning) => "WARN  ",
@@ -240,94 +239,4 @@ pub fn monitor(monitor: &MonitorResult, color: Color) -> String {
         let _ = writeln!(text, "      {}", short(&line(&finding.message), 400));
     }
     text
-}
-
-/// Where the bundle of a run is.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Bundle<'a> {
-    /// Path of `report.html`, as the user would type it.
-    pub report: Option<&'a str>,
-    /// Root hash of the manifest.
-    pub root: Option<&'a str>,
-}
-
-/// The end of a run: counts per verdict, the statement, where the report is, the root hash.
-#[must_use]
-pub fn summary(result: &RunResult, bundle: Bundle<'_>, color: Color) -> String {
-    let mut text = String::new();
-    let gaps = statement::gaps(result);
-    let rows = [
-        (
-            "tests",
-            statement::tests(result),
-            vec![(statement::tests(result).none, "not applicable")],
-        ),
-        (
-            "monitors",
-            statement::monitors(result),
-            vec![(statement::monitors(result).none, "nothing to judge")],
-        ),
-        (
-            "requirements",
-            statement::requirements(result),
-            vec![
-                (gaps.not_decided, "not decided"),
-                (gaps.not_testable, "not testable"),
-                (gaps.not_applicable, "not applicable"),
-            ],
-        ),
-    ];
-    for (name, counts, without) in rows.into_iter().filter(|(_, counts, _)| counts.total() > 0) {
-        let _ = writeln!(text, "{name:<13} {}", numbers(counts, &without, color));
-    }
-    if let Some(fleet) = &result.fleet {
-        let _ = writeln!(text, "{:<13} {}", "fleet", super::fleet::line(fleet));
-    }
-    causes(result, color, &mut text);
-    let style = color.verdict(result.verdict);
-    let word = result
-        .verdict
-        .map_or("NOTHING DECIDED".to_owned(), |verdict| verdict.word().to_uppercase());
-    let _ = writeln!(text, "\n{}  {}", style.apply_to(word), statement::statement(result));
-    if result.partial {
-        let reason = result
-            .partial_reason
-            .as_deref()
-            .unwrap_or("the run ended before its plan did");
-        let style = color.verdict(Some(Verdict::Error));
-        let _ = writeln!(text, "{}  {}", style.apply_to("PARTIAL"), line(reason));
-    }
-    if let Some(report) = bundle.report {
-        let _ = writeln!(text, "\nreport  {}", line(report));
-    }
-    if let Some(root) = bundle.root {
-        let _ = writeln!(text, "root    sha256:{}", line(root));
-    }
-    text
-}
-
-/// Why tests decided nothing, where several have one cause.
-fn causes(result: &RunResult, color: Color, text: &mut String) {
-    let groups = undecided::groups(result);
-    if groups.iter().all(|group| group.tests.len() < 2) {
-        return;
-    }
-    let _ = writeln!(text, "\nWhy nothing was decided:");
-    for group in groups {
-        let count = color.verdict(Some(Verdict::Inconclusive)).apply_to(group.count());
-        let _ = writeln!(text, "  {count}: {}", group.cause());
-        let _ = writeln!(text, "      {}", color.dim().apply_to(group.named()));
-    }
-}
-
-/// `12 pass, 1 warning, 1 fail, 2 not applicable`, worst last; noughts left out.
-fn numbers(counts: Counts, without: &[(usize, &'static str)], color: Color) -> String {
-    let with = Verdict::ALL.map(|verdict| (counts.get(Some(verdict)), Some(verdict), verdict.word()));
-    let without = without.iter().map(|(count, word)| (*count, None, *word));
-    with.into_iter()
-        .chain(without)
-        .filter(|(count, ..)| *count > 0)
-        .map(|(count, verdict, word)| color.verdict(verdict).apply_to(format!("{count} {word}")).to_string())
-        .collect::<Vec<_>>()
-        .join(", ")
 }

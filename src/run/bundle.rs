@@ -20,6 +20,9 @@ pub enum BundleError {
     },
 }
 
+/// The link in the folder of reports that leads to the run that was begun last.
+pub const LATEST: &str = "latest";
+
 /// A folder for the evidence of one run.
 #[derive(Debug)]
 pub struct Bundle {
@@ -42,6 +45,7 @@ impl Bundle {
             path: folder.clone(),
             reason,
         })?;
+        point_at_latest(reports, &folder);
         Ok(Self { folder })
     }
 
@@ -74,6 +78,23 @@ impl Bundle {
     }
 }
 
+/// Lets `reports/latest` lead to this run. It is a help for people and scripts: where there are no links, there is none.
+fn point_at_latest(reports: &Path, folder: &Path) {
+    let Ok(relative) = folder.strip_prefix(reports) else {
+        return;
+    };
+    let draft = reports.join(format!(".latest-{}", std::process::id()));
+    let _ = std::fs::remove_file(&draft);
+    #[cfg(unix)]
+    let linked = std::os::unix::fs::symlink(relative, &draft);
+    #[cfg(windows)]
+    let linked = std::os::windows::fs::symlink_dir(relative, &draft);
+    // A link is replaced in one step; a folder of that name is somebody else's, and stays.
+    if linked.is_ok() && std::fs::rename(&draft, reports.join(LATEST)).is_err() {
+        let _ = std::fs::remove_file(&draft);
+    }
+}
+
 /// A name of a device as part of a path: whatever it holds, it stays one folder.
 fn safe(name: &str) -> String {
     let kept = name.chars().map(|c| {
@@ -90,6 +111,22 @@ fn safe(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn the_latest_run_is_found_under_a_name_that_stays() {
+        let root = tempfile::tempdir().expect("folder");
+        for run in ["one", "two"] {
+            let bundle = Bundle::create(root.path(), "A", "1", jiff::Timestamp::UNIX_EPOCH, run).expect("bundle");
+            let latest = root.path().join(LATEST).canonicalize().expect("link");
+            assert_eq!(latest, bundle.folder().canonicalize().expect("bundle"));
+        }
+        let other = tempfile::tempdir().expect("folder");
+        let kept = other.path().join(LATEST).join("mine");
+        std::fs::create_dir_all(&kept).expect("folder");
+        Bundle::create(other.path(), "A", "1", jiff::Timestamp::UNIX_EPOCH, "r").expect("bundle");
+        assert!(kept.is_dir());
+    }
 
     #[test]
     fn a_hostile_name_stays_one_folder() {

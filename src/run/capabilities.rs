@@ -18,6 +18,16 @@ use crate::suite::model::{Need, SendAction, ServeBehaviour, Test, Verb};
 /// Found out from the first state, and said by no profile.
 const ACTIVE_MAP: &str = "active-map";
 
+/// How a reason begins that the factsheet of the device takes away.
+const NO_FACTSHEET: &str = "there is no factsheet ";
+/// The reason that the first state of the device takes away.
+const NO_ACTIVE_MAP: &str = "the first state shows no enabled map on which the vehicle stands";
+
+/// Whether only the device itself can say if this stands in the way.
+pub(super) fn is_said_by_the_device(why: &str) -> bool {
+    why.starts_with(NO_FACTSHEET) || why == NO_ACTIVE_MAP
+}
+
 /// What is known about device, bench and profile.
 #[derive(Clone, Debug)]
 pub struct Capabilities {
@@ -47,7 +57,18 @@ impl Capabilities {
     /// Whether a test runs, and if not, why.
     #[must_use]
     pub fn gate(&self, test: &Test) -> Gate {
-        let mut open = None;
+        match self.weigh(test) {
+            Err(why) => Gate::NotApplicable(why),
+            Ok(open) => open.into_iter().next().map_or(Gate::Runs, Gate::Unobservable),
+        }
+    }
+
+    /// Everything that stands in the way of a test, the first reason first.
+    ///
+    /// # Errors
+    /// Why it does not apply at all.
+    pub fn weigh(&self, test: &Test) -> Result<Vec<String>, String> {
+        let mut open = Vec::new();
         let hooks = test
             .sections()
             .into_iter()
@@ -64,10 +85,8 @@ impl Capabilities {
         for need in test.needs.iter().cloned().chain(stations).chain(hooks) {
             match self.has(&need) {
                 Gate::Runs => {}
-                Gate::NotApplicable(why) => return Gate::NotApplicable(why),
-                Gate::Unobservable(why) => {
-                    open.get_or_insert(why);
-                }
+                Gate::NotApplicable(why) => return Err(why),
+                Gate::Unobservable(why) => open.push(why),
             }
         }
         let sends = test.sections().into_iter().flat_map(|(_, steps)| steps);
@@ -77,22 +96,22 @@ impl Capabilities {
         });
         let mut ordered = routes.flat_map(|route| &route.actions).flat_map(|(_, actions)| actions);
         if let Some(why) = ordered.find_map(|action| self.blocks_otherwise(action)) {
-            return Gate::NotApplicable(why);
+            return Err(why);
         }
         if let Some(why) = self.factsheet.as_ref().and_then(|sheet| outgrown(sheet, test)) {
-            return Gate::NotApplicable(why);
+            return Err(why);
         }
         if test.moves
             && let Err(why) = &self.motion
         {
-            open.get_or_insert_with(|| why.clone());
+            open.push(why.clone());
         }
         if serves_a_map_to_read(test)
             && let Err(why) = &self.map_file
         {
-            open.get_or_insert_with(|| why.clone());
+            open.push(why.clone());
         }
-        open.map_or(Gate::Runs, Gate::Unobservable)
+        Ok(open)
     }
 
     fn has(&self, need: &Need) -> Gate {
@@ -114,9 +133,7 @@ impl Capabilities {
                     Gate::NotApplicable(format!("the profile says that the device has no `{name}`"))
                 }
                 Some(false) => Gate::NotApplicable(format!("the profile says that the device is not `{name}`")),
-                None if name == ACTIVE_MAP => {
-                    Gate::Unobservable("the first state shows no enabled map on which the vehicle stands".to_owned())
-                }
+                None if name == ACTIVE_MAP => Gate::Unobservable(NO_ACTIVE_MAP.to_owned()),
                 None => Gate::Unobservable(match SAMPLE_ACTIONS.iter().find(|sample| sample.name == name) {
                     Some(sample) => format!("the profile does not name `device.{name}`: {}", sample.doc),
                     None => format!("the profile does not say whether the device is `{name}`"),

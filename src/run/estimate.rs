@@ -20,7 +20,7 @@ const KEEP_ALIVE: Duration = Duration::from_millis(22_500);
 /// Of a vehicle that does not say how fast it is, in metres per second.
 const SPEED: f64 = 1.0;
 /// Of an edge nobody knows, in metres.
-const EDGE: f64 = 2.0;
+pub(super) const EDGE: f64 = 2.0;
 
 /// What is known of device and floor.
 pub(super) struct Estimate<'a> {

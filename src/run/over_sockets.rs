@@ -10,9 +10,10 @@ use serde_json::{Map, Value};
 
 use super::hooks::{DeviceProcess, ProfileHooks};
 use super::library::Library;
+use super::plan::{How, RunPlan};
 use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
-use super::virtual_run::Silent;
+use super::virtual_run::{Silent, VirtualRun, run_silently};
 use crate::bench::endpoint::{Credentials, Endpoint};
 use crate::bench::tls::TlsFiles;
 use crate::bench::{LinkError, Vantage};
@@ -127,6 +128,7 @@ impl SocketRun {
         let profile = &effective.profile;
         let device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
         let options = bench_of(profile, device.published(pack), surroundings)?;
+        certificates(effective)?;
         let maps = match device.fleet {
             Some(_) => Ok(()),
             None => reach(&options, profile.device.command.is_some()),
@@ -143,6 +145,41 @@ impl SocketRun {
             maps,
             device_log: None,
         })
+    }
+
+    /// What it would do, without a network: which tests, and what stands in the way of the others. What only the device
+    /// can say is known of a built-in one; of others it is left open.
+    #[must_use]
+    pub fn plan(self, library: &Library, pack: &Pack) -> RunPlan {
+        let (hooks, factsheet): (BTreeMap<String, How>, _) = match &self.source {
+            Source::BuiltIn { device, .. } => {
+                let hooks = device.hooks().iter().map(|name| ((*name).to_owned(), How::BuiltIn));
+                (hooks.collect(), factsheet_of(device, library, pack))
+            }
+            Source::Profile { profile, .. } => {
+                let hooks = profile.hooks.values();
+                let hooks = hooks.map(|hook| (hook.name.clone(), How::of(&hook.action)));
+                (hooks.collect(), None)
+            }
+        };
+        let bench = BenchFacts {
+            vantage: if self.options.tap {
+                Vantage::Tap
+            } else {
+                Vantage::Subscriber
+            },
+            hooks: hooks.keys().cloned().collect(),
+            maps: self.maps,
+        };
+        let subject = self.device.subject.clone();
+        let time = Value::Object(self.device.time.bindings());
+        let (_, mut setup) = self.device.on(bench, self.request, library, pack);
+        if factsheet.is_some() {
+            let statements = &mut setup.capabilities.statements;
+            statements.insert("active-map".to_owned(), true);
+            setup.capabilities.factsheet = factsheet;
+        }
+        RunPlan::of(&subject, pack, &time, setup, &hooks)
     }
 
     /// The same on this thread until it is over, with nobody watching and without a bundle.
@@ -280,6 +317,35 @@ impl Stage<'_> {
             recorder,
         })
     }
+}
+
+/// What a built-in vehicle says it can do.
+fn factsheet_of(device: &BuiltIn, library: &Library, pack: &Pack) -> Option<Value> {
+    let mut run = VirtualRun::of_role(device.role(), library, pack);
+    run.device = device.clone();
+    run.tests = Vec::new();
+    let finished = run_silently(library, pack, run).ok()?;
+    let timeline = finished.recorder.judge().timeline();
+    let sheets = timeline.of("factsheet");
+    sheets.iter().rev().find_map(|entry| entry.json().cloned())
+}
+
+/// The certificates and keys that a profile names have to be there.
+fn certificates(effective: &Effective) -> Result<(), Vec<Diagnostic>> {
+    let bench = &effective.profile.bench;
+    let files = [
+        ("bench.tls-ca", &bench.tls_ca),
+        ("bench.tls-cert", &bench.tls_cert),
+        ("bench.tls-key", &bench.tls_key),
+    ];
+    let unreadable = files.into_iter().filter_map(|(setting, file)| {
+        let file = file.as_ref()?;
+        let error = std::fs::File::open(file).err()?;
+        let title = format!("the file {} cannot be read: {error}", file.display());
+        Some(effective.complain(setting, "unreadable", title, "named here"))
+    });
+    let unreadable: Vec<Diagnostic> = unreadable.collect();
+    if unreadable.is_empty() { Ok(()) } else { Err(unreadable) }
 }
 
 /// The bench that a profile describes.

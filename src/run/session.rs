@@ -22,6 +22,7 @@ use crate::link::mqtt::BenchInfo;
 use crate::pack::Role;
 use crate::result::{RunResult, TestResult};
 use crate::suite::model::Test;
+use crate::verdict::Verdict;
 
 /// What a run is about.
 pub struct Setup {
@@ -45,6 +46,8 @@ pub struct Setup {
     pub limits: Vec<String>,
     /// Identifier of the run; makes ids unique.
     pub run: String,
+    /// Whether it ends after the first test that fails.
+    pub fail_fast: bool,
 }
 
 /// A finished run.
@@ -185,12 +188,17 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let runs = plan.tests.iter().filter(|planned| planned.gate == Gate::Runs).count();
         let mut number = 0;
         let mut gone: Option<String> = None;
+        let mut failed: Option<String> = None;
         for (at, test) in tests.iter().enumerate() {
             if plan.tests[at].gate != Gate::Runs {
                 continue;
             }
             if self.engine.interrupted() {
                 break;
+            }
+            if let Some(first) = &failed {
+                plan.tests[at].gate = Gate::Unobservable(format!("left out, because {first} failed (--fail-fast)"));
+                continue;
             }
             number += 1;
             if gone.is_none() {
@@ -219,10 +227,17 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                     gone = self.run_and_restore(test, own, number).await?;
                     if let Some(result) = self.engine.recorder.judge().done().last() {
                         self.progress.test_ended(result);
+                        if self.setup.fail_fast && result.verdict == Some(Verdict::Fail) {
+                            failed = Some(result.id.clone());
+                        }
                     }
                     saved(self.engine.recorder.judge());
                 }
             }
+        }
+        if let Some(first) = &failed {
+            let limit = format!("No test was run after {first}, which failed (--fail-fast).");
+            self.setup.limits.push(limit);
         }
         if let (Some(why), None) = (&gone, self.stopped()) {
             self.record_plan(&plan)?;
@@ -269,7 +284,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);
         let estimate = estimate.of_tests(running.map(|(test, _)| &**test));
         self.progress.note(&format!(
-            "this takes {}, if the device keeps nobody waiting",
+            "estimated time: {} (more if the device is slow)",
             estimate::in_words(estimate)
         ));
     }

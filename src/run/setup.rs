@@ -37,6 +37,8 @@ pub struct Request {
     pub run: String,
     /// The command line, for the record.
     pub command: Vec<String>,
+    /// Whether the run ends after the first test that fails.
+    pub fail_fast: bool,
 }
 
 impl Request {
@@ -49,6 +51,7 @@ impl Request {
             draw: Some(1),
             run: uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
             command: Vec::new(),
+            fail_fast: false,
         }
     }
 }
@@ -210,6 +213,7 @@ impl DeviceUnderTest {
             deviations: self.deviations,
             limits: self.limits,
             run: request.run,
+            fail_fast: request.fail_fast,
         };
         (header, setup)
     }

@@ -51,6 +51,8 @@ pub struct VirtualRun {
     pub run: String,
     /// The command line, for the record.
     pub command: Vec<String>,
+    /// Whether the run ends after the first test that fails.
+    pub fail_fast: bool,
 }
 
 impl VirtualRun {
@@ -79,6 +81,7 @@ impl VirtualRun {
             begun: jiff::Timestamp::UNIX_EPOCH,
             run: "virtual".to_owned(),
             command: Vec::new(),
+            fail_fast: false,
         }
     }
 }
@@ -154,6 +157,7 @@ pub async fn run_virtually(
         draw: request.draw,
         run: request.run,
         command: request.command,
+        fail_fast: request.fail_fast,
     };
     let (header, setup) = tested.on(bench, asked, library, pack);
     let header = Box::new(header);

@@ -188,7 +188,9 @@ impl Bench {
 pub fn bundles(reports: &Path) -> Vec<PathBuf> {
     let list = |folder: &Path| -> Vec<PathBuf> {
         let entries = std::fs::read_dir(folder).into_iter().flatten();
-        entries.map(|entry| entry.unwrap().path()).collect()
+        let paths = entries.map(|entry| entry.unwrap().path());
+        // The link to the latest run is no run of its own.
+        paths.filter(|path| !path.is_symlink()).collect()
     };
     list(reports).iter().flat_map(|device| list(device)).collect()
 }

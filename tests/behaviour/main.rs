@@ -7,14 +7,17 @@
 mod auditing;
 mod bench;
 mod broken;
+mod discovering;
 mod exit_codes;
 mod hostile;
 mod inspecting;
 mod interrupted;
 mod mosquitto;
 mod output;
+mod planning;
 mod rejudging;
 mod repeatable;
 mod scripted;
+mod selecting;
 mod simulating;
 mod tool;

@@ -2,7 +2,8 @@
 
 use vda5050_tck::journal::Journal;
 use vda5050_tck::pack::Role;
-use vda5050_tck::report::text::{self, Bundle, Color};
+use vda5050_tck::report::overview::{Bundle, overview, slowest};
+use vda5050_tck::report::text::{self, Color};
 use vda5050_tck::report::{coverage, sources::Sources};
 use vda5050_tck::result::RunResult;
 
@@ -18,7 +19,7 @@ fn whole(result: &RunResult, sources: &Sources, journal: Option<&Journal>, color
         report: Some("reports/Lindner-TX-0042/report.html"),
         root: Some("9f2c"),
     };
-    let end = text::summary(result, bundle, color);
+    let end = overview(result, sources, journal, bundle, color);
     tests.chain(monitors).chain(["\n".to_owned(), end]).collect()
 }
 
@@ -118,4 +119,12 @@ fn the_statement_says_what_was_shown_and_nothing_more() {
         with(None, &[None], false),
     ];
     insta::assert_snapshot!("statements", all.join("\n"));
+}
+
+#[test]
+fn the_slowest_tests_come_first_and_no_more_than_asked_for() {
+    let (result, _) = samples::fail();
+    let text = slowest(&result, 1, Color::Never);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines.len() == 2 && lines[1].contains("connection/last-will"), "{text}");
 }

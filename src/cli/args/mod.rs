@@ -4,8 +4,11 @@
 //! they stand, so that a value means the same on the command line, in the environment and in a file.
 
 mod audit;
+mod discover;
 mod inspect;
 mod run;
+mod selection;
+mod shell;
 mod simulate;
 #[cfg(test)]
 mod tests;
@@ -16,15 +19,18 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use audit::Audit;
+pub use discover::{Discover, Init, ListenArgs};
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub use run::{Certify, Qualify, Run, Shard};
+pub use selection::SelectionArgs;
+pub use shell::{Completions, Man};
 pub use simulate::{ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, VehicleArg};
 
 const AFTER_HELP: &str = "\
 Examples:
   vda5050-tck run                              test the built-in reference AGV: see how it works
   vda5050-tck run --profile device.toml        test your device, as the profile describes it
-  vda5050-tck run 'order/*' -v                 only some tests, with every effective setting
+  vda5050-tck run 'order-rejection/*' -v       only some tests, with every effective setting
   vda5050-tck explain ORD-REJ-03               what a requirement asks, and what decides it
   vda5050-tck certify --profile device.toml    everything that applies, with nothing left to choose
 
@@ -63,6 +69,14 @@ pub enum Command {
     Report(Report),
     /// Prove the harness: the reference passes everything, and every check is failed by a fault
     Qualify(Qualify),
+    /// Show who speaks on a broker; nothing is sent
+    Discover(Discover),
+    /// Write a commented profile of a device that is heard on a broker; nothing is sent
+    Init(Init),
+    /// Print completions for a shell
+    Completions(Completions),
+    /// Print the manual page, or write a page for every command
+    Man(Man),
 }
 
 /// Settings of the device and the bench; each is also a setting of the profile.
@@ -151,8 +165,17 @@ pub struct OutputArgs {
     )]
     pub format: Format,
     /// Say more: every effective setting with its origin; twice, every step
-    #[arg(short, long, action = clap::ArgAction::Count)]
+    #[arg(short, long, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     pub verbose: u8,
+    /// Say less: no line per test and no details, only the verdict and what is broken
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Show tests that failed or broke, and no others
+    #[arg(long, conflicts_with = "quiet")]
+    pub failures: bool,
+    /// Show the NUMBER tests that took longest
+    #[arg(long, value_name = "NUMBER")]
+    pub slowest: Option<usize>,
 }
 
 /// The format of standard output.

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::Args;
 
-use super::{DeviceArgs, Format, OutputArgs, SuiteArgs};
+use super::{DeviceArgs, Format, OutputArgs, SelectionArgs, SuiteArgs};
 
 const RUN_HELP: &str = "\
 Examples:
@@ -14,9 +14,11 @@ Examples:
   vda5050-tck run --virtual --fault outdated-update-taken-over   see a test fail
   vda5050-tck run --profile device.toml --no-motion  nothing drives
   vda5050-tck run 'order-rejection/*' --manufacturer ACME --serial 0001 --listen 0.0.0.0:1883
+  vda5050-tck run --profile device.toml --plan       what would be run, asked and driven
+  vda5050-tck run --profile device.toml --last-failed --fail-fast   what failed, up to the first failure
   vda5050-tck run --profile device.toml --shard 2/4  the second quarter of the tests
 
-A test is named by its id, and `*` stands for anything: `order/*`, `*map*`. See `list tests`.
+A test is named by its id, and `*` stands for anything: `order-rejection/*`, `*map*`. See `list tests`.
 Results go to standard output, progress to standard error; the report to --out.";
 
 /// `run`.
@@ -26,6 +28,9 @@ pub struct Run {
     /// Only tests whose id matches one of these; all that apply unless said
     #[arg(value_name = "TEST")]
     pub tests: Vec<String>,
+    /// Which of them.
+    #[command(flatten)]
+    pub selection: SelectionArgs,
     /// The device and the bench.
     #[command(flatten)]
     pub device: DeviceArgs,

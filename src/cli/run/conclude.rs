@@ -5,7 +5,11 @@ use crate::cli::args;
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
 use crate::cli::screen::Screen;
-use crate::report::text;
+use crate::engine::Recorder;
+use crate::report::known::measure;
+use crate::report::sources::Sources;
+use crate::report::text::Color;
+use crate::report::{overview, text};
 use crate::result::RunResult;
 use crate::run::{Bundle, End, Finished, sources, write_all};
 use crate::verdict::Verdict;
@@ -27,25 +31,21 @@ impl Job {
             }
             args::Format::Text => {
                 let color = crate::cli::color();
-                let mut page = String::new();
-                for test in result
-                    .tests
-                    .iter()
-                    .filter(|test| test.verdict.is_some_and(|verdict| verdict > Verdict::Pass))
-                {
-                    page.push_str(&text::test(test, &quoted, Some(recorder.journal()), color));
+                let mut page = self.details(&result, &quoted, &recorder, color);
+                if let Some(count) = self.output.slowest {
+                    page.push_str(&overview::slowest(&result, count, color));
                     page.push('\n');
                 }
-                for monitor in result.monitors.iter().filter(|monitor| !monitor.findings.is_empty()) {
-                    page.push_str(&text::monitor(monitor, color));
-                    page.push('\n');
-                }
-                page.push_str(&text::summary(
+                let report = format!("{shown}/report.html");
+                let bundle = overview::Bundle {
+                    report: Some(&report),
+                    root: Some(&root),
+                };
+                page.push_str(&overview::overview(
                     &result,
-                    text::Bundle {
-                        report: Some(&format!("{shown}/report.html")),
-                        root: Some(&root),
-                    },
+                    &quoted,
+                    Some(recorder.journal()),
+                    bundle,
                     color,
                 ));
                 crate::cli::print(&page)?;
@@ -56,12 +56,58 @@ impl Job {
                 Some(why) if result.verdict.is_none() => Err(Problem::NothingToDo(format!(
                     "no selected test applies to the device: {why}"
                 ))),
-                _ => Ok(Exit::of(result.verdict)),
+                _ => self.exit(&result),
             },
             End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
             End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Ok(broken_off(&why, &shown, &result)),
             End::Broken(error) => Ok(broken_off(&error.to_string(), &shown, &result)),
         }
+    }
+}
+
+impl Job {
+    /// What tests and monitors found, in full. Undecided tests are many, and have few causes: the overview groups them.
+    fn details(&self, result: &RunResult, quoted: &Sources, recorder: &Recorder, color: Color) -> String {
+        let mut page = String::new();
+        if self.output.quiet {
+            return page;
+        }
+        let shown = |verdict: Verdict| match (self.output.failures, self.output.verbose) {
+            (true, _) => verdict >= Verdict::Error,
+            (_, 0) => verdict > Verdict::Pass && verdict != Verdict::Inconclusive,
+            _ => verdict > Verdict::Pass,
+        };
+        for test in result.tests.iter().filter(|test| test.verdict.is_some_and(shown)) {
+            page.push_str(&text::test(test, quoted, Some(recorder.journal()), color));
+            page.push('\n');
+        }
+        for monitor in result.monitors.iter().filter(|monitor| !monitor.findings.is_empty()) {
+            page.push_str(&text::monitor(monitor, color));
+            page.push('\n');
+        }
+        page
+    }
+}
+
+impl Job {
+    /// The exit of a run that came to its end. Failures that the profile lists as known do not count; the verdict stays.
+    fn exit(&self, result: &RunResult) -> Result<Exit, Problem> {
+        let known = &self.effective.profile.known;
+        if known.is_empty() || self.certifies {
+            return Ok(Exit::of(result.verdict));
+        }
+        let measured = measure(result, known);
+        match self.output.format {
+            args::Format::Text => crate::cli::print(&format!("\n{}", measured.text()))?,
+            args::Format::Json => {
+                eprint!("{}", measured.text());
+                Exit::Conforms
+            }
+        };
+        Ok(match result.verdict {
+            Some(Verdict::Fail) => Exit::of(measured.rest),
+            verdict => Exit::of(verdict),
+        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! One profile file: TOML into a [`Layer`], with every mistake in it named at its place.
 
 mod hooks;
+mod known;
 mod layout;
 
 use std::collections::BTreeMap;
@@ -18,7 +19,7 @@ use super::{Deviation, LayoutList};
 use crate::diagnostic::{self, Diagnostic, Source, Span};
 use crate::pack::RequirementId;
 
-const SECTIONS: [&str; 9] = [
+const SECTIONS: [&str; 10] = [
     "device",
     "bench",
     "motion",
@@ -27,6 +28,7 @@ const SECTIONS: [&str; 9] = [
     "time",
     "maps",
     "deviations",
+    "known",
     "hooks",
 ];
 
@@ -134,6 +136,7 @@ impl Reader<'_> {
             match section {
                 "hooks" => table.iter().for_each(|entry| self.hook(entry)),
                 "deviations" => table.iter().for_each(|entry| self.deviation(entry)),
+                "known" => table.iter().for_each(|entry| self.known(entry)),
                 _ => self.section(section, table),
             }
         }

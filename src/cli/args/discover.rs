@@ -1,0 +1,80 @@
+//! `discover` and `init`: who is there, and a profile from that.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Format;
+
+const DISCOVER_HELP: &str = "\
+Examples:
+  vda5050-tck discover --broker mqtt://127.0.0.1:1883 --seconds 35
+  vda5050-tck discover --broker mqtts://site:8883 --username tck --tls-ca ca.crt --topic 'uagv/v2/ACME/#'
+
+It only listens: nothing is published. States come at least every 30 s, and retained messages at once.";
+
+/// How to listen on a broker.
+#[derive(Clone, Debug, Args)]
+pub struct ListenArgs {
+    /// The broker: mqtt://host:port or mqtts://host:port
+    #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
+    pub broker: String,
+    /// User name at the broker; its password is taken from the variable `VDA5050_TCK_PASSWORD`
+    #[arg(long, value_name = "NAME")]
+    pub username: Option<String>,
+    /// Whose certificates are trusted at an mqtts broker, as a PEM file
+    #[arg(long, value_name = "FILE")]
+    pub tls_ca: Option<PathBuf>,
+    /// Topic filter to subscribe to; may be repeated [default: everything]
+    #[arg(long, value_name = "FILTER")]
+    pub topic: Vec<String>,
+    /// How long to listen, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 35, value_parser = clap::value_parser!(u64).range(1..=3_600))]
+    pub seconds: u64,
+}
+
+/// `discover`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = DISCOVER_HELP)]
+pub struct Discover {
+    /// Where to listen.
+    #[command(flatten)]
+    pub listen: ListenArgs,
+    /// How it is written
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+const INIT_HELP: &str = "\
+Examples:
+  vda5050-tck init --broker mqtt://127.0.0.1:1883 --manufacturer ACME --serial 0001
+  vda5050-tck init --broker mqtt://127.0.0.1:1883 --lif hall.lif.json --vehicle-type ACME.Carrier
+
+It listens as `discover` does and writes a commented profile. Nothing is sent to the device, and motion stays off.";
+
+/// `init`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = INIT_HELP)]
+pub struct Init {
+    /// Where to listen.
+    #[command(flatten)]
+    pub listen: ListenArgs,
+    /// Manufacturer of the device; needed when several are heard
+    #[arg(long, value_name = "NAME")]
+    pub manufacturer: Option<String>,
+    /// Serial number of the device; needed when several are heard
+    #[arg(long, value_name = "NUMBER")]
+    pub serial: Option<String>,
+    /// The floor, as a LIF file
+    #[arg(long, value_name = "FILE")]
+    pub lif: Option<String>,
+    /// The vehicle type in the LIF file
+    #[arg(long, value_name = "NAME", requires = "lif")]
+    pub vehicle_type: Option<String>,
+    /// The file to write; one that is there is kept
+    #[arg(long, value_name = "FILE", default_value = "device.toml")]
+    pub file: PathBuf,
+    /// Write over a file that is there
+    #[arg(long)]
+    pub force: bool,
+}

@@ -1,0 +1,183 @@
+//! `discover` and `init`: who speaks on a broker, and a profile from that. Nothing is published.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use serde_json::json;
+
+use super::args::{Discover, Format, Init, ListenArgs};
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::bench::endpoint::{Credentials, Endpoint};
+use crate::diagnostic::Diagnostic;
+use crate::run::{Device, Heard, Library, Wishes, draft, listen};
+use crate::ui::escaped;
+
+/// `discover`.
+pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
+    let library = Library::load(None)?;
+    let heard = hear(&arguments.listen, &library)?;
+    let devices = heard.devices();
+    match arguments.format {
+        Format::Json => super::print(&format!(
+            "{:#}\n",
+            json!({ "format": "vda5050-tck.discovery/1", "devices": devices, "otherMessages": heard.others })
+        ))?,
+        Format::Text => {
+            let mut text: String = devices.iter().map(|device| describe(device)).collect();
+            if heard.others > 0 {
+                let _ = writeln!(text, "{} messages of no device were heard as well", heard.others);
+            }
+            super::print(&text)?
+        }
+    };
+    if devices.is_empty() {
+        return Err(nobody(&arguments.listen));
+    }
+    Ok(Exit::Conforms)
+}
+
+/// `init`.
+pub fn init(arguments: &Init) -> Result<Exit, Problem> {
+    if arguments.file.exists() && !arguments.force {
+        let title = format!("{} is there already", arguments.file.display());
+        return Err(Diagnostic::whole("exists", title)
+            .hint("give another name with --file, or write over it with --force")
+            .into());
+    }
+    let library = Library::load(None)?;
+    let heard = hear(&arguments.listen, &library)?;
+    let is_meant = |device: &&Device| {
+        let same = |wanted: &Option<String>, own: &str| wanted.as_deref().is_none_or(|wanted| wanted == own);
+        same(&arguments.manufacturer, &device.manufacturer) && same(&arguments.serial, &device.serial_number)
+    };
+    let all = heard.devices();
+    let meant: Vec<&Device> = all.iter().copied().filter(is_meant).collect();
+    let device = match meant[..] {
+        [device] => device,
+        [] if all.is_empty() => return Err(nobody(&arguments.listen)),
+        [] => return Err(choose("no device of that name was heard", &all)),
+        _ => return Err(choose("several devices were heard", &meant)),
+    };
+    let wishes = Wishes {
+        broker: arguments.listen.broker.clone(),
+        username: arguments.listen.username.clone(),
+        lif: arguments.lif.clone(),
+        vehicle_type: arguments.vehicle_type.clone(),
+    };
+    let text = draft(device, &wishes, &library.rules.packs);
+    let shown = arguments.file.display().to_string();
+    std::fs::write(&arguments.file, text)
+        .map_err(|error| Problem::Environment(format!("cannot write {shown}: {error}")))?;
+    super::print(&format!(
+        "{}{shown} is written; next: vda5050-tck run --profile {shown} --plan\n",
+        describe(device)
+    ))
+}
+
+fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
+    let credentials = arguments.username.clone().map(|username| Credentials {
+        username,
+        password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
+    });
+    let endpoint = Endpoint::parse(&arguments.broker, arguments.tls_ca.as_deref(), credentials).map_err(|error| {
+        Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
+    })?;
+    let filters = match arguments.topic.as_slice() {
+        [] => vec!["#".to_owned()],
+        filters => filters.to_vec(),
+    };
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
+    eprintln!(
+        "listening on {} for {} s; Ctrl-C ends it earlier",
+        arguments.broker, arguments.seconds
+    );
+    let heard = runtime.block_on(async {
+        let interrupt = super::run::interrupts();
+        let time = Duration::from_secs(arguments.seconds);
+        listen(endpoint, &filters, time, &library.rules.packs, interrupt).await
+    });
+    runtime.shutdown_background();
+    heard.map_err(|why| {
+        Problem::Environment(format!(
+            "cannot listen on {} to {}: {why}",
+            arguments.broker,
+            filters.join(", ")
+        ))
+    })
+}
+
+fn nobody(arguments: &ListenArgs) -> Problem {
+    Problem::NothingToDo(format!(
+        "no device was heard on {} in {} s; a broker with access rules may need --username, or --topic with what is allowed",
+        arguments.broker, arguments.seconds
+    ))
+}
+
+fn choose(title: &str, devices: &[&Device]) -> Problem {
+    let names = devices.iter().take(10);
+    let names: Vec<String> = names
+        .map(|device| {
+            format!(
+                "--manufacturer {} --serial {}",
+                device.manufacturer, device.serial_number
+            )
+        })
+        .collect();
+    Diagnostic::whole("device", title)
+        .hint(format!("choose one: {}", names.join("; ")))
+        .into()
+}
+
+/// What was heard of a device, for people.
+fn describe(device: &Device) -> String {
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "{} {}   VDA 5050 {}, topics {}/{}/{}/…",
+        escaped(&device.manufacturer),
+        escaped(&device.serial_number),
+        escaped(device.version.as_deref().unwrap_or("?")),
+        escaped(&device.prefix),
+        escaped(&device.manufacturer),
+        escaped(&device.serial_number)
+    );
+    let messages: Vec<String> = device
+        .messages
+        .iter()
+        .map(|(name, count)| format!("{count} {name}"))
+        .collect();
+    let _ = writeln!(text, "  heard      {}", messages.join(", "));
+    if device.connection.is_some() || device.mode.is_some() {
+        let known = [device.connection.as_deref(), device.mode.as_deref()];
+        let known: Vec<&str> = known.into_iter().flatten().collect();
+        let _ = writeln!(text, "  state      {}", escaped(&known.join(", ")));
+    }
+    if let Some(position) = &device.position {
+        let node = device
+            .last_node
+            .as_deref()
+            .map_or(String::new(), |node| format!(", last node {node}"));
+        let place = format!(
+            "x = {}, y = {} on map {}{node}",
+            position.x, position.y, position.map_id
+        );
+        let _ = writeln!(text, "  position   {}", escaped(&place));
+    }
+    let series = device.factsheet.as_ref().map(|sheet| {
+        let series = sheet.pointer("/typeSpecification/seriesName");
+        series
+            .and_then(serde_json::Value::as_str)
+            .unwrap_or("without a series name")
+    });
+    let _ = writeln!(text, "  factsheet  {}", escaped(series.unwrap_or("none was heard")));
+    for remark in &device.remarks {
+        let _ = writeln!(text, "  remark     {}", escaped(remark));
+    }
+    text.push('\n');
+    text
+}

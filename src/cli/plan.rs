@@ -1,0 +1,167 @@
+//! `run --plan`, and what `validate` says about a good profile.
+
+use std::fmt::Write as _;
+
+use serde_json::json;
+
+use super::args::Format;
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::diagnostic::Diagnostic;
+use crate::profile::{Effective, Surroundings};
+use crate::report::advice::advice;
+use crate::report::statement::many;
+use crate::run::{How, Library, Place, RunPlan, SocketRun, Waits};
+use crate::ui::escaped;
+
+/// How many tests of a reason are named.
+const NAMED: usize = 3;
+
+/// Prints a plan.
+pub(super) fn show(plan: &RunPlan, format: Format) -> Result<Exit, Problem> {
+    match format {
+        Format::Text => super::print(&text(plan))?,
+        Format::Json => super::print(&format!("{:#}\n", json!(plan)))?,
+    };
+    let runs = plan
+        .of_kind(Waits::Runs)
+        .chain(plan.of_kind(Waits::DependsOnDevice))
+        .count();
+    Ok(if runs == 0 { Exit::NothingToDo } else { Exit::Conforms })
+}
+
+/// What `validate` says about a profile that `run` would take.
+pub(super) fn validated(effective: &Effective, library: &Library) -> Result<String, Vec<Diagnostic>> {
+    let pack = match super::device::pack_of(library, effective) {
+        Ok(pack) => pack,
+        Err(Problem::Usage(all)) => return Err(all),
+        Err(other) => return Err(vec![Diagnostic::whole("profile", other.render(false))]),
+    };
+    let surroundings = Surroundings::of_process();
+    let run = SocketRun::of_profile(effective, library, &pack, &surroundings, Place::default())?;
+    let layout = run.device.layout.as_ref().map_or("no layout".to_owned(), |layout| {
+        format!("layout with {}", many(layout.nodes().count(), "node"))
+    });
+    let plan = run.plan(library, &pack);
+    Ok(format!(
+        "valid profile: {}, VDA 5050 {}; {layout}; {}",
+        escaped(&plan.device),
+        plan.protocol,
+        numbers(&plan).join(", ")
+    ))
+}
+
+/// How many tests of which kind there are.
+fn numbers(plan: &RunPlan) -> Vec<String> {
+    let count = |gate| plan.of_kind(gate).count();
+    let mut all = vec![format!(
+        "{} of {} run",
+        count(Waits::Runs),
+        many(plan.tests.len(), "test")
+    )];
+    let others = [
+        (Waits::DependsOnDevice, "if the device can do it"),
+        (Waits::Inconclusive, "inconclusive"),
+        (Waits::NotApplicable, "not applicable"),
+    ];
+    let others = others.into_iter().filter(|(gate, _)| count(*gate) > 0);
+    all.extend(others.map(|(gate, what)| format!("{} {what}", count(gate))));
+    all
+}
+
+/// A plan for people.
+fn text(plan: &RunPlan) -> String {
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "Plan for {}, VDA 5050 {}, {}",
+        escaped(&plan.device),
+        plan.protocol,
+        plan.role
+    );
+    text.push('\n');
+    let _ = writeln!(text, "tests    {}", numbers(plan).join(", "));
+    if plan.not_drawn > 0 {
+        let _ = writeln!(
+            text,
+            "         {} from schemas and matrices left out by the draw (--thorough runs all)",
+            many(plan.not_drawn, "case")
+        );
+    }
+    let people: usize = plan
+        .hooks
+        .iter()
+        .filter(|one| matches!(one.how, How::Person(_)))
+        .map(|one| one.times)
+        .sum();
+    let with_people = if people > 0 {
+        ", and the time that people need"
+    } else {
+        ""
+    };
+    let _ = writeln!(
+        text,
+        "time     {}{with_people} (more if the device is slow)",
+        plan.duration()
+    );
+    let motion = match (&plan.stands_still, plan.moving(), plan.role) {
+        (_, _, "master-control") => "only the mock vehicles of this tool".to_owned(),
+        (Some(why), ..) => format!("none: {}", escaped(why)),
+        (None, 0, _) => "none: no test drives".to_owned(),
+        (None, tests, _) => format!(
+            "the vehicle drives in {}, about {} m in all",
+            many(tests, "test"),
+            plan.metres
+        ),
+    };
+    let _ = writeln!(text, "motion   {motion}");
+    let _ = writeln!(
+        text,
+        "people   {}",
+        match people {
+            0 => "nobody is asked for anything".to_owned(),
+            times => format!("somebody at the terminal is asked {}", many(times, "time")),
+        }
+    );
+    for one in &plan.hooks {
+        let how = match &one.how {
+            How::Person(prompt) => format!("a person: {prompt}"),
+            How::Machine => "done by the profile".to_owned(),
+            How::BuiltIn => "done by the built-in device".to_owned(),
+        };
+        let _ = writeln!(
+            text,
+            "{:>8}  {}, {}",
+            format!("{}×", one.times),
+            one.hook,
+            escaped(&how)
+        );
+    }
+    let sections = [
+        (Waits::Inconclusive, "To decide more:"),
+        (Waits::DependsOnDevice, "Known when the device is there:"),
+        (Waits::NotApplicable, "Not applicable:"),
+    ];
+    for (gate, title) in sections {
+        let reasons = plan.reasons(gate);
+        if reasons.is_empty() {
+            continue;
+        }
+        let _ = writeln!(text, "\n{title}");
+        for (why, tests) in reasons {
+            let what = if gate == Waits::Inconclusive {
+                advice(why)
+            } else {
+                why.to_owned()
+            };
+            let _ = writeln!(text, "{:>11}  {}", many(tests.len(), "test"), escaped(&what));
+            let named: Vec<&str> = tests.iter().take(NAMED).copied().collect();
+            let more = match tests.len().saturating_sub(NAMED) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            let _ = writeln!(text, "             {}{more}", named.join(", "));
+        }
+    }
+    text
+}
