@@ -25,7 +25,7 @@ fn every_kind_of_good_file_is_told_by_its_content() {
             fixture("messages/2.1/good/connection-will.json"),
             "a valid connection message",
         ),
-        (fixture("profiles/good/hall.toml"), "a profile"),
+        (fixture("profiles/good/minimal.toml"), "valid profile: ACME 0001"),
         (fixture("layouts/hall.lif.json"), "a layout with"),
         (suite, "test"),
         (result, "a result of 1 tests"),
