@@ -100,6 +100,13 @@ impl Continuity {
         step
     }
 
+    /// Whether a message follows the last one of its topic by its count.
+    pub fn goes_on(&self, name: &str, message: &Value) -> bool {
+        let id = message.get("headerId").and_then(whole);
+        let before = self.last.get(name).and_then(|(before, _)| *before);
+        name != "connection" && before.is_some() && id == before.map(next)
+    }
+
     /// What was sent before does not count any more.
     pub fn forget(&mut self) {
         self.sent = Sent::default();

@@ -6,6 +6,7 @@
 //! says which monitor is used how, [`continuity`] finds the holes, and [`arrival`] puts messages back into their order.
 
 mod arrival;
+mod arrived;
 mod continuity;
 mod own_run;
 pub mod page;
@@ -171,7 +172,7 @@ impl<'r> Audit<'r> {
         let vehicles: Vec<_> = self
             .vehicles
             .into_values()
-            .map(|vehicle| vehicle.finish(scene))
+            .flat_map(|vehicle| vehicle.finish(scene))
             .collect();
         AuditResult {
             format: RESULT_FORMAT.to_owned(),

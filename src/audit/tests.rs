@@ -196,3 +196,44 @@ fn a_version_without_rules_is_named_and_not_judged() {
     let silent = audited(&library, vec![message("nonsense"), message("")]);
     assert!(silent.vehicles[0].not_judged.is_some());
 }
+
+#[test]
+fn a_vehicle_with_other_software_is_judged_by_each_of_its_versions() {
+    let library = Library::load(None).expect("library");
+    let tests = "order-acceptance/base-and-horizon";
+    let mut day = Vec::new();
+    let mut protocols = Vec::new();
+    for pack in library.rules.packs.all() {
+        let begun = day.last().and_then(|message: &Message| message.at);
+        let mut part = traffic(&library, pack, Role::Agv, tests, &[]);
+        // The vehicle has one topic whatever version it speaks, where a site has named the topics itself.
+        for message in &mut part {
+            let name = message.topic.rsplit('/').next().unwrap_or_default().to_owned();
+            message.topic = format!("site/ACME/0001/{name}");
+        }
+        let first = part[0].at.expect("a time").as_microsecond();
+        for message in &mut part {
+            let since = message.at.expect("a time").as_microsecond() - first;
+            let at = begun.map_or(first, |begun: jiff::Timestamp| begun.as_microsecond() + 60_000_000);
+            message.at = jiff::Timestamp::from_microsecond(at + since).ok();
+        }
+        protocols.push(pack.version.to_string());
+        day.extend(part);
+    }
+    let options = Options {
+        topic_template: Some("site/{manufacturer}/{serialNumber}/{topic}".to_owned()),
+        ..Options::default()
+    };
+    let mut audit = Audit::new(&library.rules, options).expect("options");
+    for message in day {
+        audit.observe(message);
+    }
+    let result = audit.finish(Vec::new());
+    let versions: Vec<&str> = result
+        .vehicles
+        .iter()
+        .filter_map(|vehicle| vehicle.protocol.as_deref())
+        .collect();
+    assert_eq!(versions, protocols);
+    assert_eq!(found(&result, Role::Agv), BTreeSet::new());
+}

@@ -7,13 +7,14 @@ use serde_json::{Map, Value, json};
 
 use super::Scene;
 use super::arrival::{Known, Sorted};
+use super::arrived::{Arrived, of_side, timestamp, version};
 use super::continuity::{Continuity, Step};
 use super::result::VehicleResult;
 use super::side::Side;
 use super::topics::Named;
 use crate::capture::Message;
 use crate::clock::{Moment, Stamp};
-use crate::journal::event::{Direction, Event, MockVehicle, Record, RunHeader, Source};
+use crate::journal::event::{Event, MockVehicle, Record, RunHeader, Source};
 use crate::journal::{Entry, Payload};
 use crate::pack::{Pack, Role};
 use crate::pattern::whole;
@@ -21,15 +22,8 @@ use crate::profile::TimeLimits;
 
 /// How many messages wait until the vehicle has said which version it speaks.
 const WAITING: usize = 64;
-
-/// A message on its way through.
-struct Arrived {
-    number: u64,
-    name: String,
-    at: Stamp,
-    stale: bool,
-    entry: Arc<Entry>,
-}
+/// How often the version of a vehicle may change; a vehicle that changes it more often is judged by the last one.
+const STRETCHES: usize = 16;
 
 /// The sides, once the version is known.
 struct Sides {
@@ -59,6 +53,8 @@ pub(super) struct Vehicle {
     counts: BTreeMap<String, u64>,
     twice: u64,
     stale: u64,
+    /// What came out while it spoke another version.
+    earlier: Vec<VehicleResult>,
 }
 
 impl Vehicle {
@@ -81,6 +77,7 @@ impl Vehicle {
             counts: BTreeMap::new(),
             twice: 0,
             stale: 0,
+            earlier: Vec::new(),
         }
     }
 
@@ -155,6 +152,10 @@ impl Vehicle {
 
     /// A message whose turn it is.
     fn pass(&mut self, arrived: Arrived, scene: Scene<'_>) {
+        if self.is_updated(&arrived) {
+            let concluded = self.conclude(scene);
+            self.earlier.push(concluded);
+        }
         if self.sides.is_some() {
             self.show(&arrived, scene);
             return;
@@ -167,6 +168,27 @@ impl Vehicle {
         if of_vehicle || self.waiting.len() >= WAITING {
             self.settle(scene, self.waiting.len() >= WAITING);
         }
+    }
+
+    /// Whether the vehicle speaks another version from this message on: it is back with other software. Where its count
+    /// goes on as if nothing had been, the version of the message is wrong instead.
+    fn is_updated(&self, arrived: &Arrived) -> bool {
+        let is_command = matches!(arrived.name.as_str(), "order" | "instantActions");
+        if arrived.stale || is_command || self.earlier.len() >= STRETCHES {
+            return false;
+        }
+        let Some(message) = arrived.entry.json() else {
+            return false;
+        };
+        let Some(said) = version(message) else { return false };
+        let is_other = match (&self.sides, &self.foreign) {
+            (Some(sides), _) => said
+                .parse()
+                .is_ok_and(|said: crate::pack::Version| said != sides.pack.version),
+            (None, Some(foreign)) => said != *foreign,
+            (None, None) => false,
+        };
+        is_other && !self.continuity.goes_on(&arrived.name, message)
     }
 
     /// Finds the version, and judges what waited for it.
@@ -298,17 +320,26 @@ impl Vehicle {
         }
     }
 
-    /// What came out.
-    pub fn finish(mut self, scene: Scene<'_>) -> VehicleResult {
+    /// What came out, version by version.
+    pub fn finish(mut self, scene: Scene<'_>) -> Vec<VehicleResult> {
         let mut rest: Vec<Arrived> = self.sorted.values_mut().flat_map(Sorted::all).collect();
         rest.sort_by_key(|arrived| arrived.number);
         for arrived in rest {
             self.pass(arrived, scene);
         }
+        let last = self.conclude(scene);
+        self.earlier.push(last);
+        self.earlier
+    }
+
+    /// What came out since the vehicle speaks this version.
+    fn conclude(&mut self, scene: Scene<'_>) -> VehicleResult {
         if self.sides.is_none() && self.foreign.is_none() {
             self.settle(scene, true);
         }
-        let (protocol, sides) = match self.sides {
+        let foreign = self.foreign.take();
+        self.clocks.clear();
+        let (protocol, sides) = match self.sides.take() {
             Some(Sides { pack, all }) => (
                 Some(pack.version.to_string()),
                 all.into_iter()
@@ -318,13 +349,13 @@ impl Vehicle {
             ),
             None => (None, Vec::new()),
         };
-        let not_judged = protocol.is_none().then(|| match &self.foreign {
+        let not_judged = protocol.is_none().then(|| match &foreign {
             Some(version) => format!("protocol version {version}, which this program does not have"),
             None => "no message names a protocol version".to_owned(),
         });
         VehicleResult {
-            manufacturer: self.manufacturer,
-            serial_number: self.serial_number,
+            manufacturer: self.manufacturer.clone(),
+            serial_number: self.serial_number.clone(),
             topics: self
                 .named
                 .all(["{topic}"].into_iter())
@@ -333,70 +364,12 @@ impl Vehicle {
                 .unwrap_or_default(),
             protocol,
             not_judged,
-            messages: self.counts,
-            holes: self.continuity.holes,
-            twice: self.twice,
-            retained: self.stale,
+            messages: std::mem::take(&mut self.counts),
+            holes: std::mem::take(&mut self.continuity).holes,
+            twice: std::mem::take(&mut self.twice),
+            retained: std::mem::take(&mut self.stale),
             vantage: "subscriber".to_owned(),
             sides,
         }
     }
-}
-
-/// The record as the side that is judged is shown it: its own messages came, those of the other side were sent.
-fn of_side(arrived: &Arrived, own: bool, apart: i64) -> Arc<Entry> {
-    let Event::Message {
-        topic,
-        qos,
-        retain,
-        dup,
-        payload,
-    } = arrived.entry.event().clone()
-    else {
-        return Arc::clone(&arrived.entry);
-    };
-    let event = if own {
-        Event::Message {
-            topic,
-            qos,
-            retain,
-            dup,
-            payload,
-        }
-    } else {
-        Event::Sent {
-            topic,
-            qos,
-            retain,
-            payload,
-        }
-    };
-    let utc = arrived.at.utc.as_microsecond().saturating_add(apart);
-    let record = Record {
-        seq: arrived.number,
-        at: Stamp {
-            moment: arrived.at.moment,
-            utc: jiff::Timestamp::from_microsecond(utc).unwrap_or(arrived.at.utc),
-        },
-        source: Source::Link,
-        direction: Some(if own {
-            Direction::FromDevice
-        } else {
-            Direction::ToDevice
-        }),
-        event,
-    };
-    Entry::beside(&arrived.entry, record)
-}
-
-/// What a message says of its time.
-fn timestamp(message: &Value) -> Option<jiff::Timestamp> {
-    message.get("timestamp")?.as_str()?.parse().ok()
-}
-
-/// What a message says of its version, if it is one.
-fn version(message: &Value) -> Option<String> {
-    let said = message.get("version")?.as_str()?;
-    let short: String = said.chars().take(32).collect();
-    short.parse::<crate::pack::Version>().ok().map(|_| short)
 }

@@ -195,7 +195,7 @@ fn parts<'a>(topic: &'a str, packs: &Packs) -> Option<(&'a str, &'a str, &'a str
     let is_known = packs
         .all()
         .iter()
-        .any(|pack| pack.topics().iter().any(|rule| rule.name == name));
+        .any(|pack| pack.topics().iter().any(|rule| rule.name.as_str() == name));
     (is_known && !serial.is_empty() && !manufacturer.is_empty()).then_some((prefix, manufacturer, serial, name))
 }
 
