@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -13,6 +14,9 @@ use crate::pattern::whole;
 
 /// How many orders and actions are kept in mind.
 const SENT: usize = 8192;
+
+/// How far recorders change the order of messages of different topics.
+const CROSSING: Duration = Duration::from_millis(100);
 
 /// What a message is for those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +67,8 @@ pub(super) struct Continuity {
     sent: Sent,
     /// Orders and actions of the last state.
     shown: Option<BTreeSet<u64>>,
+    /// Since when commands come one after the other, and what a state shows that knows the last of them.
+    command: Option<(Moment, Moment, BTreeSet<u64>)>,
     /// How many holes there are.
     pub holes: u64,
 }
@@ -97,7 +103,23 @@ impl Continuity {
             self.forget();
         }
         self.learn(name, message);
+        if let Some(message) = message.filter(|_| matches!(name, "order" | "instantActions")) {
+            let since = match &self.command {
+                Some((since, last, _)) if now.since(*last) <= CROSSING => *since,
+                _ => now,
+            };
+            self.command = Some((since, now, marks(message)));
+        }
         step
+    }
+
+    /// Since when it is not known what the master control had seen: a state came so soon after a command which it does not
+    /// know that it may have been sent before.
+    pub fn crossed(&self, name: &str, message: Option<&Value>, now: Moment) -> Option<Moment> {
+        let (since, last, marks) = self.command.as_ref()?;
+        let state = message.filter(|_| name == "state" && now.since(*last) <= CROSSING)?;
+        let mut known = shown(state).into_iter().chain(blamed(state));
+        (!known.any(|print| marks.contains(&print))).then_some(*since)
     }
 
     /// Whether a message follows the last one of its topic by its count.
@@ -168,6 +190,35 @@ fn next(id: u64) -> u64 {
     if id == u64::from(u32::MAX) { 0 } else { id + 1 }
 }
 
+/// Prints by which a state shows that it knows a command: its order, its actions, or an error about one of them.
+fn marks(message: &Value) -> BTreeSet<u64> {
+    let text = |holder: &Value, member: &str| holder.get(member).and_then(Value::as_str).map(str::to_owned);
+    let id = text(message, "orderId");
+    let update = message.get("orderUpdateId").and_then(whole);
+    let order = id.as_deref().zip(update).map(print);
+    let lists = ["actions", "instantActions"].into_iter();
+    let actions = lists.flat_map(|list| message.get(list).and_then(Value::as_array).into_iter().flatten());
+    let actions = actions.filter_map(|action| text(action, "actionId"));
+    let named = id.clone().into_iter().chain(actions);
+    let named: Vec<u64> = named.map(|name| print(name.as_str())).collect();
+    order.into_iter().chain(named).collect()
+}
+
+/// Prints of what the errors of a state refer to.
+fn blamed(state: &Value) -> Vec<u64> {
+    let list = |holder: &Value, member: &str| {
+        holder
+            .get(member)
+            .and_then(Value::as_array)
+            .cloned()
+            .unwrap_or_default()
+    };
+    let errors = list(state, "errors").into_iter();
+    let references = errors.flat_map(|error| list(&error, "errorReferences"));
+    let values = references.filter_map(|reference| Some(print(reference.get("referenceValue")?.as_str()?)));
+    values.collect()
+}
+
 /// Prints of the order and of the actions that a state shows.
 fn shown(state: &Value) -> BTreeSet<u64> {
     let id = state.get("orderId").and_then(Value::as_str).filter(|id| !id.is_empty());
@@ -215,6 +266,24 @@ mod tests {
         assert_eq!(found[2], Step::Follows);
         assert_eq!(found[3], Step::Hole(Moment::from_micros(2)));
         assert_eq!(found[4], Step::Follows);
+    }
+
+    #[test]
+    fn a_state_that_does_not_know_the_command_before_it_may_have_crossed_it() {
+        let order = json!({ "headerId": 1, "orderId": "b", "orderUpdateId": 0 });
+        let at = |milliseconds: u64| Moment::from_micros(milliseconds * 1000);
+        let crossed = |state: Value, milliseconds| {
+            let mut continuity = Continuity::default();
+            continuity.note("order", Some(&order), at(10));
+            continuity.crossed("state", Some(&state), at(milliseconds))
+        };
+        let other = json!({ "orderId": "a", "orderUpdateId": 3 });
+        assert_eq!(crossed(other.clone(), 60), Some(at(10)));
+        assert_eq!(crossed(other.clone(), 200), None);
+        assert_eq!(crossed(order.clone(), 60), None);
+        let references = json!([{ "referenceKey": "orderId", "referenceValue": "b" }]);
+        let refused = json!({ "orderId": "a", "orderUpdateId": 3, "errors": [{ "errorReferences": references }] });
+        assert_eq!(crossed(refused, 60), None);
     }
 
     #[test]

@@ -278,7 +278,12 @@ impl Vehicle {
         let publisher = rule.publisher;
         let message = arrived.entry.json();
         if !arrived.stale {
-            let step = self.continuity.note(&arrived.name, message, arrived.at.moment);
+            let moment = arrived.at.moment;
+            if let Some(since) = self.continuity.crossed(&arrived.name, message, moment) {
+                let commanding = all.iter_mut().filter(|side| side.role == Role::MasterControl);
+                commanding.for_each(|side| side.broken(since));
+            }
+            let step = self.continuity.note(&arrived.name, message, moment);
             let begins_anew = arrived.name == "connection";
             for side in all.iter_mut() {
                 match step {

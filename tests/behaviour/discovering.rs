@@ -1,25 +1,35 @@
 //! Who speaks on a broker, and a profile from that; nothing is sent.
 
-use crate::bench::{Bench, MANUFACTURER, Profile, QUICK, SERIAL};
-use crate::tool::{Running, run, tool};
+use crate::bench::{Bench, MANUFACTURER, SERIAL};
+use crate::mosquitto::Mosquitto;
+use crate::simulating::retained;
+use crate::tool::run;
 
 #[test]
-fn a_vehicle_is_found_and_its_profile_leads_to_a_verdict() {
+fn a_vehicle_is_found_and_its_profile_leads_to_a_plan() {
     let bench = Bench::new();
-    // The bench of a run that waits is the broker here.
-    let (run_that_waits, port) = bench.start(&Profile::default(), &[QUICK]);
-    let broker = format!("mqtt://127.0.0.1:{port}");
-    let listening = ["discover", "--broker", &broker, "--seconds", "4", "--format", "json"];
-    let found = Running::start(&mut tool(bench.path(), &listening));
-    std::thread::sleep(std::time::Duration::from_millis(1500));
-    let _device = bench.agv(port, &[]);
-    let found = found.end().code(0);
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let _device = bench.agv(mosquitto.port, &[]);
+    retained(mosquitto.port, "ONLINE");
+    let broker = format!("mqtt://127.0.0.1:{}", mosquitto.port);
+    let listen = ["--broker", &broker, "--seconds", "2"];
+    let found = bench
+        .run(&[&["discover", "--format", "json"], &listen[..]].concat())
+        .code(0);
     let found: serde_json::Value = serde_json::from_str(&found.stdout).unwrap();
     let device = &found["devices"][0];
     assert_eq!(device["manufacturer"], MANUFACTURER);
     assert_eq!(device["serialNumber"], SERIAL);
     assert!(device["messages"]["connection"].as_u64().unwrap() > 0, "{found}");
-    drop(run_that_waits);
+    bench
+        .run(&[&["init", "--serial", SERIAL], &listen[..]].concat())
+        .code(0)
+        .prints("device.toml is written");
+    bench.run(&["validate", "device.toml"]).code(0).prints("valid profile");
+    bench
+        .run(&["run", "--profile", "device.toml", "--plan"])
+        .code(0)
+        .prints("[motion] allowed = true");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::scripted::topic;
 use crate::tool::{Ended, Running, run, tool};
 
 /// What a topic says to somebody who comes late, until it is as wanted.
-fn retained(port: u16, wanted: &str) -> Value {
+pub fn retained(port: u16, wanted: &str) -> Value {
     let last = Arc::new(Mutex::new(Value::Null));
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_secs(20) {
