@@ -74,3 +74,18 @@ pub(super) fn version(message: &Value) -> Option<String> {
     let short: String = said.chars().take(32).collect();
     short.parse::<crate::pack::Version>().ok().map(|_| short)
 }
+
+/// Whether a state shows no order and no action that is still under way.
+pub(super) fn is_at_rest(state: &Value) -> bool {
+    let list = |member: &str| {
+        state
+            .get(member)
+            .and_then(Value::as_array)
+            .map_or(&[][..], Vec::as_slice)
+    };
+    let is_over = |action: &Value| {
+        let status = action.get("actionStatus").and_then(Value::as_str);
+        matches!(status, Some("FINISHED" | "FAILED"))
+    };
+    list("nodeStates").is_empty() && list("edgeStates").is_empty() && list("actionStates").iter().all(is_over)
+}

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::Scene;
 use super::arrival::{Known, Sorted};
-use super::arrived::{Arrived, of_side, timestamp, version};
+use super::arrived::{Arrived, is_at_rest, of_side, timestamp, version};
 use super::continuity::{Continuity, Step};
 use super::result::VehicleResult;
 use super::side::Side;
@@ -294,7 +294,9 @@ impl Vehicle {
                     _ => {}
                 }
             }
-            if step == Step::Follows && all.iter().any(|side| !side.watches()) {
+            // What was sent of an order before is not known: judging begins where none is under way.
+            let may_begin = arrived.name == "state" && step == Step::Follows && message.is_some_and(is_at_rest);
+            if may_begin && all.iter().any(|side| !side.watches()) {
                 self.continuity.forget();
                 self.continuity.learn(&arrived.name, message);
                 for side in all.iter_mut() {
