@@ -68,7 +68,7 @@ impl Read for Frames {
             if read > 0 || buffer.is_empty() {
                 return Ok(read);
             }
-            let Some(mut rest) = self.frame.take().map(|frame| frame.into_inner()) else {
+            let Some(mut rest) = self.frame.take().map(ruzstd::decoding::StreamingDecoder::into_inner) else {
                 break;
             };
             if !rest.fill_buf()?.is_empty() {

@@ -49,6 +49,8 @@ pub struct Cli {
 }
 
 /// The commands.
+// There is one of them, for the life of the program.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Test a device; without a profile, the built-in reference AGV
