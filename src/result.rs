@@ -17,6 +17,9 @@ pub struct RunResult {
     pub tool: String,
     /// Identifier of the run.
     pub run: String,
+    /// `certify` when nothing was left to choose; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
     /// Start in UTC, RFC 3339 with milliseconds.
     pub started: String,
     /// Length of the run in seconds.
@@ -72,6 +75,25 @@ pub struct FleetResult {
     /// From a state of a vehicle to the next order message for it; absent when none came.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reaction: Option<ReactionTimes>,
+    /// Each vehicle, in the order of the fleet.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub each: Vec<CommandedVehicle>,
+}
+
+/// How one vehicle of a fleet was commanded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct CommandedVehicle {
+    /// Serial number.
+    pub serial_number: String,
+    /// How many order messages it was sent.
+    pub orders: usize,
+    /// Half of its waits for an order are no longer, in milliseconds; absent when none was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub median: Option<f64>,
+    /// Its longest wait, in milliseconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longest: Option<f64>,
 }
 
 /// A distribution of times, in milliseconds.
@@ -92,6 +114,24 @@ pub struct ReactionTimes {
     pub longest: f64,
     /// How many are up to each of [`ReactionTimes::BOUNDS`] and above the one before; the last is above all bounds.
     pub buckets: Vec<usize>,
+}
+
+/// [`RunResult::mode`] of a run for a certificate.
+pub const CERTIFY: &str = "certify";
+
+impl RunResult {
+    /// Whether nothing was left to choose in the run, so that a certificate can be given.
+    #[must_use]
+    pub fn certifies(&self) -> bool {
+        self.mode.as_deref() == Some(CERTIFY)
+    }
+
+    /// The value of a setting, if it is set.
+    #[must_use]
+    pub fn setting(&self, name: &str) -> Option<&str> {
+        let found = self.settings.iter().find(|setting| setting.name == name);
+        found.map(|setting| setting.value.as_str())
+    }
 }
 
 impl ReactionTimes {

@@ -12,10 +12,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use vda5050_tck::pack::Role;
+use vda5050_tck::report::junit::Inconclusive;
 use vda5050_tck::run::{Bundle, Library, VirtualRun, run_silently, sources, write_all};
 
-const FILES: [&str; 5] = [
+const FILES: [&str; 6] = [
     "journal.jsonl",
+    "junit-requirements.xml",
     "junit.xml",
     "manifest.json",
     "report.html",
@@ -46,7 +48,14 @@ fn make(folder: &Path) {
         writer.write(&entry.record).expect("written");
     }
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
-    write_all(&bundle, &finished.result, &quoted, finished.recorder.journal()).expect("written");
+    write_all(
+        &bundle,
+        &finished.result,
+        &quoted,
+        finished.recorder.journal(),
+        Inconclusive::Error,
+    )
+    .expect("written");
 }
 
 #[test]

@@ -58,6 +58,9 @@ fn is_read(path: &str, code: &str, suites: &str) -> bool {
             .iter()
             .any(|before| suites.contains(&format!("{before}{}", sample.variable)));
     }
+    if section == "certificate" {
+        return code.contains(&format!("\"{path}\""));
+    }
     if section == "time" {
         let mut words = name.split('-');
         let first = words.next().unwrap_or_default().to_owned();

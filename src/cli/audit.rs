@@ -16,7 +16,7 @@ use crate::run::Library;
 
 /// `audit`.
 pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let library = Library::load(arguments.suites.own())?;
     let options = Options {
         topic_template: arguments.topic_template.clone(),
         vehicles: arguments.vehicle.clone(),

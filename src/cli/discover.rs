@@ -1,6 +1,7 @@
 //! `discover` and `init`: who speaks on a broker, and a profile from that. Nothing is published.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::time::Duration;
 
 use serde_json::json;
@@ -10,6 +11,8 @@ use super::exit::Exit;
 use super::problem::Problem;
 use crate::bench::endpoint::{Credentials, Endpoint};
 use crate::diagnostic::Diagnostic;
+use crate::pack::Assets;
+use crate::profile;
 use crate::run::{Device, Heard, Library, Wishes, draft, listen};
 use crate::ui::escaped;
 
@@ -39,6 +42,9 @@ pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
 
 /// `init`.
 pub fn init(arguments: &Init) -> Result<Exit, Problem> {
+    if let Some(folder) = &arguments.suites {
+        return export(folder);
+    }
     if arguments.file.exists() && !arguments.force {
         let title = format!("{} is there already", arguments.file.display());
         return Err(Diagnostic::whole("exists", title)
@@ -72,6 +78,34 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
     super::print(&format!(
         "{}{shown} is written; next: vda5050-tck run --profile {shown} --plan\n",
         describe(device)
+    ))
+}
+
+/// Writes what the program was built with, so that tests of one's own can begin with it.
+fn export(folder: &Path) -> Result<Exit, Problem> {
+    if folder.exists() {
+        let title = format!("{} is there already", folder.display());
+        return Err(Diagnostic::whole("exists", title)
+            .hint("give a folder that is not there yet")
+            .into());
+    }
+    let assets = Assets::embedded();
+    let files = assets.under("").map(|file| {
+        let inside = file.path.strip_prefix("suites/").unwrap_or(&file.path);
+        (inside.to_owned(), file.text.as_str())
+    });
+    let settings = ("default.toml".to_owned(), profile::DEFAULT_TOML);
+    for (inside, text) in files.chain([settings]) {
+        let path = folder.join(inside);
+        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        made.and_then(|()| std::fs::write(&path, text))
+            .map_err(|error| Problem::Environment(format!("cannot write {}: {error}", path.display())))?;
+    }
+    let shown = folder.display();
+    super::print(&format!(
+        "{shown}/agv and {shown}/master-control hold the tests, {shown}/monitors the monitors, {shown}/requirements the \
+         catalogue, {shown}/schemas the schemas, {shown}/default.toml every setting with its default; \
+         `--suites` takes a folder that is laid out like this, with only your own files in it\n"
     ))
 }
 

@@ -24,7 +24,10 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
     if arguments.uncovered && arguments.what != Listing::Coverage {
         return Err(Diagnostic::whole("usage", "`--uncovered` is about `list coverage`").into());
     }
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    if arguments.page && arguments.what != Listing::Requirements {
+        return Err(Diagnostic::whole("usage", "`--page` is about `list requirements`").into());
+    }
+    let library = Library::load(arguments.suites.own())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
     let roles: Vec<Role> = arguments
         .role
@@ -36,6 +39,11 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
                 json!({ "id": test.id, "title": test.title, "role": test.device.word(), "moves": test.moves, "requirements": test.requirements() })
             });
             lines(all)
+        }
+        (Listing::Requirements, Format::Text) if arguments.page => {
+            let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+            let meant = |role: &str| arguments.role.is_none_or(|wanted| role == wanted.word() || role == "both");
+            crate::report::markdown::requirements(&quoted, &pack.version.to_string(), meant)
         }
         (Listing::Requirements, Format::Text) => requirements(&library, &pack, &roles),
         (Listing::Requirements, Format::Json) => lines(of_roles(&library, &pack, &roles).map(|requirement| {
@@ -221,7 +229,7 @@ fn monitors(library: &Library, pack: &Pack, roles: &[Role]) -> String {
 
 /// `explain`.
 pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let library = Library::load(arguments.suites.own())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
     let id = arguments.id.as_str();
     let suites = &library.rules.suites;

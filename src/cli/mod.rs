@@ -2,10 +2,13 @@
 
 pub mod args;
 mod audit;
+mod certify;
 mod device;
 mod discover;
 pub mod exit;
 mod list;
+mod papers;
+mod pipeline;
 mod plan;
 mod problem;
 mod qualify;
@@ -27,7 +30,7 @@ use crate::diagnostic::Diagnostic;
 use crate::pack::Pack;
 use crate::report::text::Color;
 use crate::run::Library;
-use args::{Cli, Command};
+use args::{Cli, Command, Format};
 use list::print;
 use problem::Problem;
 
@@ -44,7 +47,7 @@ pub fn main() -> ExitCode {
     };
     let outcome = match &cli.command {
         Command::Run(arguments) => run::run_command(arguments),
-        Command::Certify(arguments) => run::certify_command(arguments),
+        Command::Certify(arguments) => certify::certify(arguments),
         Command::List(arguments) => list::list(arguments),
         Command::Explain(arguments) => list::explain(arguments),
         Command::Audit(arguments) => audit::audit(arguments),
@@ -59,7 +62,10 @@ pub fn main() -> ExitCode {
     };
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();
-        eprintln!("{}", problem.render(color));
+        match cli.command.format() {
+            Format::Json => eprintln!("{}", problem.to_json()),
+            Format::Text => eprintln!("{}", problem.render(color)),
+        }
         problem.exit()
     });
     ExitCode::from(exit.code())

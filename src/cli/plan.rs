@@ -51,6 +51,35 @@ pub(super) fn validated(effective: &Effective, library: &Library) -> Result<Stri
     ))
 }
 
+/// Refuses a run that would leave tests undecided for what the profile does not say or the bench does not have.
+pub(super) fn complete(plan: &RunPlan) -> Result<(), Problem> {
+    let lacking = plan.reasons(Waits::Inconclusive);
+    if lacking.is_empty() {
+        return Ok(());
+    }
+    let count: usize = lacking.iter().map(|(_, tests)| tests.len()).sum();
+    let mut title = format!(
+        "a certificate leaves nothing open that profile and bench could decide, and {} would be undecided:",
+        many(count, "test")
+    );
+    for (why, tests) in lacking {
+        let named: Vec<&str> = tests.iter().take(NAMED).copied().collect();
+        let more = match tests.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let _ = write!(
+            title,
+            "\n{:>11}  {}\n             {}{more}",
+            many(tests.len(), "test"),
+            escaped(&advice(why)),
+            named.join(", ")
+        );
+    }
+    let hint = "say of what the device does not have that it has not (`claims`, in the section [device]), or use `run`";
+    Err(Diagnostic::whole("certify", title).hint(hint).into())
+}
+
 /// How many tests of which kind there are.
 fn numbers(plan: &RunPlan) -> Vec<String> {
     let count = |gate| plan.of_kind(gate).count();

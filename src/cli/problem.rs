@@ -1,6 +1,8 @@
 //! Why a command could not do what it was asked, and which exit code that is.
 
-use crate::diagnostic::Diagnostic;
+use serde_json::{Value, json};
+
+use crate::diagnostic::{Diagnostic, Span};
 
 use super::exit::Exit;
 
@@ -24,6 +26,24 @@ impl Problem {
             Self::NothingToDo(_) => Exit::NothingToDo,
             Self::Environment(_) => Exit::Broken,
         }
+    }
+
+    /// The message for programs, in one line.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let (kind, problems) = match self {
+            Self::Usage(all) => {
+                let all = all.iter().map(|one| {
+                    json!({ "code": one.code, "title": one.title, "label": one.label, "hint": one.hint,
+                        "place": one.span.as_ref().map(Span::place) })
+                });
+                ("usage", all.collect())
+            }
+            Self::NothingToDo(why) => ("nothing-to-do", vec![json!({ "title": why })]),
+            Self::Environment(why) => ("environment", vec![json!({ "title": why })]),
+        };
+        let problems: Vec<Value> = problems;
+        json!({ "error": { "kind": kind, "exit": self.exit().code(), "problems": problems } }).to_string()
     }
 
     /// The message for standard error.

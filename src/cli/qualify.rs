@@ -14,7 +14,7 @@ use crate::simulate::BuiltIn;
 
 /// `qualify`.
 pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let library = Library::load(arguments.suites.own())?;
     let roles: Vec<Role> = match arguments.role {
         Some(role) => vec![role],
         None => vec![Role::Agv, Role::MasterControl],

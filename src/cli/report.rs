@@ -1,6 +1,8 @@
 //! `report`: render a finished run again, verify it, judge it again, or compare two.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
 
 use super::args::{Format, Report};
 use super::exit::Exit;
@@ -8,24 +10,31 @@ use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
 use crate::journal::file::{self, Recording};
 use crate::judge;
-use crate::report::{compare, json, manifest, overview};
+use crate::report::{compare, json as result_file, manifest, overview, side_by_side};
+use crate::result::RunResult;
 use crate::run::{Bundle, Library, sources, write_all};
 
 /// `report`.
 pub fn report(arguments: &Report) -> Result<Exit, Problem> {
-    if let Some(both) = &arguments.compare {
-        let [before, after] = both.as_slice() else {
-            return Err(Diagnostic::whole("usage", "two runs are compared").into());
-        };
-        return compare_runs(before, after);
+    if let Some(folders) = &arguments.compare {
+        return compare_runs(arguments, folders);
     }
     let Some(folder) = &arguments.directory else {
         return Err(Diagnostic::whole("usage", "the folder of a run is missing").into());
     };
     if arguments.verify {
-        return verify(folder);
+        return verify(folder, arguments);
     }
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    if let Some(rendering) = arguments.rendering {
+        return super::papers::rendered(folder, rendering, arguments.inconclusive);
+    }
+    if arguments.certificate {
+        return super::papers::certificate(folder);
+    }
+    if arguments.attestation {
+        return super::papers::attestation(folder);
+    }
+    let library = Library::load(arguments.suites.own())?;
     let Recording { journal, torn } = file::read(&folder.join("journal.jsonl")).map_err(|error| {
         Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
     })?;
@@ -35,16 +44,22 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     let result = judge::judge(&library.rules, journal.entries())
         .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
     if arguments.rejudge {
-        return rejudge(folder, &result);
+        return rejudge(folder, &result, arguments.format);
     }
     let pack = super::pack(&library, Some(&result.protocol))?;
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
-    let root = write_all(&Bundle::open(folder), &result, &quoted, &journal)
-        .map_err(|error| Problem::Environment(error.to_string()))?;
+    let root = write_all(
+        &Bundle::open(folder),
+        &result,
+        &quoted,
+        &journal,
+        arguments.inconclusive.into(),
+    )
+    .map_err(|error| Problem::Environment(error.to_string()))?;
     let shown = folder.join("report.html").display().to_string();
     match arguments.format {
         Format::Json => {
-            super::print(&json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?)?
+            super::print(&result_file::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?)?
         }
         Format::Text => {
             let bundle = overview::Bundle {
@@ -63,7 +78,7 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     Ok(Exit::of(result.verdict))
 }
 
-fn rejudge(folder: &Path, result: &crate::result::RunResult) -> Result<Exit, Problem> {
+fn rejudge(folder: &Path, result: &RunResult, format: Format) -> Result<Exit, Problem> {
     let path = folder.join("result.json");
     let saved = std::fs::read_to_string(&path).map_err(|error| {
         Problem::from(Diagnostic::whole(
@@ -71,11 +86,19 @@ fn rejudge(folder: &Path, result: &crate::result::RunResult) -> Result<Exit, Pro
             format!("cannot read {}: {error}", path.display()),
         ))
     })?;
-    let again = json::to_string(result).map_err(|error| Problem::Environment(error.to_string()))?;
+    let again = result_file::to_string(result).map_err(|error| Problem::Environment(error.to_string()))?;
+    if format == Format::Json {
+        super::print(&format!("{}\n", json!({ "same": saved == again })))?;
+        return Ok(if saved == again {
+            Exit::Conforms
+        } else {
+            Exit::DoesNotConform
+        });
+    }
     if saved == again {
         return super::print("the journal gives the same result, byte for byte\n");
     }
-    let before = json::from_str(&saved, &path.display().to_string())
+    let before = result_file::from_str(&saved, &path.display().to_string())
         .map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
     let comparison = compare::compare(&before, result);
     let text = if comparison.is_empty() {
@@ -87,32 +110,65 @@ fn rejudge(folder: &Path, result: &crate::result::RunResult) -> Result<Exit, Pro
     Ok(Exit::DoesNotConform)
 }
 
-fn verify(folder: &Path) -> Result<Exit, Problem> {
+fn verify(folder: &Path, arguments: &Report) -> Result<Exit, Problem> {
     let found = manifest::Manifest::verify(folder)
         .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
-    super::print(&format!("{}\n", found.text().trim_end()))?;
-    Ok(if found.holds() {
-        Exit::Conforms
-    } else {
-        Exit::DoesNotConform
-    })
+    let is_meant = arguments.root.as_ref().is_none_or(|root| *root == found.root);
+    let holds = found.holds() && is_meant;
+    let text = match arguments.format {
+        Format::Json => format!(
+            "{}\n",
+            json!({ "intact": holds, "rootIsMeant": is_meant, "found": found })
+        ),
+        Format::Text if is_meant => format!("{}\n", found.text().trim_end()),
+        Format::Text => format!(
+            "{}\nthe root hash is another one than --root says: this is not the bundle that was meant\n",
+            found.text().trim_end()
+        ),
+    };
+    super::print(&text)?;
+    Ok(if holds { Exit::Conforms } else { Exit::DoesNotConform })
 }
 
-fn compare_runs(before: &Path, after: &Path) -> Result<Exit, Problem> {
-    let read = |folder: &Path| {
+/// Compares runs, each with the one before it.
+fn compare_runs(arguments: &Report, folders: &[PathBuf]) -> Result<Exit, Problem> {
+    let runs = folders.iter().map(|folder| {
         let path = if folder.is_dir() {
             folder.join("result.json")
         } else {
-            folder.to_owned()
+            folder.clone()
         };
-        json::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))
-    };
-    let comparison = compare::compare(&read(before)?, &read(after)?);
-    super::print(&comparison.text())?;
-    let worse = comparison
-        .requirements
+        result_file::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))
+    });
+    let runs: Vec<RunResult> = runs.collect::<Result<_, _>>()?;
+    let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
+    let steps = runs.windows(2).map(|pair| compare::compare(&pair[0], &pair[1]));
+    let steps: Vec<compare::Comparison> = steps.collect();
+    if arguments.page {
+        let library = Library::load(arguments.suites.own())?;
+        let pack = super::pack(&library, runs.last().map(|run| run.protocol.as_str()))?;
+        let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+        let page = side_by_side::render(&runs, &names, &quoted);
+        super::print(&page.map_err(|error| Problem::Environment(error.to_string()))?)?;
+    } else if arguments.format == Format::Json {
+        let steps = steps.iter().zip(names.windows(2));
+        let steps = steps.map(|(step, names)| json!({ "before": names[0], "after": names[1], "changed": step }));
+        let steps: Vec<Value> = steps.collect();
+        super::print(&format!(
+            "{:#}\n",
+            json!({ "format": "vda5050-tck.comparison/1", "steps": steps })
+        ))?;
+    } else {
+        for (step, names) in steps.iter().zip(names.windows(2)) {
+            if steps.len() > 1 {
+                super::print(&format!("{} -> {}\n", names[0], names[1]))?;
+            }
+            super::print(&step.text())?;
+        }
+    }
+    let mut changes = steps
         .iter()
-        .chain(&comparison.tests)
-        .any(|change| change.trend() == compare::Trend::Worse);
+        .flat_map(|step| step.requirements.iter().chain(&step.tests));
+    let worse = changes.any(|change| change.trend() == compare::Trend::Worse);
     Ok(if worse { Exit::DoesNotConform } else { Exit::Conforms })
 }

@@ -1,4 +1,4 @@
-//! `run` and `certify`: test a device, write the evidence, say the verdict.
+//! `run`: test a device, write the evidence, say the verdict.
 
 mod conclude;
 
@@ -20,7 +20,9 @@ use crate::link::mqtt::BrokerChoice;
 use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{self, Effective, Surroundings};
-use crate::run::{Bundle, Library, Place, Request, RunError, SocketRun, VirtualRun, run_virtually, write_result};
+use crate::run::{
+    Bundle, Library, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, run_virtually, write_result,
+};
 use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
 /// What `run` and `certify` have in common.
@@ -41,10 +43,10 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
     let effective = profile::load(
         arguments.device.profile.as_deref(),
-        &arguments.device.settings(),
+        &[arguments.device.settings(), arguments.said.clone()].concat(),
         &surroundings,
     )?;
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let library = Library::load(arguments.suites.own())?;
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     let all = library.tests(role, &pack.id);
@@ -109,6 +111,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
             run,
             command: std::env::args().collect(),
             fail_fast: arguments.selection.fail_fast,
+            certifies: arguments.certifies,
         },
         library,
         pack,
@@ -120,6 +123,10 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     };
     if arguments.selection.plan {
         return job.plan(arguments, built_in, &surroundings);
+    }
+    if job.certifies && !built_in {
+        let plan = job.of_profile(arguments, &surroundings)?;
+        super::plan::complete(&job.planned(plan))?;
     }
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -139,43 +146,6 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     // Sockets of a silent peer must not keep the process from ending.
     runtime.shutdown_background();
     outcome
-}
-
-/// `certify`: the same with nothing left to choose.
-pub fn certify_command(arguments: &args::Certify) -> Result<Exit, Problem> {
-    let surroundings = Surroundings::of_process();
-    let effective = profile::load(arguments.profile.as_deref(), &[], &surroundings)?;
-    let contract = effective.profile.time.contract();
-    if let Some(changed) = contract.first() {
-        let diagnostic = Diagnostic::whole(
-            "certify",
-            format!("a certificate is given for default timings, and {changed}"),
-        );
-        return Err(diagnostic
-            .hint("take it out of the section [time] of the profile, or wherever `run -v` says it comes from, or use `run`")
-            .into());
-    }
-    let device = &effective.profile.device;
-    let is_foreign = arguments.profile.is_some() || device.manufacturer.is_some() || device.serial_number.is_some();
-    if is_foreign && device.role == Role::Agv && !effective.profile.motion.allowed {
-        let title = "a certificate is about driving, too, and the profile does not allow motion";
-        return Err(Diagnostic::whole("certify", title)
-            .hint(
-                "set `allowed = true` in the section [motion] of the profile where the vehicle may drive, or use `run`",
-            )
-            .into());
-    }
-    run_command(&args::Run {
-        certifies: true,
-        device: args::DeviceArgs {
-            profile: arguments.profile.clone(),
-            ..args::DeviceArgs::default()
-        },
-        output: arguments.output.clone(),
-        thorough: arguments.thorough,
-        certificate: true,
-        ..args::Run::default()
-    })
 }
 
 /// Ctrl-C once ends the run in good order, twice at once.
@@ -218,8 +188,12 @@ impl Job {
         if self.no_motion {
             run.device.stand_still(NO_MOTION);
         }
-        run.request = self.request;
-        super::plan::show(&run.plan(&self.library, &self.pack), self.output.format)
+        super::plan::show(&self.planned(run), self.output.format)
+    }
+
+    fn planned(&self, mut run: SocketRun) -> RunPlan {
+        run.request.clone_from(&self.request);
+        run.plan(&self.library, &self.pack)
     }
 
     fn of_profile(&self, arguments: &args::Run, surroundings: &Surroundings) -> Result<SocketRun, Problem> {

@@ -105,7 +105,7 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> R
         running.push(agv);
     }
     eprintln!(
-        "{} reference AGV(s) on {}; Ctrl-C signs off",
+        "{} simulated AGV(s) on {}; press Ctrl-C to disconnect",
         device.count, device.connection.broker
     );
     let _ = tokio::signal::ctrl_c().await;
@@ -130,7 +130,7 @@ async fn master_control(
     eprintln!("hooks are served at http://{}", server.address());
     let vehicles = reference.fleet().map_or(0, |fleet| fleet.vehicles.len());
     eprintln!(
-        "a reference master control of {vehicles} vehicle(s) on {}; Ctrl-C signs off",
+        "a reference master control of {vehicles} vehicle(s) on {}; press Ctrl-C to disconnect",
         device.connection.broker
     );
     let _ = tokio::signal::ctrl_c().await;

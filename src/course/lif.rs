@@ -192,7 +192,7 @@ fn choose_type(source: &Arc<Source>, file: &File, wanted: Option<&str>) -> Resul
     match (wanted, types.first()) {
         (Some(wanted), _) if types.contains(wanted) => Ok(wanted.to_owned()),
         (Some(wanted), _) => Err(refuse(
-            format!("no node is for the vehicle type `{wanted}`"),
+            format!("no node has vehicleTypeNodeProperties for `{wanted}`"),
             diagnostic::did_you_mean(wanted, types.iter().copied()),
         )),
         (None, Some(only)) if types.len() == 1 => Ok((*only).to_owned()),
@@ -254,7 +254,7 @@ impl Reader<'_> {
         for edge in file.layouts.iter().flat_map(|layout| &layout.edges) {
             for end in [&edge.start_node_id, &edge.end_node_id] {
                 if !seen.contains(end.as_str()) {
-                    let title = format!("edge `{}` touches `{end}`, which is not a node", edge.edge_id);
+                    let title = format!("edge `{}` ends at the unknown node `{end}`", edge.edge_id);
                     let hint = match diagnostic::closest(end, seen.iter().copied()) {
                         Some(close) => format!("did you mean `{close}`?"),
                         None => "an edge joins two nodes of the same file".to_owned(),

@@ -15,6 +15,9 @@ pub struct RunHeader {
     pub tool: String,
     /// Identifier of the run.
     pub run: String,
+    /// `certify` when nothing was left to choose; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
     /// `agv` or `master-control`.
     pub role: String,
     /// Protocol version the device is judged by, such as `2.1.0`.

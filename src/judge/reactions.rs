@@ -2,8 +2,8 @@
 
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::Event;
-use crate::result::{FleetResult, ReactionTimes};
+use crate::journal::event::{Event, MockVehicle};
+use crate::result::{CommandedVehicle, FleetResult, ReactionTimes};
 
 use super::timeline::Place;
 
@@ -13,36 +13,47 @@ const MOST: usize = 1_000_000;
 /// What is measured.
 #[derive(Debug, Default)]
 pub(super) struct Reactions {
-    /// By vehicle: when it said its last state.
-    states: Vec<Option<Moment>>,
-    commanded: Vec<bool>,
+    vehicles: Vec<OfVehicle>,
+    measured: usize,
+}
+
+#[derive(Debug, Default)]
+struct OfVehicle {
+    serial_number: String,
+    /// When it said its last state.
+    state: Option<Moment>,
+    orders: usize,
     /// Microseconds.
     times: Vec<u32>,
 }
 
 impl Reactions {
-    /// For so many vehicles.
-    pub fn of(vehicles: usize) -> Self {
+    /// For these vehicles.
+    pub fn of(vehicles: &[MockVehicle]) -> Self {
+        let vehicles = vehicles.iter().map(|vehicle| OfVehicle {
+            serial_number: vehicle.serial_number.clone(),
+            ..OfVehicle::default()
+        });
         Self {
-            states: vec![None; vehicles],
-            commanded: vec![false; vehicles],
-            times: Vec::new(),
+            vehicles: vehicles.collect(),
+            measured: 0,
         }
     }
 
     /// Shows the next entry and whose topic it is about.
     pub fn observe(&mut self, entry: &Entry, place: &Place) {
-        let Some(state) = self.states.get_mut(place.vehicle) else {
+        let Some(vehicle) = self.vehicles.get_mut(place.vehicle) else {
             return;
         };
         match entry.event() {
-            Event::Sent { .. } if place.name == "state" => *state = Some(entry.at().moment),
+            Event::Sent { .. } if place.name == "state" => vehicle.state = Some(entry.at().moment),
             Event::Message { retain: false, .. } if place.name == "order" => {
-                if let Some(said) = state.filter(|_| self.times.len() < MOST) {
+                if let Some(said) = vehicle.state.filter(|_| self.measured < MOST) {
                     let micros = entry.at().moment.since(said).as_micros();
-                    self.times.push(u32::try_from(micros).unwrap_or(u32::MAX));
+                    vehicle.times.push(u32::try_from(micros).unwrap_or(u32::MAX));
+                    self.measured += 1;
                 }
-                self.commanded[place.vehicle] = true;
+                vehicle.orders += 1;
             }
             _ => {}
         }
@@ -50,13 +61,29 @@ impl Reactions {
 
     /// What was measured; `None` when an AGV is tested.
     pub fn result(&self) -> Option<FleetResult> {
-        if self.states.is_empty() {
+        if self.vehicles.is_empty() {
             return None;
         }
+        let all: Vec<u32> = self
+            .vehicles
+            .iter()
+            .flat_map(|vehicle| &vehicle.times)
+            .copied()
+            .collect();
+        let each = self.vehicles.iter().map(|vehicle| {
+            let times = ReactionTimes::of(&vehicle.times);
+            CommandedVehicle {
+                serial_number: vehicle.serial_number.clone(),
+                orders: vehicle.orders,
+                median: times.as_ref().map(|times| times.median),
+                longest: times.map(|times| times.longest),
+            }
+        });
         Some(FleetResult {
-            vehicles: self.states.len(),
-            commanded: self.commanded.iter().filter(|commanded| **commanded).count(),
-            reaction: ReactionTimes::of(&self.times),
+            vehicles: self.vehicles.len(),
+            commanded: self.vehicles.iter().filter(|vehicle| vehicle.orders > 0).count(),
+            reaction: ReactionTimes::of(&all),
+            each: each.collect(),
         })
     }
 }

@@ -66,7 +66,7 @@ impl RunJudge {
             .filter(|monitor| monitor.device.is_none_or(|device| device == role))
             .collect();
         let watches = Watches::begin(&monitors, &ground, vehicles, tap);
-        let reactions = Reactions::of(header.vehicles.len());
+        let reactions = Reactions::of(&header.vehicles);
         let timeline = if header.vehicles.is_empty() {
             Timeline::new(&header.topics)
         } else {
@@ -282,6 +282,7 @@ impl RunJudge {
             format: RESULT_FORMAT.to_owned(),
             tool: header.tool.clone(),
             run: header.run.clone(),
+            mode: header.mode.clone(),
             started: format!("{:.3}", self.begun.utc),
             seconds: self.last.moment.since(self.begun.moment).as_secs_f64(),
             role: header.role.clone(),

@@ -55,6 +55,30 @@ impl Assets {
         Ok(assets)
     }
 
+    /// The embedded files and those of `dir` beside them, which is laid out like `suites/`.
+    ///
+    /// # Errors
+    /// As [`Assets::with_suites`], or when a file of `dir` has the path of an embedded one and another text.
+    pub fn with_added(dir: &Path) -> io::Result<Self> {
+        let embedded = Self::embedded();
+        let mut own = Vec::new();
+        files_below(dir, "suites", 0, &mut own)?;
+        let mut files = embedded.files.clone();
+        for file in own {
+            match embedded.get(&file.path) {
+                None => files.push(file),
+                Some(known) if known.text == file.text => {}
+                Some(_) => {
+                    let message = format!("{} is built in, and its text there is another one", file.path);
+                    return Err(io::Error::new(io::ErrorKind::AlreadyExists, message));
+                }
+            }
+        }
+        let mut assets = Self::new(files);
+        assets.modified = assets.sha256 != embedded.sha256;
+        Ok(assets)
+    }
+
     fn new(mut files: Vec<AssetFile>) -> Self {
         files.sort();
         let mut digest = Sha256::new();
@@ -191,6 +215,24 @@ mod tests {
         assert!(assets.under("schemas/").count() > 10);
         assert!(assets.modified());
         assert_ne!(assets.sha256(), Assets::embedded().sha256());
+    }
+
+    #[test]
+    fn own_files_stand_beside_the_built_in_ones_and_replace_none() {
+        let dir = tempfile::tempdir().expect("directory");
+        std::fs::create_dir_all(dir.path().join("agv/acme")).expect("directory");
+        std::fs::create_dir_all(dir.path().join("requirements")).expect("directory");
+        std::fs::write(dir.path().join("agv/acme/own.yaml"), "test: acme/own").expect("file");
+        let embedded = Assets::embedded();
+        let known = embedded.get("suites/requirements/ORD.yaml").expect("a file");
+        let copy = dir.path().join("requirements/ORD.yaml");
+        std::fs::write(&copy, &known.text).expect("file");
+        let added = Assets::with_added(dir.path()).expect("assets");
+        assert_eq!(added.files.len(), embedded.files.len() + 1);
+        assert!(added.get("suites/agv/acme/own.yaml").is_some() && added.modified());
+        std::fs::write(&copy, "group: ORD").expect("file");
+        let refused = Assets::with_added(dir.path()).expect_err("another text");
+        assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
     }
 
     #[test]

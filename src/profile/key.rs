@@ -376,6 +376,17 @@ pub const KEYS: &[Key] = &[
     key("time.notice", Kind::Duration),
     key("time.broker", Kind::Duration),
     key("maps.files", Kind::Files),
+    key("certificate.laboratory", Kind::Text),
+    key("certificate.laboratory-address", Kind::Text),
+    key("certificate.number", Kind::Text),
+    key("certificate.customer", Kind::Text),
+    key("certificate.tester", Kind::Text),
+    key("certificate.authorised-by", Kind::Text),
+    key("certificate.place", Kind::Text),
+    key("certificate.sample", Kind::Text),
+    key("certificate.sample-received", Kind::Text),
+    key("certificate.hardware-version", Kind::Text),
+    key("certificate.firmware-version", Kind::Text),
 ];
 
 /// The environment variable that holds a password unless `password-env` names another.

@@ -71,7 +71,7 @@ impl Surroundings {
             }
             let Some(key) = KEYS.iter().find(|key| key.variable() == *name) else {
                 let names: Vec<String> = KEYS.iter().map(Key::variable).collect();
-                let title = format!("the environment variable {name} sets nothing");
+                let title = format!("the environment variable {name} is not known");
                 let hint = match diagnostic::closest(name, names.iter().map(String::as_str)) {
                     Some(close) => format!("did you mean `{close}`?"),
                     None => "the name is VDA5050_TCK_, the section, `_`, and the name of the setting".to_owned(),

@@ -76,21 +76,13 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
     word("leave-field", &[], "The protective field is left."),
     word("press-pause", &[], "The pause button is pressed."),
     word("release-pause", &[], "The pause is ended at the vehicle."),
-    word(
-        "block-pause",
-        &[],
-        "A pause or its end by a message is made impossible.",
-    ),
+    word("block-pause", &[], "startPause and stopPause fail."),
     word(
         "unblock-pause",
         &[],
         "A pause and its end by a message are possible again.",
     ),
-    word(
-        "lock-charger",
-        &[],
-        "An end of charging by a message is made impossible.",
-    ),
+    word("lock-charger", &[], "stopCharging fails."),
     word(
         "unlock-charger",
         &[],

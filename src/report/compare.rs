@@ -6,13 +6,15 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
 use super::clean::line;
 use super::statement::many;
 use crate::result::RunResult;
 use crate::verdict::Verdict;
 
 /// What changed from one run to another.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Comparison {
     /// What makes the two runs different in kind, one sentence each.
     pub notes: Vec<String>,
@@ -27,7 +29,7 @@ pub struct Comparison {
 }
 
 /// One change.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Change {
     /// Id.
     pub id: String,
@@ -38,13 +40,15 @@ pub struct Change {
 }
 
 /// How something stood in one run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Standing {
     /// Not part of the run.
     Absent,
     /// Part of the run, without a verdict.
     Undecided,
     /// With this verdict.
+    #[serde(untagged)]
     Decided(Verdict),
 }
 

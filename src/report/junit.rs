@@ -8,16 +8,22 @@
 //!
 //! `junit_report` writes text as it comes, so everything goes through [`attribute`] or [`cdata`] first. What
 //! it cannot do: more than one `<failure>` in a test case (the worst decision gives type and message, all
-//! of them stand in its text), properties, and a `skipped` count on the suite. It always writes a
-//! timestamp: ours is the start of the run, and its constructors that read the clock are not used.
+//! of them stand in its text), and a `skipped` count on the suite; [`with_properties`] adds the properties. It always
+//! writes a timestamp: ours is the start of the run, and its constructors that read the clock are not used. No test case
+//! has a `file`, which the schema of Jenkins' xUnit plugin forbids.
 
 use std::fmt::Write as _;
 
 use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult as Outcome, TestSuite};
 
+use askama::filters::Escaper as _;
+
 use super::clean;
-use super::statement;
-use crate::result::{Decision, MonitorResult, RunResult, TestResult};
+use super::findings::{Finding, findings};
+use super::html::Escape;
+use super::sources::Sources;
+use super::statement::{self, Gap};
+use crate::result::{Decision, MonitorResult, RequirementResult, RunResult, TestResult};
 use crate::verdict::Verdict;
 
 /// Why no JUnit file could be made.
@@ -25,17 +31,37 @@ use crate::verdict::Verdict;
 #[error("cannot write JUnit XML: {0}")]
 pub struct JunitError(String);
 
-/// The result as JUnit XML.
+/// How what was not decided is shown to a build server.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Inconclusive {
+    /// As an error: the build is red.
+    #[default]
+    Error,
+    /// As skipped.
+    Skip,
+}
+
+/// What a build server is told beside the result.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Flavour<'a> {
+    /// How what was not decided is shown.
+    pub inconclusive: Inconclusive,
+    /// The root hash of the bundle. A file of the bundle cannot hold it.
+    pub root: Option<&'a str>,
+}
+
+/// The result as JUnit XML: a case for each test and each monitor.
 ///
 /// # Errors
 /// When the XML writer refuses; it has no reason to.
-pub fn render(result: &RunResult) -> Result<String, JunitError> {
+pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
+    let how = flavour.inconclusive;
     let mut report = ReportBuilder::new();
     report.add_testsuite(suite(result, "run", vec![run_case(result)]));
     let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
     for test in &result.tests {
         let group = test.id.split_once('/').map_or("tests", |(group, _)| group);
-        let case = test_case(test);
+        let case = test_case(test, how);
         match groups.iter_mut().find(|(name, _)| *name == group) {
             Some((_, cases)) => cases.push(case),
             None => groups.push((group, vec![case])),
@@ -45,14 +71,83 @@ pub fn render(result: &RunResult) -> Result<String, JunitError> {
         report.add_testsuite(suite(result, group, cases));
     }
     if !result.monitors.is_empty() {
-        let cases = result.monitors.iter().map(monitor_case).collect();
+        let cases = result
+            .monitors
+            .iter()
+            .map(|monitor| monitor_case(monitor, how))
+            .collect();
         report.add_testsuite(suite(result, "monitors", cases));
     }
+    written(&report, result, flavour)
+}
+
+/// The result as JUnit XML: a case for each requirement, and a suite for each group of requirements.
+///
+/// # Errors
+/// When the XML writer refuses; it has no reason to.
+pub fn by_requirement(result: &RunResult, sources: &Sources, flavour: Flavour<'_>) -> Result<String, JunitError> {
+    let found = findings(result, sources);
+    let mut report = ReportBuilder::new();
+    report.add_testsuite(suite(result, "run", vec![run_case(result)]));
+    let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
+    for requirement in &result.requirements {
+        let group = requirement.id.rsplit_once('-').map_or("other", |(group, _)| group);
+        let finding = found.iter().find(|finding| finding.requirement == requirement.id);
+        let case = requirement_case(requirement, group, finding, sources, flavour.inconclusive);
+        match groups.iter_mut().find(|(name, _)| *name == group) {
+            Some((_, cases)) => cases.push(case),
+            None => groups.push((group, vec![case])),
+        }
+    }
+    for (group, cases) in groups {
+        report.add_testsuite(suite(result, group, cases));
+    }
+    written(&report, result, flavour)
+}
+
+fn written(report: &ReportBuilder, result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
     let mut xml = Vec::new();
     let written = report.build().write_xml(&mut xml);
     written.map_err(|error| JunitError(error.to_string()))?;
-    xml.push(b'\n');
-    String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))
+    let xml = String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))?;
+    // A line for each case: whoever compares two files sees what differs.
+    let xml = with_properties(&xml, result, flavour).replace("><testcase ", ">\n<testcase ");
+    Ok(xml.replace("><testsuite ", ">\n<testsuite ") + "\n")
+}
+
+/// Puts what is known of the run into the first suite, which is about the run. The writer escapes `>` in attributes, so
+/// that the first one ends the tag.
+fn with_properties(xml: &str, result: &RunResult, flavour: Flavour<'_>) -> String {
+    let Some(begin) = xml.find("<testsuite ") else {
+        return xml.to_owned();
+    };
+    let Some(end) = xml[begin..].find('>').map(|at| begin + at + 1) else {
+        return xml.to_owned();
+    };
+    let device = &result.device;
+    let root = flavour.root.map(|root| format!("sha256:{root}"));
+    let all = [
+        ("tool", Some(result.tool.as_str())),
+        ("run", Some(&result.run)),
+        ("mode", result.mode.as_deref()),
+        ("verdict", result.verdict.map(Verdict::word)),
+        ("role", Some(&result.role)),
+        ("protocol", Some(&result.protocol)),
+        ("manufacturer", Some(&device.manufacturer)),
+        ("serialNumber", Some(&device.serial_number)),
+        ("firmwareVersion", result.setting("certificate.firmware-version")),
+        ("suites", Some(&result.suites_sha256)),
+        ("root", root.as_deref()),
+    ];
+    let mut properties = String::from("<properties>");
+    for (name, value) in all.iter().filter_map(|(name, value)| Some((name, (*value)?))) {
+        let mut escaped = String::new();
+        // Writing to a text does not fail.
+        let _ = Escape.write_escaped_str(&mut escaped, &attribute(value));
+        let _ = write!(properties, "<property name=\"{name}\" value=\"{escaped}\"/>");
+    }
+    properties += "</properties>";
+    format!("{}{properties}{}", &xml[..end], &xml[end..])
 }
 
 /// One line, without anything XML forbids. Escaping is done by the writer.
@@ -88,9 +183,10 @@ fn timestamp(result: &RunResult) -> OffsetDateTime {
 fn suite(result: &RunResult, name: &str, testcases: Vec<TestCase>) -> TestSuite {
     TestSuite {
         name: attribute(name),
-        package: attribute(&format!("vda5050-tck.{}", result.role)),
+        package: "vda5050-tck".to_owned(),
         timestamp: timestamp(result),
-        hostname: attribute(&statement::device(result)),
+        // The machine is not known, and no part of the evidence. The device stands among the properties.
+        hostname: "localhost".to_owned(),
         testcases,
         system_out: None,
         system_err: None,
@@ -100,7 +196,6 @@ fn suite(result: &RunResult, name: &str, testcases: Vec<TestCase>) -> TestSuite 
 struct Case<'a> {
     name: &'a str,
     class: &'a str,
-    file: Option<&'a str>,
     seconds: f64,
     outcome: Outcome,
     out: Option<String>,
@@ -113,7 +208,7 @@ impl Case<'_> {
             time: duration(self.seconds),
             result: self.outcome,
             classname: Some(attribute(self.class)),
-            filepath: self.file.map(attribute),
+            filepath: None,
             system_out: self.out.map(|text| cdata(&text)),
             system_err: None,
         }
@@ -121,13 +216,18 @@ impl Case<'_> {
 }
 
 /// The outcome for a verdict; `kind` is the requirement id of a fail.
-fn outcome(verdict: Option<Verdict>, kind: &str, message: &str, cause: &str) -> Outcome {
+fn outcome(verdict: Option<Verdict>, kind: &str, message: &str, cause: &str, how: Inconclusive) -> Outcome {
     let message = attribute(message);
     let cause = (!cause.is_empty()).then(|| cdata(cause));
     match verdict {
         Some(Verdict::Pass | Verdict::Warning) => Outcome::Success,
         Some(Verdict::Fail) => Outcome::Failure {
             type_: attribute(kind),
+            message,
+            cause,
+        },
+        Some(Verdict::Inconclusive) if how == Inconclusive::Skip => Outcome::SkippedWithCause {
+            type_: Verdict::Inconclusive.word().to_owned(),
             message,
             cause,
         },
@@ -153,23 +253,24 @@ fn run_case(result: &RunResult) -> TestCase {
                 .unwrap_or("the run ended before its plan did"),
         ),
         (false, None) => Some("nothing was decided"),
+        // Were all of it skipped, nothing would be red.
+        (false, Some(_)) if statement::requirements(result).decided() == 0 => Some("no requirement was decided"),
         (false, Some(_)) => None,
     };
     let statement = statement::statement(result);
     Case {
         name: "the run is complete and decided something",
         class: "run",
-        file: None,
         seconds: 0.0,
         outcome: trouble.map_or(Outcome::Success, |reason| {
-            outcome(Some(Verdict::Error), "", reason, &statement)
+            outcome(Some(Verdict::Error), "", reason, &statement, Inconclusive::Error)
         }),
         out: trouble.is_none().then_some(statement),
     }
     .build()
 }
 
-fn test_case(test: &TestResult) -> TestCase {
+fn test_case(test: &TestResult, how: Inconclusive) -> TestCase {
     let verdict = statement::test_verdict(test);
     let worst = test
         .decisions
@@ -190,13 +291,11 @@ fn test_case(test: &TestResult) -> TestCase {
         .map(|decision| finding(decision))
         .collect::<Vec<_>>()
         .join("\n\n");
-    let place = findings.first().map(|decision| decision.place.as_str());
     Case {
         name: &test.id,
         class: test.id.split_once('/').map_or("tests", |(group, _)| group),
-        file: place.and_then(|place| place.rsplit_once(':')).map(|(file, _)| file),
         seconds: test.seconds,
-        outcome: outcome(verdict, kind, message, &details),
+        outcome: outcome(verdict, kind, message, &details, how),
         out: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{details}")),
     }
     .build()
@@ -229,7 +328,7 @@ fn finding(decision: &Decision) -> String {
     text
 }
 
-fn monitor_case(monitor: &MonitorResult) -> TestCase {
+fn monitor_case(monitor: &MonitorResult, how: Inconclusive) -> TestCase {
     let mut findings: Vec<_> = monitor.findings.iter().collect();
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.verdict));
     let kind = findings.first().map_or("", |finding| finding.requirement.as_str());
@@ -257,10 +356,40 @@ fn monitor_case(monitor: &MonitorResult) -> TestCase {
     Case {
         name: &monitor.id,
         class: "monitors",
-        file: None,
         seconds: 0.0,
-        outcome: outcome(monitor.verdict, kind, message, &lines),
+        outcome: outcome(monitor.verdict, kind, message, &lines, how),
         out: (monitor.verdict == Some(Verdict::Warning)).then_some(lines),
+    }
+    .build()
+}
+
+fn requirement_case(
+    requirement: &RequirementResult,
+    group: &str,
+    finding: Option<&Finding<'_>>,
+    sources: &Sources,
+    how: Inconclusive,
+) -> TestCase {
+    let asks = sources
+        .requirement(&requirement.id)
+        .map_or("", |known| known.text.as_str());
+    // What applies and was not decided is no pass, and what no test can decide is nobody's fault.
+    let verdict = match statement::gap(requirement) {
+        Some(Gap::NotDecided) => Some(Verdict::Inconclusive),
+        _ => requirement.verdict,
+    };
+    let message = match (finding, &requirement.not_decided) {
+        (Some(finding), _) => finding.seen.as_str(),
+        (None, Some(why)) => why.as_str(),
+        (None, None) => "no test came to a decision",
+    };
+    let by = format!("{asks}\ndecided by {}", requirement.decided_by.join(", "));
+    Case {
+        name: &format!("{} {asks}", requirement.id),
+        class: group,
+        seconds: 0.0,
+        outcome: outcome(verdict, &requirement.id, message, &by, how),
+        out: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{by}")),
     }
     .build()
 }

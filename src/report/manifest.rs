@@ -66,7 +66,8 @@ pub enum ManifestError {
 }
 
 /// What verifying a bundle found.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
 pub struct Verification {
     /// Root hash of the manifest as it stands there.
     pub root: String,

@@ -5,6 +5,8 @@
 //! left to others.
 
 pub mod advice;
+pub mod attestation;
+pub mod certificate;
 pub mod clean;
 pub mod compare;
 pub mod coverage;
@@ -12,12 +14,15 @@ pub mod findings;
 pub mod fleet;
 pub mod headline;
 pub mod html;
+pub mod issues;
 pub mod json;
 pub mod junit;
 pub mod known;
 pub mod manifest;
+pub mod markdown;
 pub mod overview;
 pub mod sequence;
+pub mod side_by_side;
 pub mod sources;
 pub mod statement;
 pub mod text;

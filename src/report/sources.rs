@@ -57,6 +57,8 @@ pub struct RequirementText {
     pub interpretation: Option<String>,
     /// How it can be decided.
     pub decided: HowDecided,
+    /// The action it is about, when it binds only a vehicle that offers that action.
+    pub action: Option<String>,
 }
 
 /// How a requirement can be decided.

@@ -193,24 +193,22 @@ pub fn statement(result: &RunResult) -> String {
         "AGV" => "an AGV".to_owned(),
         other => format!("a {}", line(other)),
     };
-    let of_decided = format!("{} decided", many(decided, "requirement"));
+    let applicable = counts.total() - gaps(result).not_applicable;
+    let of_decided = format!("{decided} of {} decided", many(applicable, "applicable requirement"));
     let rest = match open {
         0 => String::new(),
-        1 => "; 1 more applies and was not decided".to_owned(),
-        _ => format!("; {open} more apply and were not decided"),
+        _ => format!("; {open} not decided"),
     };
     let sentence = match result.verdict {
         Some(Verdict::Fail) => {
             let broken = match counts.fail {
                 0 => "a test or monitor failed".to_owned(),
-                1 if decided == 1 => "the only requirement decided is broken".to_owned(),
-                1 => format!("1 of the {of_decided} is broken"),
-                count => format!("{count} of the {of_decided} are broken"),
+                count => format!("{} broken", many(count, "requirement")),
             };
-            format!("{who} does not conform to {standard} as {role}: {broken}{rest}.")
+            format!("{who} does not conform to {standard} as {role}: {broken}; {of_decided}{rest}.")
         }
         Some(Verdict::Error) => format!(
-            "No statement on {who} and {standard} can be made, because the harness or its environment broke; {of_decided} nevertheless, none of them broken."
+            "No statement on {who} and {standard}: the harness or its environment broke; {of_decided}, none of them broken."
         ),
         Some(Verdict::Inconclusive) => {
             let undecided = match counts.inconclusive {
@@ -218,7 +216,7 @@ pub fn statement(result: &RunResult) -> String {
                 count => format!("{} could not be decided", many(count, "requirement")),
             };
             format!(
-                "{who} was not found to break {standard} as {role}, but conformance is not shown either: {undecided}; {of_decided}, none of them broken."
+                "Not decided whether {who} conforms to {standard} as {role}: no violation found, but {undecided}; {of_decided}."
             )
         }
         Some(Verdict::Warning) => {
@@ -232,14 +230,19 @@ pub fn statement(result: &RunResult) -> String {
             format!("Until then {who} broke nothing of {standard} as {role}: {of_decided}{rest}.")
         }
         Some(Verdict::Pass) => {
-            format!("{who} conforms to {standard} as {role} in all it was tested for: {of_decided}, none broken{rest}.")
+            format!("{who} conforms to {standard} as {role} in all that was tested: {of_decided}, none broken{rest}.")
         }
         None if result.tests.iter().any(|test| test.not_applicable.is_some()) => {
             format!("No test applied to {who}, so nothing is said about whether it conforms to {standard} as {role}.")
         }
         None => format!("Nothing was decided about {who} and {standard}."),
     };
-    format!("{partial}{sentence}")
+    let own = if result.suites_modified {
+        "With suites that are not the delivered ones: "
+    } else {
+        ""
+    };
+    format!("{own}{partial}{sentence}")
 }
 
 /// What restricts the statement, one sentence each: what follows from the result itself, then what the run
@@ -267,10 +270,8 @@ pub fn limits(result: &RunResult) -> Vec<String> {
     }
     match undecided(result) {
         0 => {}
-        1 => all.push("Nothing is said about 1 requirement that applies and was not decided.".to_owned()),
-        open => all.push(format!(
-            "Nothing is said about {open} requirements that apply and were not decided."
-        )),
+        1 => all.push("1 applicable requirement was not decided.".to_owned()),
+        open => all.push(format!("{open} applicable requirements were not decided.")),
     }
     let young = result
         .tests

@@ -151,7 +151,7 @@ fn hooks(device: &Device, text: &mut String) {
         if !needs.is_empty() && device.factsheet.is_some() && !has_action(device, needs) {
             continue;
         }
-        let _ = writeln!(text, "\n# Afterwards: {}", one_line(hook.doc));
+        let _ = writeln!(text, "\n# {}", one_line(hook.doc));
         let _ = writeln!(text, "# [hooks.{}]\n# prompt = \"…\"", hook.name);
     }
 }

@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::bench::Vantage;
 use crate::journal::event::{MockVehicle, RunHeader, Setting};
 use crate::pack::{Pack, Participant};
+use crate::result::CERTIFY;
 
 /// Format of the journal.
 pub const JOURNAL_FORMAT: &str = "vda5050-tck.journal/1";
@@ -23,6 +24,8 @@ pub struct HeaderParts<'a> {
     pub pack: &'a Pack,
     /// Identifier of the run.
     pub run: &'a str,
+    /// Whether nothing is left to choose: the run is for a certificate.
+    pub certifies: bool,
     /// From where the harness sees.
     pub vantage: Vantage,
     /// SHA-256 over suites, schemas and requirements.
@@ -64,6 +67,7 @@ impl HeaderParts<'_> {
             format: JOURNAL_FORMAT.to_owned(),
             tool: tool(),
             run: self.run.to_owned(),
+            mode: self.certifies.then(|| CERTIFY.to_owned()),
             role: self.subject.role.word().to_owned(),
             protocol: self.pack.version.to_string(),
             manufacturer: self.subject.manufacturer.clone(),

@@ -227,8 +227,8 @@ fn request(method: &str, url: &str, body: Option<&str>) -> HookOutcome {
 
 fn ask(text: &str) -> HookOutcome {
     match inquire::Confirm::new(text).with_default(true).prompt() {
-        Ok(true) => HookOutcome::Done("a person says that it is done".to_owned()),
-        Ok(false) => HookOutcome::Failed("a person says that it is not done".to_owned()),
+        Ok(true) => HookOutcome::Done("the operator answered: done".to_owned()),
+        Ok(false) => HookOutcome::Failed("the operator answered: not done".to_owned()),
         Err(error) => HookOutcome::Failed(error.to_string()),
     }
 }

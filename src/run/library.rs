@@ -19,18 +19,35 @@ pub struct Library {
     pub rules: Rules,
 }
 
+/// A folder of suites, laid out like `suites/`.
+#[derive(Clone, Copy, Debug)]
+pub enum Own<'a> {
+    /// Its files stand beside the built-in ones.
+    Added(&'a Path),
+    /// Its files take the place of the built-in ones.
+    Alone(&'a Path),
+}
+
 impl Library {
-    /// Loads the embedded files, or those of `suites` in place of the embedded suites.
+    /// Loads the embedded files, and those of a folder.
     ///
     /// # Errors
     /// Every mistake in them.
-    pub fn load(suites: Option<&Path>) -> Result<Self, Vec<Diagnostic>> {
-        let assets = match suites {
+    pub fn load(own: Option<Own<'_>>) -> Result<Self, Vec<Diagnostic>> {
+        let unreadable = |folder: &Path, error: std::io::Error| {
+            let title = format!("the suites in {} cannot be read: {error}", folder.display());
+            let hint = match error.kind() {
+                std::io::ErrorKind::AlreadyExists => {
+                    "give the file another name, or use the folder alone, without the built-in suites, by --replace-suites"
+                }
+                _ => "give a folder that is laid out like `suites/` (`vda5050-tck init --suites DIR` writes one)",
+            };
+            vec![Diagnostic::whole("unreadable", title).hint(hint)]
+        };
+        let assets = match own {
             None => Assets::embedded(),
-            Some(folder) => Assets::with_suites(folder).map_err(|error| {
-                let title = format!("the suites in {} cannot be read: {error}", folder.display());
-                vec![Diagnostic::whole("unreadable", title).hint("give a folder that is laid out like `suites/`")]
-            })?,
+            Some(Own::Added(folder)) => Assets::with_added(folder).map_err(|error| unreadable(folder, error))?,
+            Some(Own::Alone(folder)) => Assets::with_suites(folder).map_err(|error| unreadable(folder, error))?,
         };
         let packs = Packs::load(&assets).map_err(|error| vec![Diagnostic::whole("pack", error.to_string())])?;
         let catalogue = Catalogue::load(&assets)?;

@@ -37,7 +37,7 @@ pub use capabilities::Capabilities;
 pub use discover::{Device, Heard, Position, listen};
 pub use draft::{Wishes, draft};
 pub use header::{HeaderParts, tool};
-pub use library::Library;
+pub use library::{Library, Own};
 pub use outputs::{OutputError, sources, write_all, write_result};
 pub use over_sockets::{Place, RunError, SocketRun};
 pub use plan::{How, PlanLine, RunPlan, Use, Waits};

@@ -3,6 +3,7 @@
 use super::bundle::{Bundle, BundleError};
 use crate::journal::Journal;
 use crate::pack::{Catalogue, Decided, Pack};
+use crate::report::junit::Inconclusive;
 use crate::report::sources::{HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use crate::report::{html, json, junit, manifest};
 use crate::result::RunResult;
@@ -41,6 +42,7 @@ pub fn sources(catalogue: &Catalogue, suites: &Suites, pack: &Pack) -> Sources {
             mood: note.mood.word().to_owned(),
             section: note.section.clone(),
             interpretation: requirement.interpretation.clone(),
+            action: requirement.needs.iter().find_map(|need| offered(need)),
             decided: match &requirement.decided {
                 Decided::Active => HowDecided::Active,
                 Decided::Passive => HowDecided::Passive,
@@ -61,6 +63,12 @@ pub fn sources(catalogue: &Catalogue, suites: &Suites, pack: &Pack) -> Sources {
     }
 }
 
+/// The action of a need such as `factsheet_capability:agvActions.pick`.
+fn offered(need: &str) -> Option<String> {
+    let name = need.strip_prefix("factsheet_capability:agvActions.")?;
+    Some(name.to_owned())
+}
+
 /// Writes `result.json`, as after every test.
 ///
 /// # Errors
@@ -78,9 +86,16 @@ pub fn write_all(
     result: &RunResult,
     sources: &Sources,
     journal: &Journal,
+    inconclusive: Inconclusive,
 ) -> Result<String, OutputError> {
     write_result(bundle, result)?;
-    bundle.write("junit.xml", junit::render(result)?.as_bytes())?;
+    let flavour = junit::Flavour {
+        inconclusive,
+        root: None,
+    };
+    bundle.write("junit.xml", junit::render(result, flavour)?.as_bytes())?;
+    let by_requirement = junit::by_requirement(result, sources, flavour)?;
+    bundle.write("junit-requirements.xml", by_requirement.as_bytes())?;
     let page = html::render(result, sources, Some(journal)).map_err(|error| OutputError::Html(error.to_string()))?;
     bundle.write("report.html", page.as_bytes())?;
     Ok(manifest::Manifest::write(bundle.folder())?.root)

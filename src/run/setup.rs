@@ -39,6 +39,8 @@ pub struct Request {
     pub command: Vec<String>,
     /// Whether the run ends after the first test that fails.
     pub fail_fast: bool,
+    /// Whether nothing is left to choose: the run is for a certificate.
+    pub certifies: bool,
 }
 
 impl Request {
@@ -52,6 +54,7 @@ impl Request {
             run: uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
             command: Vec::new(),
             fail_fast: false,
+            certifies: false,
         }
     }
 }
@@ -175,6 +178,7 @@ impl DeviceUnderTest {
             subject: &self.subject,
             pack,
             run: &request.run,
+            certifies: request.certifies,
             vantage: bench.vantage,
             suites: &library.rules.sha256,
             modified: library.assets.modified(),

@@ -11,7 +11,7 @@ use super::setup::{BenchFacts, DeviceUnderTest, Request};
 use crate::bench::{LinkError, Vantage};
 use crate::clock::{Moment, Stamp};
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
-use crate::journal::event::{Event, Occurrence};
+use crate::journal::event::{Event, Occurrence, Setting};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::link::Link;
@@ -53,6 +53,10 @@ pub struct VirtualRun {
     pub command: Vec<String>,
     /// Whether the run ends after the first test that fails.
     pub fail_fast: bool,
+    /// Whether nothing is left to choose: the run is for a certificate.
+    pub certifies: bool,
+    /// Effective settings, for the record.
+    pub settings: Vec<Setting>,
 }
 
 impl VirtualRun {
@@ -82,6 +86,8 @@ impl VirtualRun {
             run: "virtual".to_owned(),
             command: Vec::new(),
             fail_fast: false,
+            certifies: false,
+            settings: Vec::new(),
         }
     }
 }
@@ -142,6 +148,7 @@ pub async fn run_virtually(
     }
     let operator = OnTheBus(device.hooks());
     let mut tested = DeviceUnderTest::built_in(device, true);
+    tested.settings.clone_from(&request.settings);
     if let Err(why) = &request.motion {
         tested.stand_still(why);
     }
@@ -158,6 +165,7 @@ pub async fn run_virtually(
         run: request.run,
         command: request.command,
         fail_fast: request.fail_fast,
+        certifies: request.certifies,
     };
     let (header, setup) = tested.on(bench, asked, library, pack);
     let header = Box::new(header);

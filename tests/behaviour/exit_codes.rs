@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::bench::{Bench, Profile, QUICK, REFUSAL};
 use crate::mosquitto::free_port;
-use crate::tool::run;
+use crate::tool::{Running, run, tool};
 
 #[test]
 fn a_device_that_conforms_is_0_over_tcp_and_leaves_a_whole_bundle() {
@@ -109,8 +109,31 @@ fn a_certificate_for_a_vehicle_that_may_not_drive_is_2_and_says_why() {
             .run(&["certify", "--profile", "device.toml"])
             .code(2)
             .says("the profile does not allow motion")
-            .says("allowed = true");
+            .says("allowed = true")
+            .says("`certificate.laboratory` is missing")
+            .says("--firmware-version");
     }
+    assert!(!bench.path().join("reports").exists(), "nothing was tried");
+}
+
+#[test]
+fn a_certificate_names_each_thing_that_profile_and_bench_lack() {
+    let bench = Bench::new();
+    let text = "[device]\nmanufacturer = \"ACME\"\nserial-number = \"0001\"\n[motion]\nallowed = true\n\
+                [certificate]\nlaboratory = \"L\"\nplace = \"P\"\nhardware-version = \"A\"\nfirmware-version = \"1\"\n";
+    fs::write(bench.path().join("device.toml"), text).unwrap();
+    let certify = ["certify", "--profile", "device.toml", "--tester", "T"];
+    bench
+        .run(&certify)
+        .code(2)
+        .says("[hooks.power-cycle]: tell how it is done")
+        .says("device.pick = …: name it in the profile")
+        .says("the profile has no layout");
+    let mut modified = tool(bench.path(), &certify);
+    Running::start(modified.env("VDA5050_TCK_SUITES", "own"))
+        .end()
+        .code(2)
+        .says("VDA5050_TCK_SUITES names others");
     assert!(!bench.path().join("reports").exists(), "nothing was tried");
 }
 
@@ -142,9 +165,30 @@ fn a_wrong_suite_is_2_and_shows_the_place() {
         .says("nowhere");
     fs::remove_dir_all(own.join("requirements")).unwrap();
     bench
-        .run(&["list", "tests", "--suites", "own"])
+        .run(&["list", "tests", "--suites", "own", "--replace-suites"])
         .code(2)
         .says("needs a copy of that folder");
+    fs::remove_file(folder.join("typo.yaml")).unwrap();
+    bench
+        .run(&["init", "--suites", "built-in"])
+        .code(0)
+        .prints("built-in/requirements");
+    let written = bench.path().join("built-in");
+    let test = fs::read_to_string(written.join("agv/order-rejection/unreadable.yaml")).unwrap();
+    assert!(written.join("schemas/suite.schema.json").is_file() && written.join("default.toml").is_file());
+    bench
+        .run(&["init", "--suites", "built-in"])
+        .code(2)
+        .says("is there already");
+    fs::write(
+        folder.join("mine.yaml"),
+        test.replace("test: order-rejection/unreadable", "test: own/mine"),
+    )
+    .unwrap();
+    bench
+        .run(&["run", "--virtual", "--suites", "own", "own/mine", "--quiet"])
+        .code(0)
+        .prints("With suites that are not the delivered ones: ");
 }
 
 fn copy(from: &Path, to: &Path) {

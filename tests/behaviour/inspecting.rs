@@ -129,7 +129,7 @@ fn a_list_is_of_one_version_and_one_side() {
 }
 
 #[test]
-fn hooks_are_listed_with_what_is_true_afterwards() {
+fn hooks_are_listed_with_what_to_do() {
     insta::assert_snapshot!(run(&["list", "hooks"]).code(0).stdout);
 }
 

@@ -14,6 +14,7 @@ mod inspecting;
 mod interrupted;
 mod mosquitto;
 mod output;
+mod papers;
 mod planning;
 mod rejudging;
 mod repeatable;

@@ -41,7 +41,7 @@ fn it_is_online_until_it_is_interrupted_and_offline_afterwards() {
     let Some(mosquitto) = Mosquitto::start() else { return };
     let bench = Bench::new();
     let mut agv = bench.agv(mosquitto.port, &[]);
-    agv.line("1 reference AGV(s) on ");
+    agv.line("1 simulated AGV(s) on ");
     let online = retained(mosquitto.port, "ONLINE");
     assert_eq!(
         (&online["manufacturer"], &online["serialNumber"]),
@@ -284,7 +284,7 @@ fn an_awkward_vehicle_is_asked_for_by_a_word() {
         "shutdown",
     ];
     let mut agv = Running::start(&mut tool(bench.path(), &arguments));
-    agv.line("1 reference AGV(s) on ");
+    agv.line("1 simulated AGV(s) on ");
     agv.interrupt();
     agv.end().code(0);
 }

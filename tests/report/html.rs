@@ -157,9 +157,12 @@ fn sections_stand_in_the_order_a_reader_needs_them() {
     let document = parse(&fail);
     let headings: Vec<String> = named(&document, "h2").map(text).collect();
     let expected = [
+        "Findings",
+        "To decide more",
         "In numbers",
         "Limits of this statement",
-        "Why nothing was decided",
+        "Time line",
+        "Reaction times",
         "Requirements by chapter",
         "Tests",
         "Monitors",
@@ -244,6 +247,23 @@ fn gaps_are_visible_and_told_apart() {
             .count(),
         12
     );
+}
+
+#[test]
+fn findings_stand_first_and_lead_to_each_other() {
+    let [pass, fail, ..] = pages();
+    let document = parse(&fail);
+    let first = named(&document, "tr").nth(1).expect("a row of the findings");
+    assert!(text(first).starts_with("✕ failORD-REJ-12"), "{}", text(first));
+    let tests: Vec<&str> = named(&document, "details")
+        .filter_map(|node| node.attribute("class"))
+        .filter(|class| class.starts_with("test "))
+        .collect();
+    assert_eq!(tests.first(), Some(&"test of-fail fail"), "what is broken comes first");
+    assert!(!tests[1..].contains(&"test of-fail fail"));
+    let shown = text(document.root());
+    assert!(shown.contains("all findings"));
+    assert!(text(parse(&pass).root()).contains("None: no requirement that was decided is broken"));
 }
 
 #[test]

@@ -2,9 +2,11 @@
 //! miss, and a partial one in which every string is hostile.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test says what it expected")]
 
+mod certificate;
 mod html;
 mod json;
 mod junit;
 mod picture;
 mod samples;
+mod side_by_side;
 mod text;

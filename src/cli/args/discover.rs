@@ -49,6 +49,7 @@ const INIT_HELP: &str = "\
 Examples:
   vda5050-tck init --broker mqtt://127.0.0.1:1883 --manufacturer ACME --serial 0001
   vda5050-tck init --broker mqtt://127.0.0.1:1883 --lif hall.lif.json --vehicle-type ACME.Carrier
+  vda5050-tck init --suites own                      what tests of your own can begin with
 
 It listens as `discover` does and writes a commented profile. Nothing is sent to the device, and motion stays off.";
 
@@ -77,4 +78,7 @@ pub struct Init {
     /// Write over a file that is there
     #[arg(long)]
     pub force: bool,
+    /// Write the built-in suites, the schemas for editors and every setting with its default into this folder, and no profile
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["broker", "username", "tls_ca", "topic", "seconds", "manufacturer", "serial", "lif", "file", "force"])]
+    pub suites: Option<PathBuf>,
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{Format, SuiteArgs};
+use super::{Format, InconclusiveArg, SuiteArgs};
 use crate::pack::Role;
 
 const LIST_HELP: &str = "\
@@ -30,6 +30,9 @@ pub struct List {
     /// Of the coverage, only what nothing decides
     #[arg(long)]
     pub uncovered: bool,
+    /// The requirements as a page of Markdown, with what decides them and how the catalogue reads them
+    #[arg(long)]
+    pub page: bool,
     /// How it is written
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
@@ -82,8 +85,8 @@ pub struct Explain {
 const VALIDATE_HELP: &str = "\
 Examples:
   vda5050-tck validate device.toml hall.lif.json
-  vda5050-tck validate state.json --topic state --protocol 1.2
-  vda5050-tck validate suites/agv/order/*.yaml";
+  vda5050-tck validate state.json --topic state
+  vda5050-tck validate suites/agv/order-rejection/*.yaml";
 
 /// `validate`.
 #[derive(Clone, Debug, Args)]
@@ -108,7 +111,12 @@ Examples:
   vda5050-tck report reports/acme-0001/RUN              render it again
   vda5050-tck report --verify reports/acme-0001/RUN     are the files what they were?
   vda5050-tck report --rejudge reports/acme-0001/RUN    same journal, same verdicts?
-  vda5050-tck report --compare BEFORE AFTER             what became better or worse";
+  vda5050-tck report --verify --root sha256:HASH DIR    is it the bundle that a certificate names?
+  vda5050-tck report --certificate DIR > paper.html     two to four pages of A4 for a run of `certify`
+  vda5050-tck report --attestation DIR > attestation.json   for a signer, such as cosign
+  vda5050-tck report --as code-quality DIR > quality.json   for a pipeline; see docs/ci.md
+  vda5050-tck report --compare BEFORE AFTER             what became better or worse
+  vda5050-tck report --compare A B C --page > runs.html a page: requirement by run";
 
 /// `report`.
 #[derive(Clone, Debug, Args)]
@@ -123,9 +131,27 @@ pub struct Report {
     /// Derive all verdicts from the journal again and compare them; nothing is written
     #[arg(long, conflicts_with = "verify")]
     pub rejudge: bool,
-    /// Compare two finished runs
-    #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"], conflicts_with_all = ["verify", "rejudge"])]
+    /// The root hash that the bundle must have, as a certificate names it
+    #[arg(long, value_name = "sha256:HASH", requires = "verify", value_parser = parse_root)]
+    pub root: Option<String>,
+    /// Print the certificate of a run of `certify` as HTML for two to four pages of A4
+    #[arg(long, conflicts_with_all = ["verify", "rejudge"])]
+    pub certificate: bool,
+    /// Print an in-toto statement about the bundle, ready to be signed
+    #[arg(long, conflicts_with_all = ["verify", "rejudge", "certificate"])]
+    pub attestation: bool,
+    /// Print it for a pipeline
+    #[arg(long = "as", value_name = "WHAT", value_enum, conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare"])]
+    pub rendering: Option<Rendering>,
+    /// How JUnit XML shows what was not decided
+    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    pub inconclusive: InconclusiveArg,
+    /// Compare finished runs, each with the one before it
+    #[arg(long, num_args = 2.., value_name = "DIR", conflicts_with_all = ["verify", "rejudge", "certificate", "attestation"])]
     pub compare: Option<Vec<PathBuf>>,
+    /// Print the comparison as a page of HTML: requirement by run
+    #[arg(long, requires = "compare")]
+    pub page: bool,
     /// How it is written to standard output
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
@@ -139,4 +165,28 @@ pub(super) fn parse_role(text: &str) -> Result<Role, String> {
         .into_iter()
         .find(|role| role.word() == text)
         .ok_or_else(|| format!("a role is `{}` or `{}`", Role::Agv, Role::MasterControl))
+}
+
+/// What a finished run is printed as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Rendering {
+    /// JUnit XML with a case for each test and monitor
+    Junit,
+    /// JUnit XML with a case for each requirement
+    JunitRequirements,
+    /// Markdown, such as for the summary page of a step
+    Markdown,
+    /// Code quality of GitLab
+    CodeQuality,
+    /// SARIF 2.1.0
+    Sarif,
+}
+
+/// A root hash as it is printed, without `sha256:`.
+fn parse_root(text: &str) -> Result<String, String> {
+    let hash = text.strip_prefix("sha256:").unwrap_or(text);
+    if hash.len() == 64 && hash.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+        return Ok(hash.to_ascii_lowercase());
+    }
+    Err("a root hash is `sha256:` and 64 hexadecimal digits, as a run prints it at its end".to_owned())
 }

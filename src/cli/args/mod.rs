@@ -18,10 +18,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::report::junit::Inconclusive;
+use crate::run::Own;
+
 pub use audit::Audit;
 pub use discover::{Discover, Init, ListenArgs};
-pub use inspect::{Explain, List, Listing, Report, Validate};
-pub use run::{Certify, Qualify, Run, Shard};
+pub use inspect::{Explain, List, Listing, Rendering, Report, Validate};
+pub use run::{CertificateArgs, Certify, Qualify, Run, Shard};
 pub use selection::SelectionArgs;
 pub use shell::{Completions, Man};
 pub use simulate::{ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, VehicleArg};
@@ -65,11 +68,11 @@ pub enum Command {
     Audit(Audit),
     /// Check files: messages, suites, profiles, layouts or results, told apart by their content
     Validate(Validate),
-    /// Be a device on a broker: a reference AGV or a reference master control
+    /// Simulate a device on a broker: a reference AGV or a reference master control
     Simulate(Simulate),
     /// Render the report of a finished run again, verify it, judge it again, or compare two
     Report(Report),
-    /// Prove the harness: the reference passes everything, and every check is failed by a fault
+    /// Self-test: the reference devices pass everything, and every check is failed by a fault
     Qualify(Qualify),
     /// Show who speaks on a broker; nothing is sent
     Discover(Discover),
@@ -79,6 +82,24 @@ pub enum Command {
     Completions(Completions),
     /// Print the manual page, or write a page for every command
     Man(Man),
+}
+
+impl Command {
+    /// How the command writes, errors included.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        match self {
+            Self::Run(arguments) => arguments.output.format,
+            Self::Certify(arguments) => arguments.output.format,
+            Self::List(arguments) => arguments.format,
+            Self::Validate(arguments) => arguments.format,
+            Self::Report(arguments) => arguments.format,
+            Self::Qualify(arguments) => arguments.format,
+            Self::Discover(arguments) => arguments.format,
+            Self::Audit(arguments) => arguments.format,
+            Self::Explain(_) | Self::Simulate(_) | Self::Init(_) | Self::Completions(_) | Self::Man(_) => Format::Text,
+        }
+    }
 }
 
 /// Settings of the device and the bench; each is also a setting of the profile.
@@ -166,7 +187,7 @@ pub struct OutputArgs {
         hide_env_values = true
     )]
     pub format: Format,
-    /// Say more: every effective setting with its origin; twice, every step
+    /// Verbose: every effective setting with its origin; twice, every step
     #[arg(short, long, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     pub verbose: u8,
     /// Say less: no line per test and no details, only the verdict and what is broken
@@ -175,6 +196,9 @@ pub struct OutputArgs {
     /// Show tests that failed or broke, and no others
     #[arg(long, conflicts_with = "quiet")]
     pub failures: bool,
+    /// How junit.xml shows what was not decided
+    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    pub inconclusive: InconclusiveArg,
     /// Show the NUMBER tests that took longest
     #[arg(long, value_name = "NUMBER")]
     pub slowest: Option<usize>,
@@ -190,10 +214,45 @@ pub enum Format {
     Json,
 }
 
+/// How a build server is told of what was not decided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum InconclusiveArg {
+    /// As an error: the build is red
+    #[default]
+    Error,
+    /// As skipped
+    Skip,
+}
+
+impl From<InconclusiveArg> for Inconclusive {
+    fn from(argument: InconclusiveArg) -> Self {
+        match argument {
+            InconclusiveArg::Error => Self::Error,
+            InconclusiveArg::Skip => Self::Skip,
+        }
+    }
+}
+
 /// The suites to be used.
 #[derive(Clone, Debug, Default, Args)]
 pub struct SuiteArgs {
-    /// Use the suites of this folder instead of the built-in ones; the report says so
+    /// Use the suites of this folder beside the built-in ones; the verdict says so
     #[arg(long, value_name = "DIR", env = "VDA5050_TCK_SUITES", hide_env_values = true)]
     pub suites: Option<PathBuf>,
+    /// Use the suites of --suites alone, without the built-in ones
+    #[arg(long, requires = "suites")]
+    pub replace_suites: bool,
+}
+
+impl SuiteArgs {
+    /// The folder of suites, if one is given.
+    #[must_use]
+    pub fn own(&self) -> Option<Own<'_>> {
+        let folder = self.suites.as_deref()?;
+        Some(if self.replace_suites {
+            Own::Alone(folder)
+        } else {
+            Own::Added(folder)
+        })
+    }
 }

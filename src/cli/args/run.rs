@@ -51,6 +51,9 @@ pub struct Run {
     /// Whether it is for a certificate.
     #[arg(skip)]
     pub certifies: bool,
+    /// What the certificate says, by the names of settings.
+    #[arg(skip)]
+    pub said: Vec<(&'static str, String)>,
     /// Give the built-in device a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(
         long,
@@ -91,10 +94,66 @@ pub struct Run {
 
 const CERTIFY_HELP: &str = "\
 A certificate has to mean the same for everybody. So there is no filter, no modified suite, and no \
-changed timing: a profile that sets `[time]` is refused, and so is a run without a profile.
+changed timing: a profile that sets `[time]` is refused, and so is a run without a profile, a vehicle that may not \
+drive, and a profile that leaves out what tests need of bench or device. What a certificate says of laboratory, tester, \
+place and device comes from the section [certificate] of the profile, or from flags.
 
-Example:
-  vda5050-tck certify --profile device.toml";
+Examples:
+  vda5050-tck certify --profile device.toml --tester \"A. Person\"
+  vda5050-tck report --certificate reports/latest > certificate.html   two to four pages of A4";
+
+/// What a certificate says about who tested what; each is also a setting of the profile.
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Certificate")]
+pub struct CertificateArgs {
+    /// Name of the laboratory or company that tests
+    #[arg(long, value_name = "NAME")]
+    pub laboratory: Option<String>,
+    /// Number of the report, unique in the laboratory
+    #[arg(long, value_name = "NUMBER")]
+    pub number: Option<String>,
+    /// Who has ordered the test
+    #[arg(long, value_name = "NAME")]
+    pub customer: Option<String>,
+    /// The person who tests
+    #[arg(long, value_name = "NAME")]
+    pub tester: Option<String>,
+    /// The person who authorises the report
+    #[arg(long, value_name = "NAME")]
+    pub authorised_by: Option<String>,
+    /// Where the test takes place
+    #[arg(long, value_name = "PLACE")]
+    pub place: Option<String>,
+    /// Which piece is tested, and in which state
+    #[arg(long, value_name = "TEXT")]
+    pub sample: Option<String>,
+    /// Version of the hardware of the device
+    #[arg(long, value_name = "VERSION")]
+    pub hardware_version: Option<String>,
+    /// Version of the software of the device
+    #[arg(long, value_name = "VERSION")]
+    pub firmware_version: Option<String>,
+}
+
+impl CertificateArgs {
+    /// The flags that were given, by the names of the settings they set.
+    #[must_use]
+    pub fn settings(&self) -> Vec<(&'static str, String)> {
+        let texts = [
+            ("certificate.laboratory", &self.laboratory),
+            ("certificate.number", &self.number),
+            ("certificate.customer", &self.customer),
+            ("certificate.tester", &self.tester),
+            ("certificate.authorised-by", &self.authorised_by),
+            ("certificate.place", &self.place),
+            ("certificate.sample", &self.sample),
+            ("certificate.hardware-version", &self.hardware_version),
+            ("certificate.firmware-version", &self.firmware_version),
+        ];
+        let given = texts.into_iter();
+        given.filter_map(|(name, text)| Some((name, text.clone()?))).collect()
+    }
+}
 
 /// `certify`.
 #[derive(Clone, Debug, Default, Args)]
@@ -112,6 +171,9 @@ pub struct Certify {
     /// Try every case from schemas and matrices, and not a few of them
     #[arg(long)]
     pub thorough: bool,
+    /// Who tests what.
+    #[command(flatten)]
+    pub certificate: CertificateArgs,
     /// Where results go.
     #[command(flatten)]
     pub output: OutputArgs,

@@ -52,7 +52,7 @@ Examples:
   vda5050-tck simulate agv --fault outdated-update-taken-over
   vda5050-tck simulate agv --persona ignore-orders --persona 'set-battery={\"charge\": 10}'
 
-Runs until it is interrupted (Ctrl-C), and then signs off in good order.";
+Runs until you press Ctrl-C, and then disconnects in good order.";
 
 /// `simulate agv`.
 #[derive(Clone, Debug, Args)]
@@ -79,7 +79,7 @@ pub struct SimulatedAgv {
     /// Give it a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(long, value_name = "NAME")]
     pub tolerance: Vec<String>,
-    /// Make it awkward from the start, as a word of `list vehicle`, with its parameters as a JSON object behind `=`; may
+    /// Start with this behaviour (see `list vehicle`), with its parameters as a JSON object behind `=`; may
     /// be repeated
     #[arg(long, value_name = "WORD")]
     pub persona: Vec<PersonaArg>,
@@ -96,7 +96,7 @@ Examples:
   curl http://127.0.0.1:8080/                 what can be asked of it
 
 Parameters are those of `list hooks`; an empty text is a parameter that is not there.
-Runs until it is interrupted (Ctrl-C), and then signs off in good order.";
+Runs until you press Ctrl-C, and then disconnects in good order.";
 
 /// `simulate master-control`.
 #[derive(Clone, Debug, Args)]

@@ -124,3 +124,47 @@ fn variables_of_flags_are_known_to_the_settings() {
         panic!("{}", wrong[0]);
     }
 }
+
+/// The examples of a command and of those below it.
+fn examples(command: &clap::Command) -> Vec<String> {
+    let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    let own = text.lines().filter_map(|line| {
+        let line = line.trim_start();
+        // What stands after two blanks, or where the output goes, is no part of the command.
+        let (line, _) = line.split_once("  ").unwrap_or((line, ""));
+        let (line, _) = line.split_once(" > ").unwrap_or((line, ""));
+        let hash = format!("sha256:{}", "0".repeat(64));
+        Some(
+            line.strip_prefix("vda5050-tck ")?
+                .trim_end()
+                .replace("sha256:HASH", &hash),
+        )
+    });
+    let own: Vec<String> = own.collect();
+    own.into_iter()
+        .chain(command.get_subcommands().flat_map(examples))
+        .collect()
+}
+
+#[test]
+fn every_example_in_a_help_is_a_command_and_names_tests_that_exist() {
+    let all = examples(&Cli::command());
+    assert!(all.len() > 30, "only {} examples were found", all.len());
+    let library = crate::run::Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let protocol = library.rules.packs.latest().id.clone();
+    for line in all {
+        let patterns = match parse(&line) {
+            Ok(Command::Run(run)) => run.tests,
+            Ok(Command::Qualify(qualify)) => qualify.tests,
+            Ok(_) => Vec::new(),
+            Err(error) => panic!("{line}: {error}"),
+        };
+        let tests = library.tests(crate::pack::Role::Agv, &protocol);
+        let found = crate::cli::select::select(&tests, &patterns);
+        assert!(
+            found.is_ok(),
+            "{line}: {}",
+            found.err().map_or(String::new(), |wrong| wrong.title)
+        );
+    }
+}

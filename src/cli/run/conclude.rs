@@ -19,10 +19,17 @@ impl Job {
     pub(super) fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Screen) -> Result<Exit, Problem> {
         let Finished { end, result, recorder } = finished;
         let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
-        let root = write_all(bundle, &result, &quoted, recorder.journal());
+        let root = write_all(
+            bundle,
+            &result,
+            &quoted,
+            recorder.journal(),
+            self.output.inconclusive.into(),
+        );
         let root = root.map_err(|error| Problem::Environment(error.to_string()))?;
         terminal.finish();
         let shown = bundle.folder().display().to_string();
+        crate::cli::pipeline::tell(&result, &quoted, &shown);
         match self.output.format {
             args::Format::Json => {
                 let text =

@@ -338,7 +338,7 @@ impl Goal {
             }
             (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
             (None, None) if violated => {
-                let why = "what had to hold until then was broken before";
+                let why = "not judged: the condition before it failed";
                 (Holds::Unseen(why.to_owned()), why.to_owned(), None)
             }
             (None, None) => {

@@ -200,7 +200,7 @@ impl Expecting {
             clause.nearest.clone_from(&nearest);
             clause.expected = self.selector.expected();
         }
-        let unseen = "the message it judges did not come";
+        let unseen = "the message to be judged was not received";
         for (word, assertions) in [("assert", &self.verb.assert), ("prefer", &self.verb.prefer)] {
             clauses.extend(assertions.iter().map(|assertion| Clause {
                 requirement: assertion.requirement.clone(),

@@ -111,7 +111,7 @@ impl Fetching {
         if self.taken.is_some() {
             clauses.extend(self.asserted);
         } else {
-            let unseen = "the message it judges did not come";
+            let unseen = "the message to be judged was not received";
             clauses.extend(self.verb.assert.iter().map(|assertion| Clause {
                 requirement: assertion.requirement.clone(),
                 word: "assert",

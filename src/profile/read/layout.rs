@@ -97,7 +97,7 @@ impl Reader<'_> {
             }
             for end in [&edge.start, &edge.end] {
                 if !ids.contains(&end.as_str()) {
-                    let title = format!("edge `{}` touches `{end}`, which is not a node", edge.id);
+                    let title = format!("edge `{}` ends at the unknown node `{end}`", edge.id);
                     let hint = diagnostic::did_you_mean(end, ids.iter().copied());
                     wrong.push(Diagnostic::new("unknown-node", edge.span.clone(), title, "this edge").hint(hint));
                 }

@@ -19,7 +19,7 @@ use super::{Deviation, LayoutList};
 use crate::diagnostic::{self, Diagnostic, Source, Span};
 use crate::pack::RequirementId;
 
-const SECTIONS: [&str; 10] = [
+const SECTIONS: [&str; 11] = [
     "device",
     "bench",
     "motion",
@@ -27,6 +27,7 @@ const SECTIONS: [&str; 10] = [
     "vehicles",
     "time",
     "maps",
+    "certificate",
     "deviations",
     "known",
     "hooks",

@@ -9,6 +9,10 @@ use crate::report::headline::{headline, kind};
 
 /// Most messages of one page.
 const PAGE_LIMIT: usize = 600;
+/// Most bytes that messages take up in one page, roughly.
+const BYTES: usize = 2_000_000;
+/// Roughly what a line takes up beside its text.
+const OF_A_LINE: usize = 90;
 /// Most bytes of a payload that are set on lines.
 const PAYLOAD_LIMIT: usize = 64 * 1024;
 
@@ -41,6 +45,7 @@ pub struct Gallery<'a> {
     journal: Option<&'a Journal>,
     shown: BTreeSet<u64>,
     waiting: Vec<MessageView>,
+    bytes: usize,
 }
 
 impl<'a> Gallery<'a> {
@@ -49,6 +54,7 @@ impl<'a> Gallery<'a> {
             journal,
             shown: BTreeSet::new(),
             waiting: Vec::new(),
+            bytes: 0,
         }
     }
 
@@ -75,11 +81,20 @@ impl<'a> Gallery<'a> {
         if self.shown.contains(&seq) {
             return true;
         }
-        let Some(entry) = self.entry(seq).filter(|_| self.shown.len() < PAGE_LIMIT) else {
+        let Some(entry) = self
+            .entry(seq)
+            .filter(|_| self.shown.len() < PAGE_LIMIT && self.bytes < BYTES)
+        else {
             return false;
         };
         self.shown.insert(seq);
-        self.waiting.push(view(entry, role, places));
+        let message = view(entry, role, places);
+        self.bytes += message
+            .lines
+            .iter()
+            .map(|line| line.text.len() + OF_A_LINE)
+            .sum::<usize>();
+        self.waiting.push(message);
         true
     }
 

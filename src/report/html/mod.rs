@@ -7,10 +7,12 @@
 mod escape;
 mod matrix;
 mod messages;
+mod overview_view;
 mod pretty;
 mod source_view;
 mod test_view;
-mod view;
+mod timeline;
+pub(super) mod view;
 
 use std::collections::BTreeMap;
 
@@ -21,12 +23,12 @@ pub use escape::Escape;
 use super::fleet;
 use super::sources::Sources;
 use super::statement;
-use super::undecided;
 use crate::journal::event::Setting;
 use crate::journal::{Event, Journal};
 use crate::result::{Capability, RunResult};
 use matrix::ChapterView;
 use messages::{Gallery, MessageView};
+use overview_view::{AdviceView, FindingView, advice_views, finding_views};
 use test_view::TestView;
 use view::{Badge, CountRow, MonitorView};
 
@@ -40,6 +42,7 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
     let tests = test_view::views(result, sources, &anchors, &mut gallery)?;
     let monitors = view::monitors(result, sources, &anchors, &mut gallery);
     let monitor_messages = gallery.take();
+    let findings = finding_views(result, sources, &anchors, |seq| gallery.shows(seq));
     let shown_tests = tests.iter().filter(|test| !test.not_applicable).count();
     Page {
         title: format!(
@@ -57,11 +60,18 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
         identity: view::identity(result),
         counts: view::counts(result),
         limits: statement::limits(result),
-        undecided: undecided::groups(result),
+        findings,
+        advice: advice_views(result),
+        timeline: timeline::strip(result, &anchors, journal)?,
         fleet: result.fleet.as_ref().map(fleet::line).unwrap_or_default(),
-        reactions: match result.fleet.as_ref().and_then(|fleet| fleet.reaction.as_ref()) {
-            Some(reaction) => fleet::plot(reaction)?,
-            None => String::new(),
+        vehicles: result.fleet.as_ref().map_or_else(Vec::new, view::vehicles),
+        reactions: match (&result.fleet, fleet::answers(result)) {
+            (Some(fleet), _) => match &fleet.reaction {
+                Some(reaction) => fleet::plot(reaction, fleet::ORDERS)?,
+                None => String::new(),
+            },
+            (None, Some(answers)) => fleet::plot(&answers, fleet::ANSWERS)?,
+            (None, None) => String::new(),
         },
         chapters: matrix::chapters(result, sources, &anchors),
         not_applicable: tests.iter().any(|test| test.not_applicable),
@@ -101,8 +111,11 @@ struct Page<'a> {
     identity: Vec<(&'static str, String)>,
     counts: Vec<CountRow>,
     limits: Vec<String>,
-    undecided: Vec<undecided::Group<'a>>,
+    findings: Vec<FindingView>,
+    advice: Vec<AdviceView>,
+    timeline: String,
     fleet: String,
+    vehicles: Vec<view::VehicleRow>,
     reactions: String,
     chapters: Vec<ChapterView>,
     tests: Vec<TestView>,

@@ -16,6 +16,8 @@ use crate::verdict::Verdict;
 
 /// Most messages shown of one test.
 const MESSAGES: usize = 24;
+/// Most bytes of diagrams in a page. Where there are more, the journal has what they would show.
+const DIAGRAMS: usize = 1_500_000;
 /// Stimuli shown before and after each deciding message.
 const STIMULI: usize = 3;
 
@@ -36,6 +38,10 @@ pub struct TestView {
     pub seconds: String,
     /// Whether there is something to look at.
     pub finding: bool,
+    /// Whether it is unfolded: something was seen that should not be.
+    pub open: bool,
+    /// The findings before and after it, by their places.
+    pub neighbours: (Option<String>, Option<String>),
     pub decisions: Vec<DecisionView>,
     pub steps: Vec<StepView>,
     pub source: Option<SourceView>,
@@ -96,16 +102,53 @@ pub fn views(
     anchors: &Anchors,
     gallery: &mut Gallery<'_>,
 ) -> Result<Vec<TestView>, askama::Error> {
-    let mut all = Vec::with_capacity(result.tests.len());
-    for (at, test) in result.tests.iter().enumerate() {
-        all.push(view(at, test, result, sources, anchors, gallery)?);
+    let mut order: Vec<(usize, &TestResult)> = result.tests.iter().enumerate().collect();
+    // What is broken comes first, and takes its evidence first where there is a limit.
+    order.sort_by_key(|(_, test)| std::cmp::Reverse(weight(test_verdict(test))));
+    let mut drawn = 0;
+    let mut all = Vec::with_capacity(order.len());
+    for (at, test) in order {
+        let view = view(at, test, drawn < DIAGRAMS, result, sources, anchors, gallery)?;
+        drawn += view.diagram.as_ref().map_or(0, String::len);
+        all.push(view);
     }
+    link(&mut all);
     Ok(all)
+}
+
+/// What a reader looks at first: what is broken, then remarks, then what broke the harness, then what stayed open.
+fn weight(verdict: Option<Verdict>) -> u8 {
+    match verdict {
+        Some(Verdict::Fail) => 5,
+        Some(Verdict::Warning) => 4,
+        Some(Verdict::Error) => 3,
+        Some(Verdict::Inconclusive) => 2,
+        Some(Verdict::Pass) => 1,
+        None => 0,
+    }
+}
+
+/// Lets each finding lead to the one before and the one after it.
+fn link(all: &mut [TestView]) {
+    let places: Vec<usize> = (0..all.len()).filter(|at| all[*at].open).collect();
+    let anchor = |at: Option<&usize>| at.map(|at| all[*at].anchor.clone());
+    let neighbours: Vec<_> = (0..places.len())
+        .map(|at| {
+            (
+                anchor(at.checked_sub(1).and_then(|at| places.get(at))),
+                anchor(places.get(at + 1)),
+            )
+        })
+        .collect();
+    for (place, found) in places.into_iter().zip(neighbours) {
+        all[place].neighbours = found;
+    }
 }
 
 fn view(
     at: usize,
     test: &TestResult,
+    draws: bool,
     result: &RunResult,
     sources: &Sources,
     anchors: &Anchors,
@@ -116,7 +159,7 @@ fn view(
     let source = sources.test(&test.id);
     let left_out = if finding { choose(test, gallery) } else { None };
     let diagram = match (gallery.journal(), test.journal) {
-        (Some(journal), Some(window)) if finding => {
+        (Some(journal), Some(window)) if finding && draws => {
             let marked = marked(test);
             let steps = test
                 .steps
@@ -163,6 +206,8 @@ fn view(
         reviewed: test.maturity == "reviewed",
         seconds: seconds(test.seconds),
         finding,
+        open: matches!(verdict, Some(Verdict::Fail | Verdict::Warning | Verdict::Error)),
+        neighbours: (None, None),
         decisions,
         steps: test
             .steps

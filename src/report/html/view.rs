@@ -4,7 +4,7 @@ use super::Anchors;
 use super::messages::Gallery;
 use crate::report::sources::Sources;
 use crate::report::statement::{self, Gap, seconds};
-use crate::result::{RequirementResult, RunResult};
+use crate::result::{CommandedVehicle, FleetResult, RequirementResult, RunResult};
 use crate::verdict::Verdict;
 
 /// Most occurrences of a monitor's finding whose messages are shown.
@@ -98,8 +98,8 @@ pub fn identity(result: &RunResult) -> Vec<(&'static str, String)> {
         "as delivered, "
     };
     let vantage = match result.vantage.as_str() {
-        "tap" => "tap: every packet of the device was seen",
-        "subscriber" => "subscriber: only what the broker delivered was seen",
+        "tap" => "at the level of MQTT packets (proxy)",
+        "subscriber" => "as a subscriber: only what the broker delivered",
         other => other,
     };
     rows.extend([
@@ -107,7 +107,7 @@ pub fn identity(result: &RunResult) -> Vec<(&'static str, String)> {
         ("Protocol", format!("VDA 5050 {}", result.protocol)),
         ("Started", started(&result.started)),
         ("Length", seconds(result.seconds)),
-        ("Vantage", vantage.to_owned()),
+        ("Observation", vantage.to_owned()),
         ("Tool", result.tool.clone()),
         ("Suites", format!("{suites}SHA-256 {}", result.suites_sha256)),
         ("Run", result.run.clone()),
@@ -116,7 +116,7 @@ pub fn identity(result: &RunResult) -> Vec<(&'static str, String)> {
 }
 
 /// `2026-01-31 12:00:00 UTC`; as it stands there when it is no time.
-fn started(text: &str) -> String {
+pub fn started(text: &str) -> String {
     text.parse::<jiff::Timestamp>().map_or_else(
         |_| text.to_owned(),
         |started| started.strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
@@ -308,4 +308,29 @@ pub fn legend() -> Vec<LegendRow> {
             "Nothing in this run decided it. This is a gap, not a pass.",
         ),
     ]
+}
+
+/// One vehicle of a fleet.
+pub struct VehicleRow {
+    pub serial_number: String,
+    pub orders: usize,
+    pub median: String,
+    pub longest: String,
+}
+
+/// The vehicles of a fleet: those without an order first, then by their longest wait.
+pub fn vehicles(fleet: &FleetResult) -> Vec<VehicleRow> {
+    let mut each: Vec<_> = fleet.each.iter().collect();
+    each.sort_by(|one, other| {
+        let waits = |vehicle: &CommandedVehicle| vehicle.longest.unwrap_or(f64::MAX);
+        waits(other).total_cmp(&waits(one))
+    });
+    let time = |millis: Option<f64>| millis.map_or_else(|| "–".to_owned(), crate::report::fleet::millis);
+    let rows = each.into_iter().map(|vehicle| VehicleRow {
+        serial_number: vehicle.serial_number.clone(),
+        orders: vehicle.orders,
+        median: time(vehicle.median),
+        longest: time(vehicle.longest),
+    });
+    rows.collect()
 }

@@ -133,6 +133,7 @@ pub fn sources() -> Sources {
                 interpretation: (*id == "ORD-REJ-12").then(|| {
                     "The table of error types is read as binding; another type is accepted with a remark only where the text gives none.".to_owned()
                 }),
+                action: None,
                 decided: match *how {
                     "active" => HowDecided::Active,
                     "passive" => HowDecided::Passive,

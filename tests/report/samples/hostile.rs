@@ -160,6 +160,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         }],
     }];
     let result = RunResult {
+        mode: Some(HOSTILE.to_owned()),
         tool: evil(),
         run: evil(),
         started: evil(),
@@ -212,6 +213,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             section: evil(),
             interpretation: Some(evil()),
             decided: HowDecided::NotTestable(evil()),
+            action: Some(evil()),
         }],
         tests: vec![TestSource {
             id: format!("{HOSTILE}/fail"),

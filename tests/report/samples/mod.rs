@@ -8,5 +8,6 @@ mod runs;
 
 pub use catalogue::sources;
 pub use hostile::{HOSTILE, hostile};
+pub use parts::setting;
 pub use record::{Recorder, order, state};
 pub use runs::{fail, pass};

@@ -128,6 +128,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
         .chain(monitors.iter().map(|monitor| monitor.verdict));
     let verdict = verdicts.flatten().collect::<Accumulated>().get();
     RunResult {
+        mode: None,
         format: FORMAT.to_owned(),
         tool: "vda5050-tck 0.1.0".to_owned(),
         run: "0193f2b1".to_owned(),

@@ -1,0 +1,67 @@
+//! `certify`: a run with nothing left to choose, and what a profile has to hold before it begins.
+
+use super::args;
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::diagnostic::Diagnostic;
+use crate::pack::Role;
+use crate::profile::{self, Effective, Surroundings};
+use crate::report::certificate::OWED;
+
+/// Names a folder of suites for other commands.
+const OWN_SUITES: &str = "VDA5050_TCK_SUITES";
+
+/// `certify`.
+pub fn certify(arguments: &args::Certify) -> Result<Exit, Problem> {
+    let surroundings = Surroundings::of_process();
+    let said = arguments.certificate.settings();
+    let effective = profile::load(arguments.profile.as_deref(), &said, &surroundings)?;
+    let missing = missing(&effective, &surroundings);
+    if !missing.is_empty() {
+        return Err(Problem::Usage(missing));
+    }
+    super::run::run_command(&args::Run {
+        certifies: true,
+        said,
+        device: args::DeviceArgs {
+            profile: arguments.profile.clone(),
+            ..args::DeviceArgs::default()
+        },
+        output: arguments.output.clone(),
+        thorough: arguments.thorough,
+        certificate: true,
+        ..args::Run::default()
+    })
+}
+
+/// What stands in the way of a certificate, and can be seen in the profile alone.
+fn missing(effective: &Effective, surroundings: &Surroundings) -> Vec<Diagnostic> {
+    let mut all = Vec::new();
+    if let Some(changed) = effective.profile.time.contract().first() {
+        let title = format!("a certificate is given for default timings, and {changed}");
+        let hint =
+            "take it out of the section [time] of the profile, or wherever `run -v` says it comes from, or use `run`";
+        all.push(Diagnostic::whole("certify", title).hint(hint));
+    }
+    if surroundings.environment.contains_key(OWN_SUITES) {
+        let title = format!("a certificate is given for the suites as delivered, and {OWN_SUITES} names others");
+        all.push(
+            Diagnostic::whole("certify", title).hint(format!("take {OWN_SUITES} out of the environment, or use `run`")),
+        );
+    }
+    let is_vehicle = effective.profile.device.role == Role::Agv;
+    if is_vehicle && !effective.profile.motion.allowed {
+        let title = "a certificate is about driving, too, and the profile does not allow motion";
+        let hint =
+            "set `allowed = true` in the section [motion] of the profile where the vehicle may drive, or use `run`";
+        all.push(Diagnostic::whole("certify", title).hint(hint));
+    }
+    let says = |setting: &str| effective.settings.iter().any(|one| one.name == setting);
+    for (setting, what) in OWED.iter().filter(|(setting, _)| !says(setting)) {
+        let name = setting.trim_start_matches("certificate.");
+        let title = format!("a certificate names {what}, and `{setting}` is missing");
+        let hint = format!("set `{name}` in the section [certificate] of the profile, or give --{name}");
+        all.push(Diagnostic::whole("certify", title).hint(hint));
+    }
+    all
+}

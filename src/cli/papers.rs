@@ -1,0 +1,90 @@
+//! `report --certificate`, `--attestation` and `--as`: papers about a bundle that has not been changed.
+
+use std::path::Path;
+
+use super::args::{InconclusiveArg, Rendering};
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::diagnostic::Diagnostic;
+use crate::journal::file::{self, Recording};
+use crate::judge;
+use crate::report::attestation::Attestation;
+use crate::report::certificate::{self, CertificateError};
+use crate::report::junit::{self, Flavour};
+use crate::report::{issues, json, manifest, markdown};
+use crate::result::RunResult;
+use crate::run::{Library, sources};
+
+/// Prints the certificate of a run as HTML.
+pub fn certificate(folder: &Path) -> Result<Exit, Problem> {
+    let library = Library::load(None)?;
+    let (result, root) = intact(folder, &library)?;
+    let pack = super::pack(&library, Some(&result.protocol))?;
+    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+    let page = certificate::render(&result, &quoted, &root).map_err(|error| match error {
+        CertificateError::Template(_) => Problem::Environment(error.to_string()),
+        why => {
+            let title = format!("there is no certificate for {}: {why}", folder.display());
+            let hint = "`vda5050-tck certify` makes a run for a certificate; its report is the one of any run";
+            Diagnostic::whole("certificate", title).hint(hint).into()
+        }
+    })?;
+    super::print(&page)
+}
+
+/// Prints an in-toto statement about the bundle of a run.
+pub fn attestation(folder: &Path) -> Result<Exit, Problem> {
+    let library = Library::load(None)?;
+    let (result, root) = intact(folder, &library)?;
+    let path = folder.join(manifest::NAME);
+    let bytes = std::fs::read(&path)
+        .map_err(|error| Problem::Environment(format!("cannot read {}: {error}", path.display())))?;
+    let text = Attestation::of(&result, &bytes, &root).to_json();
+    super::print(&text.map_err(|error| Problem::Environment(error.to_string()))?)
+}
+
+/// Prints a run for a pipeline.
+pub fn rendered(folder: &Path, rendering: Rendering, inconclusive: InconclusiveArg) -> Result<Exit, Problem> {
+    let library = Library::load(None)?;
+    let (result, root) = intact(folder, &library)?;
+    let pack = super::pack(&library, Some(&result.protocol))?;
+    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+    let flavour = Flavour {
+        inconclusive: inconclusive.into(),
+        root: Some(&root),
+    };
+    let text = match rendering {
+        Rendering::Junit => junit::render(&result, flavour),
+        Rendering::JunitRequirements => junit::by_requirement(&result, &quoted, flavour),
+        Rendering::Markdown => Ok(markdown::summary(&result, &quoted, folder.to_str())),
+        Rendering::CodeQuality => Ok(issues::code_quality(&result)),
+        Rendering::Sarif => Ok(issues::sarif(&result, &quoted)),
+    };
+    super::print(&text.map_err(|error| Problem::Environment(error.to_string()))?)
+}
+
+/// The result of a bundle and its root hash, when every file is what the manifest says and the journal gives this result.
+fn intact(folder: &Path, library: &Library) -> Result<(RunResult, String), Problem> {
+    let found = manifest::Manifest::verify(folder)
+        .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
+    if !found.holds() {
+        let title = format!(
+            "{} is not what its manifest says, and no paper is made of it\n{}",
+            folder.display(),
+            found.text().trim_end()
+        );
+        return Err(Diagnostic::whole("manifest", title).into());
+    }
+    let Recording { journal, .. } = file::read(&folder.join("journal.jsonl"))
+        .map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string())))?;
+    let result = judge::judge(&library.rules, journal.entries())
+        .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
+    let path = folder.join("result.json");
+    let saved = json::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
+    if saved != result {
+        let title = format!("the journal does not give the result that is in {}", path.display());
+        let hint = "`report --rejudge` shows what differs; another version of the tool may judge otherwise";
+        return Err(Diagnostic::whole("result", title).hint(hint).into());
+    }
+    Ok((result, found.root))
+}

@@ -1,0 +1,30 @@
+//! What a pipeline asks for by its environment: annotations and a summary page.
+
+use std::io::Write as _;
+
+use crate::report::markdown;
+use crate::report::sources::Sources;
+use crate::result::RunResult;
+
+/// Names the file of the summary page of a step, on GitHub.
+const SUMMARY: &str = "GITHUB_STEP_SUMMARY";
+/// Set to `true` on GitHub.
+const ACTIONS: &str = "GITHUB_ACTIONS";
+
+/// Tells the pipeline about a run. A page that cannot be written changes no verdict.
+pub(super) fn tell(result: &RunResult, sources: &Sources, report: &str) {
+    if std::env::var(ACTIONS).is_ok_and(|value| value == "true") {
+        eprint!("{}", markdown::annotations(result, sources));
+    }
+    let Some(path) = std::env::var_os(SUMMARY).filter(|path| !path.is_empty()) else {
+        return;
+    };
+    let page = markdown::summary(result, sources, Some(report)) + "\n";
+    let file = std::fs::OpenOptions::new().append(true).create(true).open(&path);
+    if let Err(error) = file.and_then(|mut file| file.write_all(page.as_bytes())) {
+        eprintln!(
+            "the summary page {} ({SUMMARY}) cannot be written: {error}",
+            path.display()
+        );
+    }
+}
