@@ -15,6 +15,7 @@ mod screen;
 mod select;
 mod selection;
 mod shell;
+mod signals;
 mod simulate;
 mod validate;
 

@@ -109,6 +109,12 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
             Ok(record) if record.seq <= last => {
                 return Err(bad(format!("number {} does not rise from {last}", record.seq)));
             }
+            Ok(record) if record.seq != last + 1 => {
+                return Err(bad(format!(
+                    "number {} follows {last}: records are missing",
+                    record.seq
+                )));
+            }
             Ok(record) => {
                 last = record.seq;
                 journal.restore(record);
@@ -212,6 +218,20 @@ mod tests {
         let back = read(&path).expect("read");
         assert!(back.torn);
         assert_eq!(back.journal.entries().len(), records.len() - 1);
+    }
+
+    #[test]
+    fn a_record_that_is_missing_is_noticed() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("journal.jsonl");
+        let mut records = some_records();
+        records.remove(1);
+        let mut writer = JournalWriter::create(&path).expect("create");
+        for record in &records {
+            writer.write(record).expect("write");
+        }
+        let error = read(&path).expect_err("a gap").to_string();
+        assert!(error.contains("records are missing"), "{error}");
     }
 
     #[test]

@@ -277,6 +277,9 @@ impl RunJudge {
             Some((partial, reason)) => (*partial, reason.clone()),
             None => (true, Some("the run has not ended yet".to_owned())),
         };
+        // Nobody knows what the rest would have shown. A failure stands on its evidence.
+        let unknown = partial.then_some(Verdict::Inconclusive);
+        let verdict = verdict.into_iter().chain(unknown).collect::<Accumulated>().get();
         let header = &self.header;
         RunResult {
             format: RESULT_FORMAT.to_owned(),

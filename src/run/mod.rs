@@ -25,6 +25,7 @@ mod over_sockets;
 mod pace;
 mod plan;
 mod presence;
+mod program;
 mod rest;
 mod risk;
 mod session;
