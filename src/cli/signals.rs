@@ -28,7 +28,9 @@ impl Signals {
             })
         }
         #[cfg(not(unix))]
-        Ok(Self {})
+        {
+            Ok(Self {})
+        }
     }
 
     /// Waits for the next one.

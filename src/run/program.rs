@@ -123,7 +123,9 @@ fn pid(child: &Child) -> Option<rustix::process::Pid> {
 /// Asks a program to end in good order.
 pub(super) fn ask_to_end(child: &Child) -> bool {
     #[cfg(unix)]
-    return pid(child).is_some_and(|pid| rustix::process::kill_process(pid, rustix::process::Signal::TERM).is_ok());
+    {
+        pid(child).is_some_and(|pid| rustix::process::kill_process(pid, rustix::process::Signal::TERM).is_ok())
+    }
     #[cfg(not(unix))]
     {
         let _ = child;
