@@ -98,7 +98,7 @@ impl DeviceProcess {
 
     /// Whether it was started and not ended.
     fn is_running(&mut self) -> bool {
-        let ended = self.child.as_mut().map(|child| child.try_wait());
+        let ended = self.child.as_mut().map(Child::try_wait);
         matches!(ended, Some(Ok(None)))
     }
 
@@ -243,7 +243,8 @@ fn ask(text: &str) -> HookOutcome {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use crate::diagnostic::{Source, Span};

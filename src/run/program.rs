@@ -133,7 +133,8 @@ pub(super) fn ask_to_end(child: &Child) -> bool {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
 
