@@ -17,6 +17,7 @@ mod estimate;
 mod fits;
 mod header;
 pub mod hooks;
+mod identity;
 mod ladder;
 mod lasting;
 mod library;
