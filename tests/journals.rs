@@ -115,3 +115,30 @@ fn journals_are_judged_as_they_always_were() {
         "these are judged otherwise than they have to be:\n{wrong}"
     );
 }
+
+#[test]
+fn a_journal_without_its_end_gives_no_better_verdict() {
+    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let kept = std::fs::read_dir(root.join("fixtures/journals")).expect("fixtures/journals");
+    let mut all: Vec<_> = kept.map(|entry| entry.expect("a folder").path()).collect();
+    all.retain(|path| path.is_dir());
+    all.push(root.join("reports/example"));
+    for folder in all {
+        let name = folder.display();
+        let saved = vda5050_tck::journal::file::read(&folder.join("journal.jsonl")).expect("a journal");
+        let entries = saved.journal.entries();
+        let cuts = (1..entries.len()).step_by((entries.len() / 60).max(1));
+        for cut in cuts.chain([entries.len() - 1]) {
+            let beginning = judge(&library.rules, &entries[..cut]).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(beginning.partial, "{name}, {cut} records");
+            assert!(
+                beginning
+                    .verdict
+                    .is_some_and(|verdict| verdict >= Verdict::Inconclusive),
+                "{name}, {cut} records: {:?}",
+                beginning.verdict
+            );
+        }
+    }
+}

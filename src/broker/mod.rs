@@ -17,8 +17,9 @@ pub use self_test::self_test;
 
 mod self_test;
 
-/// Largest packet the broker takes.
-const LARGEST_PACKET: usize = 256 << 20;
+/// Largest packet the broker takes. It announces it to clients of MQTT 5, and some of them refuse to connect when they are
+/// told more than the four bytes of a remaining length can say.
+const LARGEST_PACKET: usize = (256 << 20) - 1;
 /// How many messages may wait for one client.
 const WAITING: usize = 100_000;
 /// How long the broker may take to begin.
@@ -118,5 +119,53 @@ impl Drop for EmbeddedBroker {
     fn drop(&mut self) {
         self.shutdown.shutdown();
         self.running.abort();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+    use tokio::net::TcpStream;
+
+    use super::*;
+
+    /// The properties of the CONNACK that a client of MQTT 5 gets.
+    async fn announced() -> Vec<u8> {
+        let broker = EmbeddedBroker::start().await.unwrap();
+        let mut socket = TcpStream::connect(broker.address()).await.unwrap();
+        let connect = b"\x10\x0e\x00\x04MQTT\x05\x02\x00\x3c\x00\x00\x01a";
+        socket.write_all(connect).await.unwrap();
+        let mut head = [0; 2];
+        socket.read_exact(&mut head).await.unwrap();
+        assert_eq!(head[0], 0x20, "no CONNACK");
+        let mut body = vec![0; head[1].into()];
+        socket.read_exact(&mut body).await.unwrap();
+        assert_eq!(body[1], 0, "refused");
+        body[3..].to_vec()
+    }
+
+    /// How long the value of a property is.
+    fn length(property: u8, rest: &[u8]) -> usize {
+        match property {
+            0x11 | 0x27 => 4,
+            0x13 | 0x21 | 0x22 => 2,
+            0x24 | 0x25 | 0x28 | 0x29 | 0x2a => 1,
+            0x12 | 0x15 | 0x1a | 0x1c | 0x1f => 2 + usize::from(u16::from_be_bytes([rest[0], rest[1]])),
+            other => panic!("property {other:#x}"),
+        }
+    }
+
+    #[tokio::test]
+    async fn no_client_is_told_of_a_packet_that_mqtt_cannot_have() {
+        let properties = announced().await;
+        let mut rest = properties.as_slice();
+        while let [property, value @ ..] = rest {
+            let (value, after) = value.split_at(length(*property, value));
+            if *property == 0x27 {
+                let largest = u32::from_be_bytes(value.try_into().unwrap());
+                assert!(largest <= 268_435_455, "{largest}");
+            }
+            rest = after;
+        }
     }
 }

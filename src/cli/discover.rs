@@ -131,12 +131,12 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
         arguments.broker, arguments.seconds
     );
     let heard = runtime.block_on(async {
-        let interrupt = super::run::interrupts();
+        let interrupt = super::run::interrupts()?;
         let time = Duration::from_secs(arguments.seconds);
-        listen(endpoint, &filters, time, &library.rules.packs, interrupt).await
+        Ok::<_, Problem>(listen(endpoint, &filters, time, &library.rules.packs, interrupt).await)
     });
     runtime.shutdown_background();
-    heard.map_err(|why| {
+    heard?.map_err(|why| {
         Problem::Environment(format!(
             "cannot listen on {} to {}: {why}",
             arguments.broker,

@@ -18,6 +18,7 @@ mod screen;
 mod select;
 mod selection;
 mod shell;
+mod signals;
 mod simulate;
 mod validate;
 

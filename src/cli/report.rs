@@ -14,6 +14,9 @@ use crate::report::{compare, json as result_file, manifest, overview, side_by_si
 use crate::result::RunResult;
 use crate::run::{Bundle, Library, sources, write_all};
 
+/// The evidence in a bundle.
+const JOURNAL: &str = "journal.jsonl";
+
 /// `report`.
 pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     if let Some(folders) = &arguments.compare {
@@ -35,7 +38,7 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
         return super::papers::attestation(folder);
     }
     let library = Library::load(arguments.suites.own())?;
-    let Recording { journal, torn } = file::read(&folder.join("journal.jsonl")).map_err(|error| {
+    let Recording { journal, torn } = file::read(&folder.join(JOURNAL)).map_err(|error| {
         Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
     })?;
     if torn {
@@ -46,6 +49,7 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     if arguments.rejudge {
         return rejudge(folder, &result, arguments.format);
     }
+    unchanged(folder)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
     let root = write_all(
@@ -76,6 +80,27 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
         }
     };
     Ok(Exit::of(result.verdict))
+}
+
+/// Refuses to write over a bundle that was changed: it would come out intact. What is missing is made again; a run that was
+/// killed has no manifest.
+fn unchanged(folder: &Path) -> Result<(), Problem> {
+    if !folder.join(manifest::NAME).exists() {
+        return Ok(());
+    }
+    let found = manifest::Manifest::verify(folder)
+        .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
+    let is_there = !found.missing.iter().any(|file| file == JOURNAL);
+    if found.root_holds && found.changed.is_empty() && found.extra.is_empty() && is_there {
+        return Ok(());
+    }
+    let title = format!(
+        "{} is not what its manifest says, and nothing is written over it\n{}",
+        folder.display(),
+        found.text().trim_end()
+    );
+    let hint = format!("copy `{JOURNAL}` alone into another folder, and give that one; `--rejudge` writes nothing");
+    Err(Diagnostic::whole("manifest", title).hint(hint).into())
 }
 
 fn rejudge(folder: &Path, result: &RunResult, format: Format) -> Result<Exit, Problem> {

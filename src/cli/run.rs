@@ -13,6 +13,7 @@ use super::device::{check_faults, pack_of, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::screen::{Screen, Show};
+use super::signals::Signals;
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::judge::RunJudge;
@@ -134,7 +135,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         .build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let outcome = runtime.block_on(async {
-        let interrupt = interrupts();
+        let interrupt = interrupts()?;
         if arguments.in_virtual_time {
             job.virtually(arguments, interrupt).await
         } else if built_in {
@@ -148,22 +149,17 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     outcome
 }
 
-/// Ctrl-C once ends the run in good order, twice at once.
-pub(super) fn interrupts() -> watch::Receiver<bool> {
+/// A signal once ends the run in good order, twice at once.
+pub(super) fn interrupts() -> Result<watch::Receiver<bool>, Problem> {
     let (sender, receiver) = watch::channel(false);
+    let mut signals = Signals::listen()?;
     tokio::spawn(async move {
-        let mut times = 0;
-        while tokio::signal::ctrl_c().await.is_ok() {
-            times += 1;
-            if times > 1 {
-                std::process::exit(i32::from(Exit::Interrupted.code()));
-            }
-            let _ = sender.send(true);
-        }
-        // The sender stays alive as long as the process.
-        std::future::pending::<()>().await;
+        signals.next().await;
+        let _ = sender.send(true);
+        signals.next().await;
+        std::process::exit(i32::from(Exit::Interrupted.code()));
     });
-    receiver
+    Ok(receiver)
 }
 
 impl Job {

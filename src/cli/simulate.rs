@@ -9,6 +9,7 @@ use super::args::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMa
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
+use super::signals::Signals;
 use crate::bench::endpoint::{Credentials, Endpoint};
 use crate::clock::WallClock;
 use crate::course::Layout;
@@ -81,6 +82,7 @@ async fn end(device: RunningDevice) {
 
 async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
+    let mut signals = Signals::listen()?;
     reach(endpoint, &device.connection).await?;
     let clock = WallClock::start();
     let mut running = Vec::new();
@@ -108,7 +110,7 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> R
         "{} simulated AGV(s) on {}; press Ctrl-C to disconnect",
         device.count, device.connection.broker
     );
-    let _ = tokio::signal::ctrl_c().await;
+    signals.next().await;
     for device in running {
         end(device).await;
     }
@@ -121,6 +123,7 @@ async fn master_control(
     endpoint: &Endpoint,
 ) -> Result<Exit, Problem> {
     check_faults(Role::MasterControl, &device.fault)?;
+    let mut signals = Signals::listen()?;
     let mut reference = BuiltIn::from(configured(device, pack)?);
     tolerate(&mut reference, &device.tolerance)?;
     reach(endpoint, &device.connection).await?;
@@ -133,7 +136,7 @@ async fn master_control(
         "a reference master control of {vehicles} vehicle(s) on {}; press Ctrl-C to disconnect",
         device.connection.broker
     );
-    let _ = tokio::signal::ctrl_c().await;
+    signals.next().await;
     if let Some(running) = server.stop().await {
         end(running).await;
     }

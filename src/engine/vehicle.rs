@@ -71,7 +71,7 @@ pub fn has_open_connection(judge: &RunJudge) -> bool {
     let connects = timeline.of("mqtt/connect");
     let is_open = |entry: &&Arc<Entry>| number_of(entry).is_some_and(|connection| closed(connection).is_none());
     let Some(publishing) = timeline.publishing() else {
-        return connects.last().as_ref().is_some_and(is_open);
+        return connects.iter().any(|entry| is_open(&entry));
     };
     let Some(gone) = closed(publishing) else { return true };
     let client = connects.iter().find(|entry| number_of(entry) == Some(publishing));

@@ -62,6 +62,9 @@ pub enum Event {
         /// Why, when partial.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<String>,
+        /// Whether another device spoke than the one that was to be judged.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        stranger: bool,
     },
     /// What the run is going to do, and why it leaves things out.
     Planned {

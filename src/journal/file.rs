@@ -2,11 +2,17 @@
 //!
 //! Every record is handed to the operating system as soon as it happens, so that a killed process leaves a
 //! readable journal; a last line that is cut off is reported and everything before it is used.
+//!
+//! Every line but the first names the one before it by a hash, so that what is changed, added or taken out shows. A journal
+//! that ends too early shows by its last record, which is not the end of a run.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
+use sha2::{Digest as _, Sha256};
+
+use super::event::hex;
 use super::{Journal, Record};
 
 /// Writes records through to a file.
@@ -14,6 +20,8 @@ use super::{Journal, Record};
 pub struct JournalWriter {
     file: File,
     line: Vec<u8>,
+    /// The hash of the line that was written last.
+    last: Option<String>,
 }
 
 impl JournalWriter {
@@ -25,6 +33,7 @@ impl JournalWriter {
         Ok(Self {
             file: File::options().write(true).create_new(true).open(path)?,
             line: Vec::new(),
+            last: None,
         })
     }
 
@@ -34,9 +43,15 @@ impl JournalWriter {
     /// What the operating system says.
     pub fn write(&mut self, record: &Record) -> io::Result<()> {
         self.line.clear();
-        serde_json::to_writer(&mut self.line, record)?;
+        let chained = Chained {
+            record,
+            after: self.last.as_deref(),
+        };
+        serde_json::to_writer(&mut self.line, &chained)?;
         self.line.push(b'\n');
-        self.file.write_all(&self.line)
+        self.file.write_all(&self.line)?;
+        self.last = Some(hash(&self.line));
+        Ok(())
     }
 
     /// Waits until the records are on the disk.
@@ -46,6 +61,29 @@ impl JournalWriter {
     pub fn sync(&self) -> io::Result<()> {
         self.file.sync_all()
     }
+}
+
+/// A record on its line.
+#[derive(serde::Serialize)]
+struct Chained<'a> {
+    #[serde(flatten)]
+    record: &'a Record,
+    /// The hash of the line before it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    after: Option<&'a str>,
+}
+
+/// What a line says of the one before it. It is the last member, and no text inside of another one can look like it.
+fn link(line: &[u8]) -> Option<&str> {
+    let line = std::str::from_utf8(line).ok()?.trim_end().strip_suffix("\"}")?;
+    let (rest, hash) = line.rsplit_once('"')?;
+    rest.ends_with(",\"after\":").then_some(hash)
+}
+
+/// What names a line.
+fn hash(line: &[u8]) -> String {
+    let line = line.strip_suffix(b"\n").unwrap_or(line);
+    hex(&Sha256::digest(line)[..8])
 }
 
 /// Why a journal could not be read.
@@ -94,6 +132,8 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
     let mut text = Vec::new();
     let mut line = 0;
     let mut last = 0;
+    let mut before: Option<String> = None;
+    let mut chained = false;
     loop {
         text.clear();
         if reader.read_until(b'\n', &mut text).map_err(io)? == 0 {
@@ -109,7 +149,23 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
             Ok(record) if record.seq <= last => {
                 return Err(bad(format!("number {} does not rise from {last}", record.seq)));
             }
+            Ok(record) if record.seq != last + 1 => {
+                return Err(bad(format!(
+                    "number {} follows {last}: records are missing",
+                    record.seq
+                )));
+            }
             Ok(record) => {
+                // Journals of earlier versions are not chained.
+                let after = link(&text);
+                chained |= after.is_some();
+                if chained && line > 1 && after != before.as_deref() {
+                    return Err(bad(format!(
+                        "number {} does not follow the line before it, as it was written: the journal was changed",
+                        record.seq
+                    )));
+                }
+                before = Some(hash(&text));
                 last = record.seq;
                 journal.restore(record);
             }
@@ -212,6 +268,51 @@ mod tests {
         let back = read(&path).expect("read");
         assert!(back.torn);
         assert_eq!(back.journal.entries().len(), records.len() - 1);
+    }
+
+    #[test]
+    fn a_record_that_is_missing_is_noticed() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("journal.jsonl");
+        let mut records = some_records();
+        records.remove(1);
+        let mut writer = JournalWriter::create(&path).expect("create");
+        for record in &records {
+            writer.write(record).expect("write");
+        }
+        let error = read(&path).expect_err("a gap").to_string();
+        assert!(error.contains("records are missing"), "{error}");
+    }
+
+    #[test]
+    fn a_record_that_was_changed_is_noticed() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("journal.jsonl");
+        let mut writer = JournalWriter::create(&path).expect("create");
+        for record in &some_records() {
+            writer.write(record).expect("write");
+        }
+        let text = std::fs::read_to_string(&path).expect("text");
+        assert!(!text.lines().next().expect("a line").contains("\"after\""));
+        std::fs::write(&path, text.replace("x/y", "y/x")).expect("change");
+        let error = read(&path).expect_err("changed").to_string();
+        assert!(
+            error.contains(":3:") && error.contains("the journal was changed"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_journal_without_hashes_is_read() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("journal.jsonl");
+        let lines = some_records().into_iter().map(|record| {
+            let mut line = serde_json::to_vec(&record).expect("JSON");
+            line.push(b'\n');
+            line
+        });
+        std::fs::write(&path, lines.collect::<Vec<_>>().concat()).expect("write");
+        assert_eq!(read(&path).expect("read").journal.entries().len(), some_records().len());
     }
 
     #[test]

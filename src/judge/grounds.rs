@@ -38,6 +38,7 @@ impl Grounds {
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: Arc::clone(&bindings),
             waivers: Vec::new(),
+            interference: None,
         };
         // What a master control sends names the vehicle it is for.
         let mut of_vehicles = header

@@ -4,6 +4,7 @@
 //! test, an evaluator those of one step; [`MonitorJudge`] watches everything. The engine shows it entries
 //! as they happen and asks what to wait for; `report --rejudge` shows it the same entries again.
 
+mod company;
 mod decide;
 mod departure;
 mod grounds;

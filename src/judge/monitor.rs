@@ -231,6 +231,13 @@ impl MonitorJudge {
             if verdict == Verdict::Pass {
                 continue;
             }
+            let (verdict, message) = match &ground.interference {
+                Some(why) if verdict == Verdict::Fail => (
+                    Verdict::Inconclusive,
+                    format!("cannot be told, since {why}; {}", finding.message),
+                ),
+                _ => (verdict, finding.message),
+            };
             if verdict == Verdict::Fail && self.broken.is_none() && !self.monitor.hides.is_empty() {
                 self.broken = Some((id.as_str().to_owned(), finding.seq));
                 self.accuses.get_or_insert_with(|| id.as_str().to_owned());
@@ -250,7 +257,7 @@ impl MonitorJudge {
                     verdict,
                     count: 1,
                     first: vec![finding.seq],
-                    message: finding.message,
+                    message,
                     interpretation: requirement.interpretation.clone(),
                 });
             }

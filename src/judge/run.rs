@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use super::company::{Company, Part};
 use super::decide::mood;
 use super::grounds::Grounds;
 use super::hidden::Hidden;
@@ -40,6 +41,8 @@ pub struct RunJudge {
     last: Stamp,
     timeline: Timeline,
     watches: Watches,
+    /// Who is on the tap, where that is known.
+    company: Option<Company>,
     reactions: Reactions,
     /// The instant actions the harness has sent: type by id.
     instants: BTreeMap<String, String>,
@@ -48,6 +51,8 @@ pub struct RunJudge {
     done: Vec<TestResult>,
     plan: Plan,
     end: Option<(bool, Option<String>)>,
+    /// Another device spoke than the one that was to be judged.
+    is_stranger: bool,
 }
 
 impl RunJudge {
@@ -67,6 +72,7 @@ impl RunJudge {
             .collect();
         let watches = Watches::begin(&monitors, &ground, vehicles, tap);
         let reactions = Reactions::of(&header.vehicles);
+        let company = Company::of(role, &ground.topics, &ground.pack);
         let timeline = if header.vehicles.is_empty() {
             Timeline::new(&header.topics)
         } else {
@@ -81,6 +87,7 @@ impl RunJudge {
             begun: first.at(),
             last: first.at(),
             watches,
+            company,
             reactions,
             instants: BTreeMap::new(),
             last_order: None,
@@ -88,12 +95,16 @@ impl RunJudge {
             done: Vec::new(),
             plan: Plan::default(),
             end: None,
+            is_stranger: false,
         })
     }
 
     /// Shows it the next entry.
     pub fn observe(&mut self, entry: &Arc<Entry>) -> Result<(), JudgeError> {
         self.last = entry.at();
+        if self.is_of_bystander(entry) {
+            return Ok(());
+        }
         let subject = self.timeline.add(entry);
         if let Some(place) = self.timeline.place(entry) {
             self.reactions.observe(entry, place);
@@ -117,7 +128,12 @@ impl RunJudge {
                 let found = self.test(test).ok_or_else(|| JudgeError::UnknownTest(test.clone()))?;
                 self.current = Some(TestJudge::begin(&found, &self.ground, entry, bindings));
             }
-            Event::RunEnded { partial, reason } => {
+            Event::RunEnded {
+                partial,
+                reason,
+                stranger,
+            } => {
+                self.is_stranger = *stranger;
                 self.break_off(reason.as_deref().unwrap_or("the run ended before the test did"));
                 self.end = Some((*partial, reason.clone()));
                 self.watches.finish(entry.at().moment, &self.ground);
@@ -136,6 +152,29 @@ impl RunJudge {
             self.ended(current.result().clone());
         }
         Ok(())
+    }
+
+    /// Whether an entry is about somebody on the tap who is not the device. What was left out of a client that turns out to be
+    /// the device is made up for.
+    fn is_of_bystander(&mut self, entry: &Arc<Entry>) -> bool {
+        let Some(company) = &mut self.company else { return false };
+        let part = company.observe(entry);
+        self.ground.interference = company.interference(entry.at().moment).cloned();
+        if let (Some(why), Some(current)) = (&self.ground.interference, &mut self.current) {
+            current.interfered(why);
+        }
+        match part {
+            Part::Judged => false,
+            Part::Bystander => true,
+            Part::Joined(before) => {
+                for entry in &before {
+                    let subject = self.timeline.restore(entry);
+                    self.watches
+                        .observe(entry, subject.as_deref(), &self.timeline, &self.ground);
+                }
+                false
+            }
+        }
     }
 
     fn note_instants(&mut self, entry: &Entry) {
@@ -262,7 +301,12 @@ impl RunJudge {
             .collect();
         tests.sort_by_key(|test| places.get(test.id.as_str()).copied());
         tests.extend(self.set_aside());
-        let watched = self.watches.results();
+        let watched = if self.is_stranger {
+            tests.clear();
+            Vec::new()
+        } else {
+            self.watches.results()
+        };
         let all = tests
             .iter()
             .filter_map(|test| test.verdict)
@@ -277,6 +321,9 @@ impl RunJudge {
             Some((partial, reason)) => (*partial, reason.clone()),
             None => (true, Some("the run has not ended yet".to_owned())),
         };
+        // Nobody knows what the rest would have shown. A failure stands on its evidence.
+        let unknown = (partial && !self.is_stranger).then_some(Verdict::Inconclusive);
+        let verdict = verdict.into_iter().chain(unknown).collect::<Accumulated>().get();
         let header = &self.header;
         RunResult {
             format: RESULT_FORMAT.to_owned(),
@@ -329,6 +376,7 @@ impl RunJudge {
                 lag.as_secs_f64()
             ));
         }
+        limits.extend(self.company.iter().flat_map(Company::limits));
         limits
     }
 

@@ -41,6 +41,8 @@ pub struct Ground {
     pub bindings: Arc<Map<String, Value>>,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
+    /// Why what is found at present may stem from somebody else on the tap.
+    pub interference: Option<Arc<str>>,
 }
 
 /// What is only preferred by a ruling of the catalogue: broken is a warning.
@@ -77,6 +79,8 @@ pub struct TestJudge {
     verdict: Accumulated,
     result: TestResult,
     departure: Departure,
+    /// Why what is found may stem from somebody else.
+    interference: Option<Arc<str>>,
     hidden: Vec<Hidden>,
     /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
     /// decided before.
@@ -128,6 +132,7 @@ impl TestJudge {
                 allowances: Vec::new(),
             },
             departure: Departure::default(),
+            interference: ground.interference.clone(),
             hidden: Vec::new(),
             open: Vec::new(),
             ended: false,
@@ -196,6 +201,7 @@ impl TestJudge {
             Event::Bound { name, value } => self.bindings.set(name, value.clone()),
             Event::TestEnded { .. } => {
                 self.allow_for_lag(timeline);
+                self.allow_for_others();
                 self.finish(entry.at().moment, ground);
             }
             _ => {
@@ -406,6 +412,22 @@ impl TestJudge {
             );
             open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
             open.clause.holds = Holds::Unseen(why);
+        }
+    }
+
+    /// Somebody else on the tap may be the cause of what is found.
+    pub(super) fn interfered(&mut self, why: &Arc<str>) {
+        self.interference.get_or_insert_with(|| Arc::clone(why));
+    }
+
+    /// What somebody else may have caused is not held against the device.
+    fn allow_for_others(&mut self) {
+        let Some(why) = &self.interference else { return };
+        for open in &mut self.open {
+            if matches!(open.clause.holds, Holds::No | Holds::Late) {
+                open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+                open.clause.holds = Holds::Unseen(why.to_string());
+            }
         }
     }
 

@@ -80,6 +80,15 @@ impl Timeline {
         Some(subject)
     }
 
+    /// Takes in one entry later than it happened, and returns its subject, if it has one.
+    pub fn restore(&mut self, entry: &Arc<Entry>) -> Option<String> {
+        let subject = self.subject_of(entry)?;
+        let all = self.subjects.entry(subject.clone()).or_default();
+        let at = all.partition_point(|known| known.seq() < entry.seq());
+        all.insert(at, Arc::clone(entry));
+        Some(subject)
+    }
+
     /// The subject of an entry.
     #[must_use]
     pub fn subject_of(&self, entry: &Entry) -> Option<String> {

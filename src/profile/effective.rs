@@ -273,7 +273,10 @@ impl Taken<'_> {
                     HookAction::Run(_) => "run",
                     HookAction::Http { .. } => "http",
                     HookAction::Prompt(_) => "prompt",
-                    HookAction::RestartDevice | HookAction::NaturalTraffic => "builtin",
+                    HookAction::RestartDevice
+                    | HookAction::StopDevice
+                    | HookAction::StartDevice
+                    | HookAction::NaturalTraffic => "builtin",
                 }
                 .to_owned(),
                 origin: origin.to_string(),

@@ -226,12 +226,22 @@ pub enum HookAction {
     Prompt(String),
     /// The harness ends and starts again the device it has started itself (`device.command`).
     RestartDevice,
+    /// The harness asks the device that it has started itself to end in good order.
+    StopDevice,
+    /// The harness starts it again.
+    StartDevice,
     /// Nothing is done: the harness waits for the next order or instant action to come by itself.
     NaturalTraffic,
 }
 
 /// `builtin`: the harness ends and starts again the device it has started itself.
 pub const RESTART_DEVICE: &str = "restart-command";
+
+/// `builtin`: the harness asks the device it has started itself to end in good order, with SIGTERM.
+pub const STOP_DEVICE: &str = "stop-command";
+
+/// `builtin`: the harness starts that device again.
+pub const START_DEVICE: &str = "start-command";
 
 /// `builtin`: the harness waits for the next order or instant action to come by itself.
 pub const NATURAL_TRAFFIC: &str = "natural-traffic";
@@ -258,8 +268,7 @@ impl HookAction {
         match self {
             Self::Run(arguments) => Self::Run(arguments.iter().map(|text| fill(text, values, verbatim)).collect()),
             Self::Prompt(text) => Self::Prompt(fill(text, values, verbatim)),
-            Self::RestartDevice => Self::RestartDevice,
-            Self::NaturalTraffic => Self::NaturalTraffic,
+            Self::RestartDevice | Self::StopDevice | Self::StartDevice | Self::NaturalTraffic => self.clone(),
             Self::Http { method, url, body } => Self::Http {
                 method: method.clone(),
                 url: fill(url, values, |value| {
@@ -279,7 +288,7 @@ impl HookAction {
         match self {
             Self::Run(arguments) => arguments.iter().map(String::as_str).collect(),
             Self::Prompt(text) => vec![text],
-            Self::RestartDevice | Self::NaturalTraffic => Vec::new(),
+            Self::RestartDevice | Self::StopDevice | Self::StartDevice | Self::NaturalTraffic => Vec::new(),
             Self::Http { url, body, .. } => [Some(url), body.as_ref()]
                 .into_iter()
                 .flatten()

@@ -28,7 +28,8 @@ use serde_json::{Map, Value, json};
 pub use claim::Claim;
 pub use effective::Effective;
 pub use hooks::{
-    HOOKS, Hook, HookAction, HookInfo, NATURAL_TRAFFIC, RESTART_DEVICE, fill, find as find_hook, placeholders,
+    HOOKS, Hook, HookAction, HookInfo, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE, fill,
+    find as find_hook, placeholders,
 };
 pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,

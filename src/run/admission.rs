@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
+use super::identity::somebody_else;
 use super::presence::{Presence, is_stale};
 use super::session::Session;
 use crate::engine::{EngineError, Operator, Recorder};
@@ -13,33 +14,36 @@ use crate::link::Link;
 use crate::pack::Role;
 use crate::profile::show_duration;
 
+/// How often a person is told what is waited for.
+const TOLD_EVERY: Duration = Duration::from_secs(10);
+
 impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Waits for the device, its first state and its factsheet. `Err` says why it cannot be judged.
     pub(super) async fn admit(&mut self) -> Result<Result<(), String>, EngineError> {
         let vantage = self.setup.capabilities.vantage;
         let patience = self.time("connect");
-        let until = self.engine.link.now().moment + patience;
         let there = |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
-        if !self.engine.watch(until, there).await? {
+        if !self.wait_for(patience, there).await? {
             return Ok(Err(format!("no device connected within {}", show_duration(patience))));
         }
         if self.engine.recorder.judge().role() == Role::MasterControl {
             return self.settle_in().await;
         }
         let begun = self.engine.recorder.journal().entries().len() as u64;
+        let is_virtual = self.engine.operator.runs_on_the_link();
         let has_state = |recorder: &Recorder| {
-            recorder
-                .judge()
-                .timeline()
-                .of("state")
-                .iter()
-                .any(|entry| !is_stale(entry))
+            let states = recorder.judge().timeline().of("state");
+            states.iter().any(|entry| !is_stale(entry))
         };
-        let until = self.engine.link.now().moment + self.time("statePeriod");
-        if !self.engine.watch(until, has_state).await? {
+        let speaks =
+            |recorder: &Recorder| has_state(recorder) || (!is_virtual && somebody_else(recorder.judge()).is_some());
+        let patience = self.time("statePeriod");
+        self.wait_for(patience, speaks).await?;
+        if !has_state(&self.engine.recorder) {
             let why = format!(
-                "the device connected (see #{begun}) but sent no state within {}",
-                show_duration(self.time("statePeriod"))
+                "the device connected (see #{begun}) but sent no state within {} on {}",
+                show_duration(patience),
+                self.topic("state")
             );
             return Ok(Err(why));
         }
@@ -49,6 +53,58 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         self.home.before.clone_from(&self.home.first);
         self.read_over(self.engine.link.now().moment).await?;
         Ok(Ok(()))
+    }
+
+    /// Who speaks instead of the device of the profile. A built-in device in virtual time is wrong on purpose.
+    pub(super) fn somebody_else(&self) -> Option<String> {
+        let is_virtual = self.engine.operator.runs_on_the_link();
+        (!is_virtual)
+            .then(|| somebody_else(self.engine.recorder.judge()))
+            .flatten()
+    }
+
+    /// Waits so long, and says from time to time what for.
+    async fn wait_for(
+        &mut self,
+        patience: Duration,
+        mut done: impl FnMut(&Recorder) -> bool,
+    ) -> Result<bool, EngineError> {
+        let begun = self.engine.link.now().moment;
+        let end = begun + patience;
+        loop {
+            let now = self.engine.link.now().moment;
+            let until = (now + TOLD_EVERY).min(end);
+            if self.engine.watch(until, &mut done).await? {
+                return Ok(true);
+            }
+            if until == end || self.engine.interrupted() || self.engine.recorder.flood().is_some() {
+                return Ok(false);
+            }
+            let opened = self.engine.recorder.journal().entries().iter();
+            let opened = opened
+                .filter(|entry| matches!(entry.event(), Event::Opened { .. }))
+                .count();
+            self.progress.note(&format!(
+                "waiting for the device: {} s of {} s; connections seen: {opened}; awaited: {}",
+                until.since(begun).as_secs(),
+                patience.as_secs(),
+                self.awaited()
+            ));
+        }
+    }
+
+    /// The topics on which the device has to speak.
+    fn awaited(&self) -> String {
+        let ground = self.engine.recorder.judge().ground();
+        let rules = ground.pack.topics().iter();
+        let own = rules.filter(|rule| rule.publisher == ground.role);
+        let topics = own.filter_map(|rule| ground.topics.get(rule.name.as_str()).map(String::as_str));
+        topics.collect::<Vec<_>>().join(", ")
+    }
+
+    fn topic(&self, name: &str) -> String {
+        let ground = self.engine.recorder.judge().ground();
+        ground.topics.get(name).cloned().unwrap_or_default()
     }
 
     async fn factsheet(&mut self) -> Result<(), EngineError> {

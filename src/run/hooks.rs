@@ -9,12 +9,16 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 use tokio::process::{Child, Command};
 
+use super::program::{ask_to_end, program};
 use crate::engine::{HookOutcome, Operator};
 use crate::profile::{Hook, HookAction, show_duration};
 
 /// Answers of a device that has understood what is wanted, and does not do it: in conflict with what it does now, not
 /// to be processed, not implemented.
 const REFUSALS: [u16; 3] = [409, 422, 501];
+
+/// How long a device may take to end in good order.
+const GOODBYE_LIMIT: Duration = Duration::from_secs(20);
 
 /// A device that the harness starts itself (`device.command`).
 #[derive(Debug)]
@@ -74,6 +78,28 @@ impl DeviceProcess {
     pub async fn restart(&mut self) -> std::io::Result<()> {
         self.stop().await;
         self.start()
+    }
+
+    /// Asks it to end in good order, and kills it when it does not. Says whether it ended by itself.
+    pub async fn end(&mut self) -> bool {
+        if !self.is_running() {
+            self.stop().await;
+            return true;
+        }
+        let Some(child) = &mut self.child else { return true };
+        if !ask_to_end(child) {
+            self.stop().await;
+            return false;
+        }
+        let ended = tokio::time::timeout(GOODBYE_LIMIT, child.wait()).await.is_ok();
+        self.stop().await;
+        ended
+    }
+
+    /// Whether it was started and not ended.
+    fn is_running(&mut self) -> bool {
+        let ended = self.child.as_mut().map(Child::try_wait);
+        matches!(ended, Some(Ok(None)))
     }
 
     /// Kills it.
@@ -139,15 +165,25 @@ impl ProfileHooks {
             HookAction::Prompt(_) => Ok(HookOutcome::Missing),
             // The engine waits for it itself.
             HookAction::NaturalTraffic => Ok(HookOutcome::Done("left to natural traffic".to_owned())),
-            HookAction::RestartDevice => match &mut self.device {
-                Some(device) => Ok(match device.restart().await {
-                    Ok(()) => HookOutcome::Done("the device was started again".to_owned()),
-                    Err(error) => HookOutcome::Failed(error.to_string()),
-                }),
-                None => Ok(HookOutcome::Failed(
-                    "the profile has no `device.command` that could be started".to_owned(),
-                )),
-            },
+            HookAction::RestartDevice | HookAction::StopDevice | HookAction::StartDevice => {
+                let Some(device) = &mut self.device else {
+                    return HookOutcome::Failed("the profile has no `device.command` that could be started".to_owned());
+                };
+                return match action {
+                    HookAction::StopDevice if device.end().await => {
+                        HookOutcome::Done("the device has ended".to_owned())
+                    }
+                    HookAction::StopDevice => HookOutcome::Failed(format!(
+                        "the device did not end within {} of SIGTERM, and was killed",
+                        show_duration(GOODBYE_LIMIT)
+                    )),
+                    HookAction::StartDevice if device.is_running() => HookOutcome::Done("the device runs".to_owned()),
+                    _ => match device.restart().await {
+                        Ok(()) => HookOutcome::Done("the device was started".to_owned()),
+                        Err(error) => HookOutcome::Failed(error.to_string()),
+                    },
+                };
+            }
         };
         outcome.unwrap_or_else(|_| HookOutcome::Failed(format!("not done within {}", show_duration(hook.timeout))))
     }
@@ -180,32 +216,6 @@ impl Operator for ProfileHooks {
     }
 }
 
-async fn program(arguments: &[String], folder: &std::path::Path) -> HookOutcome {
-    let Some((program, arguments)) = arguments.split_first() else {
-        return HookOutcome::Failed("the command is empty".to_owned());
-    };
-    let mut command = Command::new(program);
-    command.args(arguments).stdin(Stdio::null()).kill_on_drop(true);
-    if !folder.as_os_str().is_empty() {
-        command.current_dir(folder);
-    }
-    match command.output().await {
-        Err(error) => HookOutcome::Failed(format!("cannot start `{program}`: {error}")),
-        Ok(output) => {
-            let said = shown(if output.status.success() {
-                &output.stdout
-            } else {
-                &output.stderr
-            });
-            if output.status.success() {
-                HookOutcome::Done(said)
-            } else {
-                HookOutcome::Failed(format!("`{program}` ended with {}: {said}", output.status))
-            }
-        }
-    }
-}
-
 fn request(method: &str, url: &str, body: Option<&str>) -> HookOutcome {
     let made = ureq::http::Request::builder().method(method).uri(url);
     let made = match body {
@@ -233,7 +243,56 @@ fn ask(text: &str) -> HookOutcome {
     }
 }
 
-/// The first lines of what a program printed, bounded.
-fn shown(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).trim().chars().take(500).collect()
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::{Source, Span};
+
+    fn hook(action: HookAction) -> Hook {
+        Hook {
+            name: "shutdown".to_owned(),
+            action,
+            timeout: Duration::from_secs(30),
+            span: Span::new(&Source::new("device.toml", ""), 0, 0),
+        }
+    }
+
+    async fn outcomes(script: &str, folder: &std::path::Path, actions: &[HookAction]) -> Vec<HookOutcome> {
+        let command = ["sh", "-c", script].map(str::to_owned).to_vec();
+        let mut device = DeviceProcess::new(command, folder.to_owned(), None);
+        device.start().unwrap();
+        let mut hooks = ProfileHooks::new(BTreeMap::new(), BTreeMap::new(), folder.to_owned(), Some(device), false);
+        let mut all = Vec::new();
+        for action in actions {
+            while !folder.join("ready").exists() {
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
+            all.push(hooks.carry_out(&hook(action.clone()), &BTreeMap::new()).await);
+        }
+        all
+    }
+
+    #[tokio::test]
+    async fn the_device_of_the_profile_is_asked_to_end_in_good_order_and_started_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let script = "trap 'echo goodbye >> said; exit 0' TERM; echo hello >> said; touch ready; \
+                      while true; do sleep 0.05; done";
+        let actions = [HookAction::StopDevice, HookAction::StopDevice, HookAction::StartDevice];
+        let all = outcomes(script, folder.path(), &actions).await;
+        assert!(
+            all.iter().all(|outcome| matches!(outcome, HookOutcome::Done(_))),
+            "{all:?}"
+        );
+        while std::fs::read_to_string(folder.path().join("said"))
+            .unwrap()
+            .lines()
+            .count()
+            < 3
+        {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        let said = std::fs::read_to_string(folder.path().join("said")).unwrap();
+        assert_eq!(said, "hello\ngoodbye\nhello\n");
+    }
 }

@@ -35,9 +35,12 @@ impl How {
     pub fn of(action: &HookAction) -> Self {
         match action {
             HookAction::Prompt(text) => Self::Person(text.clone()),
-            HookAction::Run(_) | HookAction::Http { .. } | HookAction::RestartDevice | HookAction::NaturalTraffic => {
-                Self::Machine
-            }
+            HookAction::Run(_)
+            | HookAction::Http { .. }
+            | HookAction::RestartDevice
+            | HookAction::StopDevice
+            | HookAction::StartDevice
+            | HookAction::NaturalTraffic => Self::Machine,
         }
     }
 }

@@ -67,6 +67,8 @@ pub enum End {
     Completed,
     /// The device never showed up; the text says how long was waited.
     NoDevice(String),
+    /// Another device speaks than the one that was to be judged; the text says which. Nothing is judged.
+    Stranger(String),
     /// The device went away, and did not come back.
     Lost(String),
     /// The user stopped it.
@@ -107,11 +109,16 @@ pub async fn run<L: Link, O: Operator>(
     };
     let (partial, reason) = match &end {
         End::Completed => (false, None),
-        End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => (true, Some(why.clone())),
+        End::NoDevice(why) | End::Stranger(why) | End::Lost(why) | End::Flooded(why) => (true, Some(why.clone())),
         End::Interrupted => (true, Some("interrupted by the user".to_owned())),
         End::Broken(error) => (true, Some(error.to_string())),
     };
-    let recorded = engine.note(Event::RunEnded { partial, reason });
+    let stranger = matches!(end, End::Stranger(_));
+    let recorded = engine.note(Event::RunEnded {
+        partial,
+        reason,
+        stranger,
+    });
     let synced = engine.recorder.sync();
     match (recorded, synced) {
         (Ok(_), Ok(())) => end,
@@ -166,7 +173,10 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let admitted = self.admit().await?;
         self.draw();
         if let Err(why) = admitted {
-            let end = self.stopped().unwrap_or_else(|| End::NoDevice(why.clone()));
+            let end = self.stopped().unwrap_or_else(|| match self.somebody_else() {
+                Some(who) => End::Stranger(who),
+                None => End::NoDevice(why.clone()),
+            });
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
                 gate: Gate::Unobservable(why.clone()),

@@ -18,6 +18,33 @@ fn a_device_that_conforms_is_0_over_tcp_and_leaves_a_whole_bundle() {
 }
 
 #[test]
+fn a_device_that_is_not_the_one_of_the_profile_is_2_and_gets_no_verdict() {
+    let bench = Bench::new();
+    let (run, port) = bench.start(&Profile::default(), &[REFUSAL]);
+    let broker = format!("mqtt://127.0.0.1:{port}");
+    let arguments = [
+        "simulate",
+        "agv",
+        "--broker",
+        &broker,
+        "--manufacturer",
+        "ACME",
+        "--serial",
+        "0002",
+    ];
+    let _other = Running::start(&mut tool(bench.path(), &arguments));
+    run.end()
+        .code(2)
+        .says_one_error("a device speaks as ACME/0002 on uagv/v2/ACME/0002/connection; the profile says ACME/0001");
+    let result = bench.result();
+    assert_eq!(
+        (&result["verdict"], &result["monitors"]),
+        (&serde_json::Value::Null, &serde_json::json!([]))
+    );
+    bench.is_whole();
+}
+
+#[test]
 fn a_device_of_a_profile_that_conforms_is_0() {
     let bench = Bench::new();
     let (run, port) = bench.start(&Profile::default(), &[REFUSAL]);

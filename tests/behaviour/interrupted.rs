@@ -42,6 +42,27 @@ fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_p
 }
 
 #[test]
+fn other_signals_that_ask_it_to_end_are_obeyed_like_ctrl_c() {
+    for name in ["TERM", "HUP"] {
+        let bench = Bench::new();
+        let mut profile = Profile::default().with(&[("quiet", "40 s")]);
+        profile.motion = true;
+        let (mut run, port) = bench.start(&profile, &[WAITING]);
+        let _agv = bench.agv(port, &[]);
+        step_begun(&bench, &mut run, (WAITING, "steps[1]"));
+        run.signal(name);
+        run.end().code(130);
+        let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+        assert!(
+            journal.contains("cancelOrder"),
+            "after {name} the vehicle was left with its order"
+        );
+        assert!(bench.bundle().join("junit.xml").exists(), "{name}");
+        bench.is_partial();
+    }
+}
+
+#[test]
 fn while_it_waits_for_the_device_it_ends_at_once() {
     let bench = Bench::new();
     let (run, _) = bench.start(&Profile::default(), &[REFUSAL]);

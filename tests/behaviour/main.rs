@@ -7,6 +7,7 @@
 mod auditing;
 mod bench;
 mod broken;
+mod bystanders;
 mod discovering;
 mod exit_codes;
 mod hostile;

@@ -120,6 +120,47 @@ fn a_journal_that_ends_in_the_middle_of_a_line_gives_a_partial_report() {
 }
 
 #[test]
+fn a_journal_whose_end_is_missing_makes_no_failed_run_conform() {
+    let (bench, folder) = failed_run();
+    let journal = bench.bundle().join("journal.jsonl");
+    let text = fs::read_to_string(&journal).unwrap();
+    let beginning: String = text.split_inclusive('\n').take(7).collect();
+    fs::write(&journal, beginning).unwrap();
+    let before = fs::read(bench.bundle().join("manifest.json")).unwrap();
+    bench
+        .run(&["report", &folder])
+        .code(2)
+        .says("nothing is written over it");
+    assert_eq!(
+        fs::read(bench.bundle().join("manifest.json")).unwrap(),
+        before,
+        "a changed bundle was made intact"
+    );
+    bench.run(&["report", &folder, "--verify"]).code(1);
+    fs::remove_file(bench.bundle().join("manifest.json")).unwrap();
+    bench.run(&["report", &folder]).code(3);
+    let result = bench.result();
+    assert_eq!(
+        (&result["partial"], &result["verdict"]),
+        (&true.into(), &"inconclusive".into())
+    );
+}
+
+#[test]
+fn a_journal_without_some_of_its_records_is_refused() {
+    let (bench, folder) = failed_run();
+    let journal = bench.bundle().join("journal.jsonl");
+    let text = fs::read_to_string(&journal).unwrap();
+    let lines = text.split_inclusive('\n').enumerate();
+    let without: String = lines.filter(|(at, _)| *at != 20).map(|(_, line)| line).collect();
+    fs::write(&journal, without).unwrap();
+    bench
+        .run(&["report", &folder, "--rejudge"])
+        .code(2)
+        .says("records are missing");
+}
+
+#[test]
 fn what_is_no_run_is_2() {
     let bench = Bench::new();
     bench.run(&["report", "nowhere"]).code(2).says("nowhere");

@@ -57,6 +57,32 @@ impl Scripted {
         this
     }
 
+    /// Connects under this client id as any tool does, without a last will, and subscribes to everything.
+    pub fn stranger(port: u16, client_id: &str) -> Self {
+        let mut socket = TcpStream::connect(("127.0.0.1", port)).unwrap();
+        socket.set_nodelay(true).unwrap();
+        let mut this = Self {
+            socket: socket.try_clone().unwrap(),
+            headers: 0,
+        };
+        let connect = [text("MQTT").as_slice(), &[4, 0b0000_0010, 0, 60], &text(client_id)].concat();
+        this.packet(0x10, &connect);
+        let mut connack = [0; 4];
+        socket.read_exact(&mut connack).unwrap();
+        assert_eq!(connack, [0x20, 2, 0, 0]);
+        this.packet(0x82, &[[0, 1].as_slice(), &text("#"), &[0]].concat());
+        std::thread::spawn(move || {
+            let mut thrown_away = [0; 4096];
+            while socket.read(&mut thrown_away).is_ok_and(|length| length > 0) {}
+        });
+        this
+    }
+
+    /// Says DISCONNECT.
+    pub fn say_goodbye(mut self) {
+        self.raw(&[0xe0, 0]);
+    }
+
     /// A message with header.
     pub fn message(&mut self, members: &Value) -> Value {
         let header = json!({

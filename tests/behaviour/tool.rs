@@ -163,9 +163,14 @@ impl Running {
 
     /// Ctrl-C.
     pub fn interrupt(&self) {
+        self.signal("INT");
+    }
+
+    /// A signal by its short name.
+    pub fn signal(&self, name: &str) {
         let id = self.child.id();
         let sent = Command::new("sh")
-            .args(["-c", &format!("kill -INT {id}")])
+            .args(["-c", &format!("kill -{name} {id}")])
             .status()
             .unwrap();
         assert!(sent.success());

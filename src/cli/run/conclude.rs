@@ -5,6 +5,7 @@ use crate::cli::args;
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
 use crate::cli::screen::Screen;
+use crate::diagnostic::Diagnostic;
 use crate::engine::Recorder;
 use crate::report::known::measure;
 use crate::report::sources::Sources;
@@ -66,6 +67,9 @@ impl Job {
                 _ => self.exit(&result),
             },
             End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
+            End::Stranger(why) => Err(Diagnostic::whole("another-device", why)
+                .hint("set manufacturer, serial-number, protocol-version or topic-template in the section [device] of the profile")
+                .into()),
             End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Ok(broken_off(&why, &shown, &result)),
             End::Broken(error) => Ok(broken_off(&error.to_string(), &shown, &result)),
         }

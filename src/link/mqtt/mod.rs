@@ -115,12 +115,42 @@ impl BenchOptions {
 pub struct BenchInfo {
     /// `host:port` the device connects to: the tap, or the broker when there is no tap.
     pub device_address: String,
+    /// Whether it has to speak TLS there.
+    pub device_tls: bool,
     /// `host:port` of the broker.
     pub broker_address: String,
     /// The broker, for clients of the harness itself.
     pub broker: Endpoint,
     /// Where the map server listens.
     pub maps_address: SocketAddr,
+}
+
+impl BenchInfo {
+    /// What a device is told to connect to. A bench that listens on every address is reached at one of them.
+    #[must_use]
+    pub fn device_url(&self) -> String {
+        let scheme = if self.device_tls { "mqtts" } else { "mqtt" };
+        let address = self.device_address.parse::<SocketAddr>().ok();
+        let address = address.filter(|address| address.ip().is_unspecified()).and_then(|any| {
+            let own = own_address(any)?;
+            Some(SocketAddr::new(own, any.port()).to_string())
+        });
+        format!("{scheme}://{}", address.as_deref().unwrap_or(&self.device_address))
+    }
+}
+
+/// The address of this machine from which others are reached. Nothing is sent.
+fn own_address(like: SocketAddr) -> Option<std::net::IpAddr> {
+    // Addresses that are kept for documents: nobody has them, so the usual way out is taken.
+    let (from, to) = if like.is_ipv4() {
+        ("0.0.0.0:0", "192.0.2.1:9")
+    } else {
+        ("[::]:0", "[2001:db8::1]:9")
+    };
+    let socket = std::net::UdpSocket::bind(from).ok()?;
+    socket.connect(to).ok()?;
+    let own = socket.local_addr().ok()?.ip();
+    (!own.is_unspecified()).then_some(own)
 }
 
 /// Starts benches.
@@ -157,7 +187,9 @@ impl MqttBench {
         let maps = MapServer::start(&options.maps_listen, options.maps_host.as_deref(), reporter.clone()).await?;
         self_test(&endpoint).await?;
         let run = uuid::Uuid::new_v4().simple().to_string();
-        let standing = standing(&endpoint, &run, &options, &reporter).await?;
+        // Known to nobody on the broker, so that nobody can take it.
+        let client_id = format!("tck-{}", uuid::Uuid::new_v4().simple());
+        let standing = standing(&endpoint, &run, &client_id, &options, &reporter).await?;
         // Last, so that nothing of the device can be missed.
         let tap = if options.tap {
             Some(Tap::start(&options.listen, tls, upstream, reporter.clone()).await?)
@@ -168,6 +200,11 @@ impl MqttBench {
             device_address: tap
                 .as_ref()
                 .map_or_else(|| endpoint.address(), |tap| tap.address().to_string()),
+            device_tls: if options.tap {
+                options.tls.is_some()
+            } else {
+                endpoint.tls.is_some()
+            },
             broker_address: endpoint.address(),
             broker: endpoint.clone(),
             maps_address: maps.address(),
@@ -193,6 +230,7 @@ impl MqttBench {
             vantage: if options.tap { Vantage::Tap } else { Vantage::Subscriber },
             endpoint,
             run,
+            client_id,
             client: standing.client,
             inbox,
             reporter,
@@ -217,11 +255,12 @@ struct Standing {
 async fn standing(
     endpoint: &Endpoint,
     run: &str,
+    client_id: &str,
     options: &BenchOptions,
     reporter: &Reporter,
 ) -> Result<Standing, LinkError> {
     let topics = options.device_topics.iter().cloned().chain([probe_topic(run)]);
-    let (client, mut events) = Client::open(&own_client(endpoint, &format!("tck-{run}"), topics));
+    let (client, mut events) = Client::open(&own_client(endpoint, client_id, topics));
     let connected = async {
         loop {
             match events.recv().await {
@@ -303,6 +342,7 @@ pub struct MqttLink {
     vantage: Vantage,
     endpoint: Endpoint,
     run: String,
+    client_id: String,
     client: Client,
     inbox: Inbox,
     reporter: Reporter,
@@ -410,7 +450,7 @@ impl Link for MqttLink {
         self.requests += 1;
         let request = self.requests;
         let end = format!("vda5050-tck/{}/end/{request}", self.run);
-        let id = format!("tck-{}-{request}", self.run);
+        let id = format!("{}-{request}", self.client_id);
         let options = own_client(&self.endpoint, &id, [topic.to_owned(), end.clone()].into_iter());
         let (endpoint, reporter) = (self.endpoint.clone(), self.reporter.clone());
         while self.tasks.try_join_next().is_some() {}

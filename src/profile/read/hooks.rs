@@ -5,7 +5,7 @@ use toml::de::DeValue;
 
 use super::{Entry, Reader};
 use crate::diagnostic;
-use crate::profile::hooks::{HOOKS, Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE};
+use crate::profile::hooks::{HOOKS, Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
 use crate::profile::key::{COMMON_PLACEHOLDERS, Kind};
 use crate::profile::value::{self, Value};
 
@@ -85,13 +85,16 @@ impl Reader<'_> {
 
     fn builtin(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<HookAction> {
         let name = self.text(what, value)?;
-        if name == RESTART_DEVICE {
-            return Some(HookAction::RestartDevice);
+        let known = [
+            (RESTART_DEVICE, HookAction::RestartDevice),
+            (STOP_DEVICE, HookAction::StopDevice),
+            (START_DEVICE, HookAction::StartDevice),
+            (NATURAL_TRAFFIC, HookAction::NaturalTraffic),
+        ];
+        if let Some((_, action)) = known.iter().find(|(word, _)| *word == name) {
+            return Some(action.clone());
         }
-        if name == NATURAL_TRAFFIC {
-            return Some(HookAction::NaturalTraffic);
-        }
-        let hint = Some(diagnostic::did_you_mean(&name, [RESTART_DEVICE, NATURAL_TRAFFIC]));
+        let hint = Some(diagnostic::did_you_mean(&name, known.iter().map(|(word, _)| *word)));
         self.complain("bad-value", value.span(), &format!("{what} is not known"), &name, hint);
         None
     }

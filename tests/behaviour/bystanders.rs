@@ -1,0 +1,111 @@
+//! Others on the tap: whatever they do, a healthy vehicle is not accused of it.
+
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::bench::{Bench, Profile, QUICK};
+use crate::scripted::Scripted;
+use crate::tool::{Ended, Running};
+
+/// Tests without motion, which take some seconds.
+const TESTS: [&str; 2] = [QUICK, "order-rejection/unreadable*"];
+
+/// A run against a healthy vehicle, with others who act from its first test on. The client ids that were seen are given to them.
+fn run_beside(others: impl FnOnce(u16, &[String])) -> (Bench, Ended) {
+    let bench = Bench::new();
+    let (mut run, port) = bench.start(&Profile::default(), &TESTS);
+    let _agv: Running = bench.agv(port, &[]);
+    run.until("the first test", |_| {
+        records(&bench)
+            .iter()
+            .find(|record| record["event"]["kind"] == "test-begun")?;
+        Some(())
+    });
+    let ids: Vec<String> = records(&bench)
+        .iter()
+        .filter_map(|record| Some(record["event"]["packet"]["clientId"].as_str()?.to_owned()))
+        .collect();
+    others(port, &ids);
+    (bench, run.end())
+}
+
+fn records(bench: &Bench) -> Vec<Value> {
+    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    journal
+        .lines()
+        .filter_map(|line| serde_json::from_str(line).ok())
+        .collect()
+}
+
+fn short() {
+    std::thread::sleep(Duration::from_millis(100));
+}
+
+#[test]
+fn onlookers_and_visitors_cost_no_verdict() {
+    let (bench, ended) = run_beside(|port, _| {
+        let onlooker = Scripted::stranger(port, "MQTT_Explorer");
+        short();
+        Scripted::stranger(port, "visitor").say_goodbye();
+        drop(onlooker);
+        drop(std::net::TcpStream::connect(("127.0.0.1", port)).unwrap());
+        // Names like those of the harness.
+        for name in ["tck-watcher", "tck-1", "tck-fresh"] {
+            drop(Scripted::stranger(port, name));
+        }
+    });
+    ended.code(0);
+    let limits = bench.result()["limits"].to_string();
+    assert!(!limits.contains("visitor") && !limits.contains("Explorer"), "{limits}");
+    bench.is_whole();
+}
+
+#[test]
+fn what_others_say_in_the_name_of_the_vehicle_is_not_held_against_it() {
+    let (bench, ended) = run_beside(|port, _| {
+        let mut forger = Scripted::stranger(port, "forger");
+        for _ in 0..10 {
+            forger.publish("state", b"{\"orderId\": \"forged\", \"headerId\": -5}", false);
+            forger.publish("connection", b"no JSON", false);
+            forger.publish("visualization", b"[]", false);
+            short();
+        }
+    });
+    ended.code(0);
+    let limits = bench.result()["limits"].to_string();
+    assert!(limits.contains("forger") && limits.contains("/state"), "{limits}");
+    bench.is_whole();
+}
+
+#[test]
+fn who_takes_the_client_id_of_the_vehicle_makes_it_no_failure() {
+    let (bench, ended) = run_beside(|port, ids| {
+        for _ in 0..3 {
+            drop(Scripted::stranger(port, &ids[0]));
+            short();
+        }
+    });
+    assert!(matches!(ended.status.code(), Some(0 | 3)), "{ended:?}");
+    let limits = bench.result()["limits"].to_string();
+    assert!(limits.contains("took the client id"), "{limits}");
+    bench.is_whole();
+}
+
+#[test]
+fn who_commands_the_vehicle_is_named() {
+    let (bench, ended) = run_beside(|port, _| {
+        let mut other = Scripted::stranger(port, "other");
+        other.publish("order", b"{\"orderId\": \"of somebody else\"}", false);
+        other.publish(
+            "instantActions",
+            b"{\"actions\": [{\"actionType\": \"startPause\", \"actionId\": \"x\", \"blockingType\": \"HARD\"}]}",
+            false,
+        );
+        short();
+    });
+    assert!(matches!(ended.status.code(), Some(0 | 3)), "{ended:?}");
+    let limits = bench.result()["limits"].to_string();
+    assert!(limits.contains("other") && limits.contains("/order"), "{limits}");
+    bench.is_whole();
+}
