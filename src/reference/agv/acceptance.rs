@@ -45,9 +45,6 @@ impl Agv {
             serde_json::from_slice::<Value>(payload)
                 .map_err(|error| Refusal::new(Rule::Malformed, &format!("the message is not JSON: {error}")))
         };
-        if message.is_err() && self.faults.has(F::R1UnreadableOrderDropped) {
-            return;
-        }
         let result = match &message {
             Err(refusal) => Err(refusal.clone()),
             Ok(message) => self.order_decided(message),
@@ -62,9 +59,6 @@ impl Agv {
         }
         if let Err(refusal) = result {
             self.third.posed = false;
-            if refusal.is_of_busy() && self.faults.has(F::R2RefusedOrderQueued) {
-                self.queued = message.as_ref().ok().cloned();
-            }
             self.refuse(message.as_ref().unwrap_or(&Value::Null), refusal);
         }
     }
@@ -93,26 +87,12 @@ impl Agv {
     }
 
     fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
-        let taken = super::leniency::taken(message, self.faults);
-        let mended = self.mended(&taken);
-        if let Some(defect) = self.unreadable_for_faulty(&taken) {
-            return Err(defect.into());
-        }
-        let mut order = Order::read(mended.as_ref().unwrap_or(&taken))?;
+        let mut order = Order::read(&self.read(message))?;
         if order.nodes.is_empty() && self.faults.has(F::R3EmptyOrderDropped) {
             return Ok(());
         }
-        if self.faults.has(F::R3MissingOrientationTypeGlobal) {
-            let sent = message.get("edges").and_then(Value::as_array).into_iter().flatten();
-            for (edge, sent) in order.edges.iter_mut().zip(sent) {
-                edge.global |= sent.get("orientationType").is_none();
-            }
-        }
         if std::mem::take(&mut self.locked) {
             return Err(Refusal::new(Rule::OtherOrderActive, "another order is active"));
-        }
-        if !order.nodes.is_empty() && self.faults.has(F::R2SurplusEdgeDropped) {
-            order.edges.truncate(order.nodes.len() - 1);
         }
         let tolerated = |defect: &Defect| {
             let unchecked = match defect.path.rsplit('.').next() {
@@ -160,40 +140,6 @@ impl Agv {
             self.echo_order(message);
         }
         Ok(())
-    }
-
-    /// A malformed order as a faulty vehicle reads it all the same.
-    fn mended(&self, message: &Value) -> Option<Value> {
-        let (numbers, blocking) = (
-            self.faults.has(F::R1NumbersReadFromText),
-            self.faults.has(F::R1BlockingTypeAssumed),
-        );
-        if !numbers && !blocking {
-            return None;
-        }
-        let mut message = message.clone();
-        if numbers {
-            number_from_text(&mut message, "orderUpdateId");
-        }
-        for list in ["nodes", "edges"] {
-            for element in message
-                .get_mut(list)
-                .and_then(Value::as_array_mut)
-                .into_iter()
-                .flatten()
-            {
-                if numbers {
-                    number_from_text(element, "sequenceId");
-                }
-                let actions = element.get_mut("actions").and_then(Value::as_array_mut);
-                for action in actions.into_iter().flatten().filter_map(Value::as_object_mut) {
-                    if blocking {
-                        action.entry("blockingType").or_insert_with(|| Value::from("NONE"));
-                    }
-                }
-            }
-        }
-        Some(message)
     }
 
     /// What a faulty vehicle does with an order it knows already.
@@ -510,15 +456,4 @@ impl Agv {
 fn content_of(message: &Value) -> Value {
     let part = |key: &str| message.get(key).cloned().unwrap_or_default();
     Value::Array(vec![part("nodes"), part("edges")])
-}
-
-/// Makes a number of a text that is one.
-fn number_from_text(object: &mut Value, key: &str) {
-    let number = object
-        .get(key)
-        .and_then(Value::as_str)
-        .and_then(|text| text.parse::<u32>().ok());
-    if let Some(number) = number {
-        object[key] = Value::from(number);
-    }
 }

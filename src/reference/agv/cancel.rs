@@ -106,32 +106,18 @@ impl Agv {
         if self.faults.has(F::CancelLeavesNodes) {
             self.book.drop_route();
         }
-        if self.faults.has(F::IdleCancelSilent) {
-            return;
-        }
-        let referenced = !self.faults.has(F::IdleCancelUnreferenced);
-        let once = self.faults.has(F::R6NoOrderToCancelKeepsFirstId);
-        let listed = self.errors.references_of(&self.config.errors.no_order_to_cancel);
-        let refusal = ActiveError {
+        let error = ActiveError {
             error_type: self.config.errors.no_order_to_cancel.clone(),
-            fatal: self.faults.has(F::IdleCancelFatal),
-            references: listed.filter(|_| once).unwrap_or_else(|| {
-                referenced
-                    .then(|| match self.faults.has(F::R1IdleCancelNamesType) {
-                        true => ("actionType".to_owned(), "cancelOrder".to_owned()),
-                        false => ("actionId".to_owned(), action_id.to_owned()),
-                    })
-                    .into_iter()
-                    .collect()
-            }),
+            fatal: false,
+            references: vec![("actionId".to_owned(), action_id.to_owned())],
             description: "there is no order to cancel".into(),
             life: match () {
                 () if self.takes(T::R1IdleCancelErrorBrief) => Life::Until(self.moment() + self.brief()),
-                () if once || self.takes(T::R4NoOrderWarningUntilNextOrder) => Life::UntilNewOrder,
+                () if self.takes(T::R4NoOrderWarningUntilNextOrder) => Life::UntilNewOrder,
                 () => Life::Until(self.moment() + self.config.error_duration),
             },
         };
-        self.errors.refused(refusal, self.now.moment, self.faults);
+        self.raise_nothing_to_cancel(error);
     }
 
     /// Ends the actions of the order, as far as they can be interrupted (ORD-CANCEL-03 to ORD-CANCEL-05).

@@ -125,9 +125,7 @@ impl Agv {
             "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
             "enable-map" => {
                 // A map that is not on board cannot be chosen on the vehicle's panel.
-                let _ = self
-                    .maps
-                    .enable(text("mapId"), text("mapVersion"), super::Faults::default());
+                let _ = self.maps.enable(text("mapId"), text("mapVersion"));
             }
             "place-load" => self.place_load(text("loadId"), text("loadType")),
             "remove-load" => self.loads.clear(),

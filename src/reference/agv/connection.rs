@@ -29,8 +29,6 @@ pub(crate) struct Connection {
     pub(crate) header_ids: BTreeMap<&'static str, u32>,
     /// The factsheet that is published now was asked for.
     pub(crate) factsheet_asked: bool,
-    /// It has answered a factsheetRequest (`r2-factsheet-only-once` only).
-    pub(crate) factsheet_given: bool,
     /// When to say ONLINE (`online-late` only).
     pub(crate) online_at: Option<Moment>,
 }
@@ -46,7 +44,6 @@ impl Connection {
             sessions: 0,
             header_ids: BTreeMap::new(),
             factsheet_asked: false,
-            factsheet_given: false,
             online_at: None,
         }
     }
@@ -176,11 +173,6 @@ impl Agv {
         let on_request = self.takes(T::R1FactsheetOnRequestOnly);
         if !on_request && self.takes(T::R2FactsheetBeforeOnline) {
             self.publish_factsheet();
-        }
-        if !first && self.faults.has(F::R3DeletedMapBackAfterReconnect) {
-            for (id, version) in std::mem::take(&mut self.third.deleted_maps) {
-                self.maps.store(&id, &version, super::Faults::default());
-            }
         }
         if !first && self.faults.has(F::OnlineLate) {
             self.connection.online_at = Some(self.moment() + Duration::from_secs(25));

@@ -27,10 +27,9 @@ pub(crate) enum Area {
 /// Why an action failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Problem {
-    area: Area,
-    reason: String,
+    pub(crate) area: Area,
+    pub(crate) reason: String,
     pub(crate) references: Vec<(String, String)>,
-    silent: bool,
 }
 
 impl Problem {
@@ -45,7 +44,6 @@ impl Problem {
             area,
             reason: reason.to_owned(),
             references,
-            silent: false,
         }
     }
 
@@ -61,12 +59,6 @@ impl Problem {
     /// An instant action that cannot be performed.
     pub(crate) fn unable(action: &Action, reason: &str) -> Self {
         Self::new(Area::InstantAction, action, reason)
-    }
-
-    /// The same, without an error.
-    pub(crate) fn silent_if(mut self, silent: bool) -> Self {
-        self.silent |= silent;
-        self
     }
 }
 
@@ -164,7 +156,19 @@ impl Agv {
             self.fail_as_told(&action, error_type);
             return;
         }
-        match self.deed(&action) {
+        let outcome = match self.does(&action) {
+            Some(outcome) => outcome,
+            None => {
+                let outcome = self.deed(&action);
+                self.turned_out(&action, outcome)
+            }
+        };
+        self.conclude(id, outcome);
+    }
+
+    /// An action comes to this.
+    pub(crate) fn conclude(&mut self, id: &str, outcome: Outcome) {
+        match outcome {
             Outcome::Done(result) => self.finish(id, result),
             Outcome::Failed(problem) => self.fail(id, &problem),
             Outcome::Open => {}
@@ -192,28 +196,21 @@ impl Agv {
 
     /// Ends an action without success, and says why (IACT-06, BP-03).
     pub(crate) fn fail(&mut self, id: &str, problem: &Problem) {
+        self.end_failed(id, problem);
+        self.report_failure(id, problem);
+    }
+
+    /// Ends an action without success.
+    pub(crate) fn end_failed(&mut self, id: &str, problem: &Problem) {
         if let Some(action) = self.actions.get_mut(id) {
             action.end(Status::Failed);
             if self.config.tolerances.has(T::R2FailuresDescribed) {
                 action.result = Some(problem.reason.clone());
             }
         }
-        let retried = |action: &Action| {
-            let deed = action.kind.map(|kind| kind.deed);
-            action.of_order() && matches!(deed, Some(Deed::Pick | Deed::Drop))
-        };
-        if self.faults.has(F::R3FailedPickRetried)
-            && self.actions.get(id).is_some_and(retried)
-            && !self.third.retried.iter().any(|other| other == id)
-        {
-            self.third.retried.push(id.to_owned());
-            self.flush();
-            self.run_action(id);
-            return;
-        }
-        if problem.silent {
-            return;
-        }
+    }
+
+    fn report_failure(&mut self, id: &str, problem: &Problem) {
         let names = &self.config.errors;
         let name = match problem.area {
             Area::InstantAction => &names.instant_action,
@@ -222,19 +219,9 @@ impl Agv {
             Area::Load => &names.load,
             Area::Charging => &names.charging,
         };
-        let mut references = problem.references.clone();
-        let of_order = self.actions.get(id).is_some_and(Action::of_order);
-        let first = self
-            .actions
-            .iter()
-            .find(|action| action.of_order())
-            .filter(|_| of_order);
-        if let Some(first) = first.filter(|_| self.faults.has(F::R3FailureBlamesFirstAction)) {
-            let named = references.iter_mut().filter(|(key, _)| key == "actionId");
-            named.for_each(|(_, value)| value.clone_from(&first.request.id));
-        }
-        references.retain(|(key, _)| key != "actionId" || !self.faults.has(F::FailureUnreferenced));
-        self.warn(name.clone(), references, problem.reason.clone());
+        let error = self.warning(name.clone(), problem.references.clone(), problem.reason.clone());
+        let action = self.actions.get(id).cloned();
+        self.raise_failure(action.as_ref(), error);
     }
 
     /// Ends an action without success because a test wants that.
@@ -264,33 +251,11 @@ impl Agv {
             Deed::StopCharging => self.stop_charging(action).into(),
             Deed::InitPosition => {
                 let result = self.init_position(action);
-                self.lost |= result.is_err() && self.faults.has(F::R3RefusedPoseLosesPosition);
                 self.third.posed |= result.is_ok() && !action.of_order();
                 result.into()
             }
             Deed::EnableMap => {
-                let (id, version) = (action.text("mapId"), action.text("mapVersion"));
-                let busy = !self.book.nodes.is_empty() || self.actions.order_unfinished();
-                let known = self.maps.has_version(id, version);
-                if known && action.of_order() && self.faults.has(F::R3EnableOnNodeWithoutEffect) {
-                    return Outcome::Done(None);
-                }
-                if self.maps.is_enabled(id, version) && self.faults.has(F::R3EnableTwiceFails) {
-                    return Outcome::Failed(Problem::map(action, "the map is enabled already"));
-                }
-                if busy && known && self.enables_later(id, version) {
-                    return Outcome::Done(None);
-                }
-                if busy && self.maps.has_version(id, version) && self.faults.has(F::R2EnableIgnoredMidOrder) {
-                    return Outcome::Done(None);
-                }
-                if self.maps.has_version(id, version) && self.faults.has(F::R1EnableInTwoStates) {
-                    self.maps.disable_all(id);
-                    self.flush();
-                }
-                let result = self
-                    .maps
-                    .enable(action.text("mapId"), action.text("mapVersion"), self.faults);
+                let result = self.maps.enable(action.text("mapId"), action.text("mapVersion"));
                 result.map_err(|reason| Problem::map(action, reason)).into()
             }
             Deed::DeleteMap if self.takes(T::R1MapDelistedNext) => {
@@ -308,9 +273,7 @@ impl Agv {
             }
             Deed::DeleteMap => self.delete_map(action).into(),
             Deed::StateRequest => {
-                let paused = self.holds.pause && self.faults.has(F::R1StateRequestUnansweredInPause);
-                self.report.requested = !paused && !self.faults.has(F::StateRequestUnanswered);
-                self.report.silenced = !self.report.requested;
+                self.report.requested = true;
                 Outcome::Done(None)
             }
             Deed::LogReport => {
@@ -320,21 +283,16 @@ impl Agv {
                     self.last_log = Some((action.request.id.clone(), name));
                     return Outcome::Done(None);
                 }
-                Outcome::Done(Some(name).filter(|_| !self.faults.has(F::LogNameMissing)))
+                Outcome::Done(Some(name))
             }
             Deed::Pick => self.pick(action).into(),
             Deed::Drop => self.put_down(action).into(),
             Deed::DetectObject => self.detect(action),
             Deed::FinePositioning => self.align(action).into(),
             Deed::FactsheetRequest => {
-                let mid_order = self.is_busy() && self.faults.has(F::R1FactsheetNotMidOrder);
-                let again = std::mem::replace(&mut self.connection.factsheet_given, true);
-                let again = again && self.faults.has(F::R2FactsheetOnlyOnce);
-                if !self.faults.has(F::FactsheetRequestUnanswered) && !mid_order && !again {
-                    self.connection.factsheet_asked = true;
-                    self.publish_factsheet();
-                    self.connection.factsheet_asked = false;
-                }
+                self.connection.factsheet_asked = true;
+                self.publish_factsheet();
+                self.connection.factsheet_asked = false;
                 Outcome::Done(None)
             }
             Deed::WaitForTrigger | Deed::WarningLights | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
@@ -342,10 +300,7 @@ impl Agv {
                 self.cancel_order(&action.request.id);
                 Outcome::Open
             }
-            Deed::DownloadMap => {
-                self.begin_download(&action.request.id);
-                Outcome::Open
-            }
+            Deed::DownloadMap => self.begin_download(&action.request.id),
         }
     }
 
@@ -496,42 +451,16 @@ impl Agv {
         if action.origin == Origin::Instant && (!self.book.nodes.is_empty() || self.actions.order_unfinished()) {
             return invalid("an order is active");
         }
-        if self.faults.has(F::InitPositionWithoutEffect) {
-            return Ok(());
-        }
-        self.lost = self.faults.has(F::InitPositionUninitialized);
+        self.lost = false;
         self.persona.lost = false;
-        if !self.faults.has(F::R4InitPositionOntoDisabledMap) {
-            self.maps.enable_any(map_id);
-        }
-        if self.faults.has(F::R1InitPositionEnablesAll) {
-            self.maps.enable_all(map_id);
-        }
-        let node = self.config.node(action.text("lastNodeId"));
-        let snapped = node.filter(|node| node.map_id == map_id && self.faults.has(F::R3InitPositionSnapsToNode));
-        let (x, y) = snapped.map_or((x, y), |node| (node.x, node.y));
-        let stale = action.of_order() && self.faults.has(F::LiftMapStale);
-        let stale = stale || self.faults.has(F::R6InitPositionKeepsMap);
-        let old = self.motion.pose(self.moment()).map_id;
-        let kept = self.motion.pose(self.moment());
-        let (x, y) = if self.faults.has(F::InitPositionKeepsPose) {
-            (kept.x, kept.y)
-        } else {
-            (x, y)
-        };
+        self.maps.enable_any(map_id);
         self.motion.place(Pose {
             x,
             y,
-            theta: if self.faults.has(F::R1InitPositionThetaLost) {
-                0.0
-            } else {
-                theta.clamp(-PI, PI)
-            },
-            map_id: if stale { old } else { map_id.to_owned() },
+            theta: theta.clamp(-PI, PI),
+            map_id: map_id.to_owned(),
         });
-        if !self.faults.has(F::InitPositionKeepsNode) {
-            action.text("lastNodeId").clone_into(&mut self.book.last_node);
-        }
+        action.text("lastNodeId").clone_into(&mut self.book.last_node);
         if !action.of_order() && self.takes(T::R1InitPositionResetsSequence) {
             self.book.last_sequence = 0;
         }
@@ -549,22 +478,9 @@ impl Agv {
     fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
         let here = self.motion.pose(self.moment()).map_id;
         let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
-        let ahead = !self.faults.has(F::R1MapOfOrderDeleted);
-        let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
-        let free = idle && self.faults.has(F::R2CurrentMapDeletedWhenIdle);
         let kept = self.takes(T::R4EnabledUnusedMapNotDeleted);
-        let used =
-            |map_id: &str| kept || here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
-        let result = self
-            .maps
-            .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);
-        if result == Err("the map is in use") && self.faults.has(F::R3UsedMapDeletionFinished) {
-            return Ok(());
-        }
-        if result.is_ok() && self.faults.has(F::R3DeletedMapBackAfterReconnect) {
-            let deleted = (action.text("mapId").to_owned(), action.text("mapVersion").to_owned());
-            self.third.deleted_maps.push(deleted);
-        }
+        let used = |map_id: &str| kept || here == map_id || needed.iter().any(|needed| needed == map_id);
+        let result = self.maps.delete(action.text("mapId"), action.text("mapVersion"), used);
         result.map_err(|reason| Problem::map(action, reason))
     }
 }

@@ -25,7 +25,6 @@ macro_rules! faults {
 with_blind_faults! { faults!
     // Transport
     PauseStuckAfterCut "pause-stuck-after-cut" ["ACT-13"] "Reports stopPause FINISHED and stays paused when the link was lost in the pause.";
-    PauseStuckAfterRefusal "pause-stuck-after-refusal" ["ACT-13"] "Reports stopPause FINISHED and stays paused when it has refused an order or an update in the pause.";
     ActionEndMissedOffline "action-end-missed-offline" ["MQTT-04"] "Leaves an action RUNNING for ever that ends while the link is down.";
     StopsOnLinkLoss "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down.";
     HorizonDrivenOffline "horizon-driven-offline" ["MQTT-05", "ORD-07", "MQTT-04"] "Drives into the horizon while the link is down.";
@@ -66,7 +65,6 @@ with_blind_faults! { faults!
     FreeActionIgnored "free-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs that does not block.";
     HorizonNotBusy "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point.";
     FarOrderAccepted "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is.";
-    StartRefusalSilent "start-refusal-silent" ["ORD-REJ-17"] "Raises no error when the first node of an order is out of reach.";
     OldActionStatesKept "old-action-states-kept" ["ORD-FLOW-05", "STATE-MSG-11"] "Keeps the action states of the old order.";
     NeverStarts "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive.";
     UpdateReplacesBase "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives.";
@@ -91,9 +89,6 @@ with_blind_faults! { faults!
     CompletedUpdateGapAccepted "completed-update-gap-accepted" ["ORD-FLOW-10"] "Continues a completed order from whatever node the update begins with.";
     ContinuationNotDriven "continuation-not-driven" ["ORD-06", "ORD-FLOW-11"] "Takes over an update of a completed order and does not drive it.";
     CompletedNotContinued "completed-not-continued" ["ORD-FLOW-11"] "Refuses updates of a completed order.";
-    RejectionStopsOrder "rejection-stops-order" ["ORD-FLOW-12", "ORD-REJ-11"] "Stops driving when it has to refuse a message.";
-    RejectionDropsHorizon "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12", "ORD-FLOW-03"] "Forgets its horizon when it has to refuse a message.";
-    RejectionClearsActionStates "rejection-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when it has to refuse an order.";
 
     // Cancel
     CancelDrivesOn "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder.";
@@ -126,57 +121,20 @@ with_blind_faults! { faults!
     TemporaryNodeNotReached "temporary-node-not-reached" ["ORD-CANCEL-15"] "Takes over an order with one node it has never heard of, and never counts it as reached.";
     RangeNotCounted "range-not-counted" ["ORD-CANCEL-16"] "Drives to the exact place of a first node in whose range it stands.";
     IdleCancelFinished "idle-cancel-finished" ["ORD-CANCEL-18"] "Reports cancelOrder FINISHED although there is no order.";
-    IdleCancelSilent "idle-cancel-silent" ["ORD-CANCEL-19", "ORD-CANCEL-20"] "Raises no error when there is no order to cancel.";
-    IdleCancelFatal "idle-cancel-fatal" ["ORD-CANCEL-19"] "Calls a missing order to cancel FATAL.";
-    IdleCancelUnreferenced "idle-cancel-unreferenced" ["ORD-CANCEL-20"] "Does not name the actionId when there is no order to cancel.";
 
     // Rejection
-    MalformedTakenOver "malformed-taken-over" ["ORD-REJ-01"] "Reports the orderId of a malformed order as its own.";
-    UnreadableClearsOrder "unreadable-clears-order" ["ORD-REJ-01", "ORD-FLOW-12"] "Clears its order when it cannot read a message.";
-    MissingIdTakenOver "missing-id-taken-over" ["ORD-REJ-01", "STATE-MSG-02"] "Reads a missing orderId as an empty one and reports it.";
-    ReleasedAssumed "released-assumed" ["ORD-REJ-01"] "Takes nodes and edges that do not say whether they are released for released ones.";
-    TextReadAsNumber "text-read-as-number" ["ORD-REJ-01"] "Takes numbers and Booleans that are written as text.";
-    NullReadAsDefault "null-read-as-default" ["ORD-REJ-01"] "Reads null as zero, as false or as nothing in particular.";
-    BlockingTypeUnchecked "blocking-type-unchecked" ["ORD-REJ-01"] "Takes every word it does not know for the blockingType NONE.";
-    MissingListReadAsEmpty "missing-list-read-as-empty" ["ORD-REJ-01"] "Takes a list that is missing for an empty one.";
-    NumbersWrapped "numbers-wrapped" ["ORD-REJ-01"] "Cuts numbers that are no whole numbers of 32 bits until they are.";
-    OptionalTypesUnchecked "optional-types-unchecked" ["ORD-REJ-01"] "Leaves optional members of a wrong type aside, although it supports them.";
-    EdgeEndsAssumed "edge-ends-assumed" ["ORD-11", "ORD-REJ-01"] "Lets every edge lead from the node before it to the one behind it, whatever it says.";
     EdgeEndsUnchecked "edge-ends-unchecked" ["ORD-11"] "Takes edges that name other nodes than those around them.";
     SequenceUnchecked "sequence-unchecked" ["ORD-11"] "Takes nodes and edges with doubled or missing sequenceIds.";
-    SequenceCountedAnew "sequence-counted-anew" ["ORD-FLOW-06", "ORD-11"] "Numbers nodes and edges itself, from the number of the first node on, whatever they say.";
-    MalformedStopsOrder "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema.";
-    HeaderUnchecked "header-unchecked" ["ORD-REJ-01"] "Takes over orders whose header is broken.";
     ParametersUnchecked "parameters-unchecked" ["ORD-REJ-04"] "Takes over orders whatever the parameters of their actions are.";
-    ValidationErrorMisspelled "validation-error-misspelled" ["ORD-REJ-02"] "Calls a malformed order validationOrder, as an old figure does.";
-    ValidationErrorFatal "validation-error-fatal" ["ORD-REJ-02"] "Reports a malformed order as FATAL.";
-    ValidationErrorDroppedEarly "validation-error-dropped-early" ["ORD-REJ-03"] "Forgets the validationError after a moment.";
     ValidationErrorLingers "validation-error-lingers" ["ORD-REJ-03"] "Keeps order errors although a new order was accepted.";
     UnknownActionAccepted "unknown-action-accepted" ["ORD-REJ-04", "ORD-REJ-09"] "Accepts orders with unknown actions and fails the action.";
-    RefusedActionsListed "refused-actions-listed" ["ORD-REJ-09"] "Lists the actions of an order it cannot perform as FAILED.";
     UnsupportedFieldIgnored "unsupported-field-ignored" ["ORD-REJ-05", "OPT-02"] "Ignores fields of an order it has no use for.";
-    OrderErrorAsValidation "order-error-as-validation" ["ORD-REJ-06"] "Reports orders it cannot perform as malformed.";
-    OrderErrorFatal "order-error-fatal" ["ORD-REJ-06"] "Reports orders it cannot perform as FATAL.";
-    OrderErrorUnreferenced "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform.";
-    OrderErrorLocks "order-error-locks" ["ORD-FLOW-06", "ORD-REJ-08"] "Refuses the order that follows one it could not perform.";
-    OrderErrorDroppedEarly "order-error-dropped-early" ["ORD-REJ-08"] "Forgets the orderError after a moment.";
     OutdatedUpdateTakenOver "outdated-update-taken-over" ["ORD-REJ-10"] "Goes back to an outdated order update.";
-    OutdatedUpdateDropsOrder "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives.";
-    OutdatedUpdateMisnamed "outdated-update-misnamed" ["ORD-REJ-12"] "Reports an outdated update as validationError.";
-    OutdatedUpdateFatal "outdated-update-fatal" ["ORD-REJ-12"] "Reports an outdated update as FATAL.";
     DuplicateReported "duplicate-reported" ["ORD-REJ-13"] "Raises an error for an order that is sent twice.";
     DuplicateHaltsDriving "duplicate-halts-driving" ["ORD-06", "ORD-REJ-13"] "Stands still for ever when the order it drives is sent again.";
-    RefusalStallsAction "refusal-stalls-action" ["ACT-01", "ORD-FLOW-12"] "An order it refuses makes it forget to end the action that runs.";
-    RefusedUpdateDropsEdges "refused-update-drops-edges" ["ORD-FLOW-12", "STATE-12"] "An order it refuses makes it throw the edges of its horizon away.";
-    BusyRefusalUntyped "busy-refusal-untyped" ["ERR-02"] "The error of an order it refuses because of another one has an empty errorType.";
     DuplicateExecuted "duplicate-executed" ["ORD-REJ-13"] "Begins an order again when it is sent twice.";
-    UpdateIdUnreferenced "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update.";
     MemoryUnchecked "memory-unchecked" ["ORD-REJ-15", "STATE-12"] "Takes over orders larger than its stated limits, cut to what fits.";
     OrientationUnchecked "orientation-unchecked" ["ORD-REJ-16"] "Accepts edges with an orientation it cannot take.";
-    RefusalLevelCorrected "refusal-level-corrected" ["ORD-REJ-12", "ORD-REJ-02", "ORD-REJ-06", "ORD-CANCEL-19"] "Reports a refusal as FATAL at first, and right a moment later.";
-    RefusalTypeCorrected "refusal-type-corrected" ["ORD-REJ-06", "ORD-REJ-02", "ORD-REJ-12"] "Reports a refusal as internalError at first, and right a moment later.";
-    RefusalReferencesCorrected "refusal-references-corrected" ["ORD-REJ-14", "ORD-REJ-07", "ORD-CANCEL-20"] "Does not say what a refusal is about at first, and says it a moment later.";
-    RejectionSilent "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order.";
 
     // Motion
     ThetaIgnored "theta-ignored" ["ORD-MSG-10", "ORD-MSG-14", "NODE-01"] "Does not turn to the orientation a node asks for.";
@@ -210,36 +168,9 @@ with_blind_faults! { faults!
     DisabledMapUsed "disabled-map-used" ["MAP-13"] "Drives on maps that are disabled.";
     DownloadNeverRunning "download-never-running" ["MAP-17"] "Keeps downloadMap INITIALIZING while it downloads.";
     DownloadFinishedEarly "download-finished-early" ["MAP-18", "MAP-21", "MAP-17"] "Reports downloadMap FINISHED when the first byte arrives.";
-    DownloadFailureFinished "download-failure-finished" ["MAP-19"] "Reports downloadMap FINISHED when the server does not have the map.";
-    DownloadFailureSilent "download-failure-silent" ["MAP-19"] "Raises no error when a download fails.";
-    DownloadEnables "download-enables" ["MAP-20"] "Enables a map as soon as it is downloaded.";
-    MapListedWhileLoading "map-listed-while-loading" ["MAP-21"] "Lists a map when its download begins.";
-    DownloadDisablesOthers "download-disables-others" ["MAP-22"] "Disables all other maps when it downloads one.";
-    DuplicateMapAccepted "duplicate-map-accepted" ["MAP-23"] "Downloads a map again that it has.";
-    DuplicateMapSilent "duplicate-map-silent" ["MAP-23"] "Raises no error for a map it has already.";
-    DownloadReplacesVersion "download-replaces-version" ["MAP-22"] "Disables the version of a map that is enabled when it downloads another one of it.";
-    DownloadDropsVersion "download-drops-version" ["MAP-22", "MAP-31"] "Deletes the other versions of a map when it downloads one.";
-    DeleteTakesAllVersions "delete-takes-all-versions" ["MAP-31", "MAP-29"] "Deletes every version of a map when one is to be deleted.";
-    DownloadNeverEnds "download-never-ends" ["MAP-18"] "Leaves downloadMap RUNNING for ever, although the map is there.";
-    TwoMapsEnabled "two-maps-enabled" ["MAP-14", "MAP-24"] "Leaves the old version of a map enabled beside the new one.";
-    EnableDisablesOtherMaps "enable-disables-other-maps" ["MAP-24"] "Disables all other maps when one is enabled, whatever their mapId.";
-    EnableWithoutEffect "enable-without-effect" ["MAP-24"] "Reports enableMap FINISHED and enables nothing.";
-    EnableBringsOther "enable-brings-other" ["MAP-06"] "Lists a map that nobody has sent it as soon as another one is enabled.";
-    EnableUnknownFinished "enable-unknown-finished" ["MAP-25"] "Reports enableMap FINISHED for a map it does not have.";
     ManualEnableUnreported "manual-enable-unreported" ["MAP-26", "STATE-10"] "Does not report a map enabled on the vehicle.";
-    DeleteKeepsEntry "delete-keeps-entry" ["MAP-29"] "Keeps listing a map it has deleted.";
-    StorageFullSilent "storage-full-silent" ["MAP-30", "MAP-19"] "Raises no error when there is no room for a map.";
-    StorageFullDeletes "storage-full-deletes" ["MAP-31", "MAP-22"] "Deletes another map when there is no room for a new one.";
-    UsedMapDeleted "used-map-deleted" ["MAP-32"] "Deletes the map it drives on.";
-    DeleteUnknownFinished "delete-unknown-finished" ["MAP-33"] "Reports deleteMap FINISHED for a map it does not have.";
     HashIgnored "hash-ignored" ["MAP-34"] "Does not verify the hash of a map.";
     MapNotFetched "map-not-fetched" ["MAP-06"] "Reports downloadMap FINISHED without asking the server for anything.";
-    DownloadRenumbers "download-renumbers" ["MAP-22", "MAP-31"] "Counts the versions of all its maps up when it downloads one.";
-    FailedDownloadRenumbers "failed-download-renumbers" ["MAP-22", "MAP-31"] "Counts the versions of all its maps up when a download fails.";
-    EnableOnlyUpwards "enable-only-upwards" ["MAP-24"] "Reports enableMap FINISHED and keeps the newer version enabled.";
-    EnableUnknownDisables "enable-unknown-disables" ["MAP-25"] "Disables its maps before it fails to enable one it does not have.";
-    UsedMapDisabled "used-map-disabled" ["MAP-32"] "Disables the map it drives on before it fails to delete it.";
-    LiftMapStale "lift-map-stale" ["MAP-35", "ACT-23"] "Keeps its old mapId when an action of an order puts it on another floor.";
 
     // Actions
     ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07", "ORD-06"] "Never begins the actions of an order.";
@@ -261,48 +192,17 @@ with_blind_faults! { faults!
     OrderEndsPause "order-ends-pause" ["ACT-12"] "Drives off with a new order although it is paused.";
     ButtonPauseOverridden "button-pause-overridden" ["ACT-16"] "Pauses and goes on by message although a switch or the button at the vehicle forbids it.";
     BlockedPauseTaken "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot.";
-    ChargingUnreported "charging-unreported" ["ACT-19"] "Does not report that it charges.";
-    ChargingEndUnreported "charging-end-unreported" ["ACT-19"] "Reports that it charges after stopCharging is FINISHED.";
-    ChargingEndsEarly "charging-ends-early" ["ACT-22"] "Reports that it does not charge any more while it cannot take orders yet.";
-    ChargingFailureFinished "charging-failure-finished" ["ACT-20"] "Reports startCharging FINISHED although there is no charger.";
-    ChargingEndFailureFinished "charging-end-failure-finished" ["ACT-20", "ACT-19"] "Reports stopCharging FINISHED although it cannot leave the charger.";
-    ChargingEndShownAnyway "charging-end-shown-anyway" ["ACT-20"] "Reports that it does not charge any more although stopCharging failed.";
-    ChargingToggled "charging-toggled" ["ACT-11"] "Ends its charging when startCharging comes a second time.";
-    ChargingEndToggled "charging-end-toggled" ["ACT-11"] "Begins to charge again when stopCharging comes a second time.";
-    ChargingTwiceFails "charging-twice-fails" ["ACT-11"] "Fails a startCharging while it charges.";
-    ChargingShownAnyway "charging-shown-anyway" ["ACT-20"] "Reports that it charges although startCharging failed.";
-    InitPositionWithoutEffect "init-position-without-effect" ["ACT-23", "ACT-24"] "Reports initPosition FINISHED and does nothing.";
-    InitPositionKeepsPose "init-position-keeps-pose" ["ACT-23"] "Takes over the last node of an initPosition, and keeps its pose.";
-    InitPositionUninitialized "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose.";
     InitPositionTakenAnyway "init-position-taken-anyway" ["ACT-25"] "Changes its map although it fails an initPosition.";
-    InitPositionKeepsNode "init-position-keeps-node" ["ACT-24"] "Ignores the lastNodeId of initPosition.";
     InitPositionUnchecked "init-position-unchecked" ["ACT-25"] "Takes over a pose on a map it does not have.";
-    StateRequestUnanswered "state-request-unanswered" ["ACT-26"] "Reports stateRequest FINISHED only with the next periodic state.";
-    LogNameMissing "log-name-missing" ["ACT-27", "STATE-MSG-12"] "Does not name the log it stored.";
-    PickWithoutLoad "pick-without-load" ["ACT-28"] "Reports pick FINISHED and no load.";
-    DropReportedLate "drop-reported-late" ["ACT-28"] "Shows its load for another second after drop is FINISHED.";
-    PickFailureFinished "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was nothing to pick.";
-    DropFailureFinished "drop-failure-finished" ["ACT-29"] "Reports drop FINISHED although the place was taken.";
-    FailureUnreferenced "failure-unreferenced" ["BP-03"] "Does not say in its error which pick or drop has failed.";
-    FailureChangesLoad "failure-changes-load" ["ACT-29"] "Changes the load it shows although its pick or drop has failed.";
-    DetectionFails "detection-fails" ["ACT-35"] "Reports detectObject FAILED although the object is there.";
-    PositioningFails "positioning-fails" ["ACT-36"] "Reports finePositioning FAILED although it has reached the target.";
-    DetectionFailureFinished "detection-failure-finished" ["ACT-35"] "Reports detectObject FINISHED although there is no object.";
-    DetectionUndescribed "detection-undescribed" ["STATE-MSG-12"] "Does not describe what it has detected, as its factsheet promises.";
-    PositioningFailureFinished "positioning-failure-finished" ["ACT-36"] "Reports finePositioning FINISHED although there is no target.";
-    FailureSilent "failure-silent" ["ACT-30", "BP-03"] "Raises no error when a pick, a drop or charging fails.";
     TriggerNotAwaited "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself.";
     TriggerGivenUp "trigger-given-up" ["ACT-37"] "Waits for a trigger for a second and a half only.";
     TriggerSkipped "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting.";
     TriggerSurvivesCancel "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled.";
-    FactsheetRequestUnanswered "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet.";
     StateRequestStuck "state-request-stuck" ["ACT-26", "IACT-04"] "Leaves stateRequest RUNNING for ever.";
     InstantActionStuck "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever.";
     InstantActionDeferred "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete.";
     UnknownInstantFinished "unknown-instant-finished" ["IACT-04", "IACT-06"] "Reports an instant action it does not know as FINISHED.";
     UnknownInstantWaits "unknown-instant-waits" ["IACT-06"] "Leaves an instant action it does not know WAITING for ever.";
-    UnknownInstantSilent "unknown-instant-silent" ["IACT-06"] "Fails an instant action it cannot perform, and raises no error.";
-    UnknownInstantUnreferenced "unknown-instant-unreferenced" ["BP-01"] "Raises an error without references for an instant action it cannot perform.";
     MalformedInstantDeafens "malformed-instant-deafens" ["IACT-03"] "Takes no instant actions any more once one of them was malformed.";
     MalformedInstantStopsOrder "malformed-instant-stops-order" ["ORD-06"] "Gives its order up when an instant action is malformed.";
     InstantActionFadesAway "instant-action-fades-away" ["STATE-MSG-10", "STATE-MSG-11", "STATE-MSG-09"] "Removes running instant actions from its states when another one arrives.";
@@ -320,7 +220,6 @@ with_blind_faults! { faults!
     ActionsWithoutState "actions-without-state" ["STATE-09"] "Does not send a state when an action proceeds.";
     MapsWithoutState "maps-without-state" ["STATE-10"] "Does not send a state when its maps change.";
     StateBursts "state-bursts" ["STATE-11"] "Sends every state five times.";
-    RejectedIdReported "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused.";
     LoadForgottenWithOrder "load-forgotten-with-order" ["STATE-MSG-06", "ACT-29"] "Shows no load any more when it takes over a new order.";
     FinishedInstantForgotten "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done.";
     LastInstantActionOnly "last-instant-action-only" ["STATE-MSG-10", "STATE-MSG-09"] "Removes finished instant actions from its states when another one arrives.";
@@ -356,7 +255,6 @@ with_blind_faults! { faults!
     OwnErrorKept "own-error-kept" ["ERR-01", "ERR-04"] "Keeps its errors for a minute, also when their cause is gone.";
     FatalDrives "fatal-drives" ["ERR-04"] "Drives on with a FATAL error.";
     OwnErrorMild "own-error-mild" ["ERR-04"] "Reports defects that keep it from running as a WARNING.";
-    ReferencesOfLastOrder "references-of-last-order" ["ORD-REJ-14", "BP-02"] "Names the order and update it has, and not those it refuses.";
     SemiautomaticRefused "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC.";
     SemiautomaticEndsOrder "semiautomatic-ends-order" ["MODE-02"] "Gives its order up when it is switched from AUTOMATIC to SEMIAUTOMATIC.";
     ManualTakesOrders "manual-takes-orders" ["MODE-05", "MODE-02"] "Takes orders over in MANUAL, and drives them when it is back in AUTOMATIC.";

@@ -12,7 +12,6 @@ use super::book::Stop;
 use super::faults::FaultName as F;
 use super::motion;
 use super::order_message::{Node, Order};
-use super::read::Defect;
 use super::tolerances::ToleranceName as T;
 use crate::clock::Moment;
 use crate::nurbs::Path;
@@ -39,8 +38,6 @@ pub(crate) struct Fourth {
     pub(crate) results_told: Vec<String>,
     /// When it shows that it does not charge any more.
     pub(crate) uncharged_at: Option<Moment>,
-    /// mapId and mapVersion of a map that is enabled when the order has ended.
-    enables: Option<(String, String)>,
     /// States that could not be sent, and the timestamp of each.
     pub(crate) buffered: Vec<(String, Map<String, Value>)>,
     /// What was still to be traversed when the link broke.
@@ -88,51 +85,6 @@ pub(crate) fn control_polygon(trajectory: &Value) -> Path {
 }
 
 impl Agv {
-    /// What a faulty vehicle cannot read although it is right.
-    pub(crate) fn unreadable_for_faulty(&self, message: &Value) -> Option<Defect> {
-        let whole = self.faults.has(F::R4WholeNumberCoordinatesRefused);
-        let foreign = self.faults.has(F::R4NonAsciiDescriptionRefused);
-        if !whole && !foreign {
-            return None;
-        }
-        for list in ["nodes", "edges"] {
-            let elements = message.get(list).and_then(Value::as_array).into_iter().flatten();
-            for (index, element) in elements.enumerate() {
-                let position = element.get("nodePosition").unwrap_or(&Value::Null);
-                let is_whole = |key: &&&str| {
-                    position
-                        .get(**key)
-                        .is_some_and(|value| value.is_i64() || value.is_u64())
-                };
-                if let Some(key) = ["x", "y"].iter().find(is_whole).filter(|_| whole) {
-                    return Some(Defect {
-                        path: format!("{list}[{index}].nodePosition.{key}"),
-                        reason: "is no floating-point number",
-                    });
-                }
-                let actions = element.get("actions").and_then(Value::as_array).into_iter().flatten();
-                let described = [element, position].into_iter().chain(actions);
-                let is_foreign = |object: &Value| {
-                    let keys = [
-                        "nodeDescription",
-                        "edgeDescription",
-                        "mapDescription",
-                        "actionDescription",
-                    ];
-                    let texts = keys.iter().filter_map(|key| object.get(*key)?.as_str());
-                    texts.into_iter().any(|text| !text.is_ascii())
-                };
-                if foreign && described.into_iter().any(is_foreign) {
-                    return Some(Defect {
-                        path: format!("{list}[{index}]"),
-                        reason: "has a description with unknown characters",
-                    });
-                }
-            }
-        }
-        None
-    }
-
     /// Whether the order came just before, and is still in the only receive buffer.
     pub(crate) fn receive_buffer_is_full(&self) -> bool {
         let occupied = |at: Moment| self.moment().since(at) < OCCUPIED;
@@ -216,15 +168,6 @@ impl Agv {
         }
     }
 
-    /// Whether a map is only enabled when the order has ended.
-    pub(crate) fn enables_later(&mut self, map_id: &str, version: &str) -> bool {
-        let later = self.faults.has(F::R4MapEnabledDuringDriveChangesNothingUntilIdle);
-        if later {
-            self.fourth.enables = Some((map_id.to_owned(), version.to_owned()));
-        }
-        later
-    }
-
     /// Whether it does not pause because it has no order.
     pub(crate) fn has_nothing_to_pause(&self) -> bool {
         let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
@@ -238,32 +181,12 @@ impl Agv {
         self.book.heedless |= ended && self.faults.has(F::R4PauseForgottenAfterNodeAction);
     }
 
-    /// Whether it shows for some seconds that it charges although it does not any more.
-    pub(crate) fn shows_charging_longer(&mut self) -> bool {
-        let longer = self.charging && self.faults.has(F::R4StopChargingFlagLate);
-        if longer {
-            self.fourth.uncharged_at = Some(self.moment() + Duration::from_secs(3));
-        }
-        longer
-    }
-
     /// The link is back: sends what could not be sent.
     pub(crate) fn replay_buffer(&mut self) {
         for (timestamp, mut body) in std::mem::take(&mut self.fourth.buffered) {
             // What the body says goes before the header.
             body.insert("timestamp".into(), Value::from(timestamp));
             self.publish("state", body);
-        }
-    }
-
-    /// Enables a map that was asked for during the order.
-    pub(crate) fn enable_what_waited(&mut self) {
-        if self.is_busy() {
-            return;
-        }
-        if let Some((map_id, version)) = self.fourth.enables.take() {
-            // It was on board when it was asked for; if it was deleted since, there is nothing to enable.
-            let _ = self.maps.enable(&map_id, &version, self.faults);
         }
     }
 

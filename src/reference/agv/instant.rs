@@ -187,13 +187,12 @@ impl Agv {
                 ) => {}
             Some(reason) => {
                 self.take_map_anyway(&action);
-                let silent = self.faults.has(F::UnknownInstantSilent)
-                    || self.takes(super::tolerances::ToleranceName::R1RefusedInstantWithoutError);
-                let mut problem = Problem::unable(&action, &reason).silent_if(silent);
-                if self.faults.has(F::UnknownInstantUnreferenced) {
-                    problem.references.clear();
+                let problem = Problem::unable(&action, &reason);
+                if self.takes(T::R1RefusedInstantWithoutError) {
+                    self.end_failed(&id, &problem);
+                } else {
+                    self.fail(&id, &problem);
                 }
-                self.fail(&id, &problem);
             }
             None if self.faults.has(F::InstantActionDeferred) && action.request.action_type != "cancelOrder" => {}
             None => self.begin_instant(&id),

@@ -6,10 +6,6 @@
 /// Name of a fault, and why it is no more than a lapse.
 pub const LAPSES: &[(&str, &str)] = &[
     (
-        "edge-ends-assumed",
-        "No sentence obliges a vehicle to check startNodeId and endNodeId; a remark.",
-    ),
-    (
         "edge-ends-unchecked",
         "No sentence obliges a vehicle to check startNodeId and endNodeId; a remark.",
     ),
@@ -26,12 +22,6 @@ pub const LAPSES: &[(&str, &str)] = &[
     ("cancel-lets-run", "It breaks a recommendation only."),
     ("cancel-fails-early", "It breaks a recommendation only."),
     (
-        "header-unchecked",
-        "No sentence says what becomes of an order whose header is broken; that it is malformed is a matter of reading.",
-    ),
-    ("unknown-instant-silent", "It breaks a recommendation only."),
-    ("unknown-instant-unreferenced", "It breaks a recommendation only."),
-    (
         "max-rotation-speed-ignored",
         "The turn takes place while the edge is entered; whether it belongs to the edge yet is a matter of reading.",
     ),
@@ -40,35 +30,9 @@ pub const LAPSES: &[(&str, &str)] = &[
         "corridor-contour-ignored",
         "CORR-03 is a recommendation, and by the kinematic centre CORR-01 is kept.",
     ),
-    (
-        "storage-full-silent",
-        "FAILED tells it; to say why is the recommendation MAP-30.",
-    ),
-    (
-        "delete-unknown-finished",
-        "The action is marked idempotent; the ruling of MAP-33 is a warning.",
-    ),
     ("hash-ignored", "It breaks a recommendation only."),
     ("undescribed-status", "It breaks a recommendation only."),
-    (
-        "charging-twice-fails",
-        "Whether charging cannot be started where it is under way is a matter of reading; the ruling of ACT-11 is a warning.",
-    ),
     ("field-does-not-pause", "It breaks a recommendation only."),
-    (
-        "state-request-unanswered",
-        "The next periodic state comes within the hard limit; what needs many states is not reached.",
-    ),
-    (
-        "log-name-missing",
-        "The ruling of ACT-27 and STATE-MSG-12 is a warning.",
-    ),
-    ("failure-unreferenced", "It breaks a recommendation only."),
-    (
-        "detection-undescribed",
-        "To leave the result out is a warning by the ruling of STATE-MSG-12.",
-    ),
-    ("failure-silent", "It breaks a recommendation only."),
     ("state-bursts", "It breaks a recommendation only."),
     ("own-error-cleared-by-order", "It breaks a recommendation only."),
     (

@@ -18,7 +18,7 @@ pub(crate) mod cancel;
 mod commands;
 pub(crate) mod config;
 pub(crate) mod connection;
-mod deeds;
+pub(crate) mod deeds;
 pub(crate) mod downloads;
 pub(crate) mod errors;
 mod factsheet;
@@ -26,7 +26,6 @@ pub mod faults;
 pub(crate) mod fourth;
 pub(crate) mod instant;
 pub mod lapses;
-mod leniency;
 pub(crate) mod maps;
 pub(crate) mod motion;
 pub(crate) mod order_message;
@@ -130,10 +129,6 @@ pub(crate) struct Load {
 /// What only vehicles with faults or liberties of round three remember.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Third {
-    /// mapId and mapVersion of downloads that failed (`r3-failed-download-blocks-retry` only).
-    pub(crate) failed_downloads: Vec<(String, String)>,
-    /// mapId and mapVersion of maps that were deleted (`r3-deleted-map-back-after-reconnect` only).
-    pub(crate) deleted_maps: Vec<(String, String)>,
     /// It was given a pose since the last order (`r3-order-after-init-position-refused` only).
     pub(crate) posed: bool,
     /// It still rolls although it is paused (`r3-pause-finished-before-standing` only).
@@ -325,19 +320,24 @@ impl Agv {
 
     /// Reports a warning that has no rule for its end.
     pub(crate) fn warn(&mut self, error_type: String, references: Vec<(String, String)>, description: String) {
+        let warning = self.warning(error_type, references, description);
+        self.errors.raise(warning);
+    }
+
+    fn warning(&self, error_type: String, references: Vec<(String, String)>, description: String) -> ActiveError {
         let life = match () {
             () if self.faults.has(FaultName::R6ActionErrorsNeverClear) => Life::Always,
             () if self.takes(T::R3ActionErrorsUntilNewOrder) => Life::UntilNewOrder,
             () if self.takes(T::R3ActionErrorsBrief) => Life::Until(self.moment() + self.brief()),
             () => Life::Until(self.moment() + self.config.error_duration),
         };
-        self.errors.raise(ActiveError {
+        ActiveError {
             error_type,
             fatal: false,
             references,
             description,
             life,
-        });
+        }
     }
 
     /// When something happens next by itself.
@@ -359,6 +359,7 @@ impl Agv {
             self.third.charging_at,
             self.fourth.uncharged_at,
             self.sixth.next_event(),
+            self.due(),
             self.persona.next_end(),
             self.next_report(),
         ];
@@ -388,6 +389,7 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
+        self.happens(seam::Event::Woken);
         self.persona.expire(moment);
         self.lingers_until = self.lingers_until.filter(|until| *until > moment);
         while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
@@ -414,7 +416,7 @@ impl Agv {
         self.attempt_connection();
         self.settle();
         self.notice_end_of_order();
-        self.enable_what_waited();
+        self.happens(seam::Event::Settled);
         self.begin_queued();
         self.flush();
     }

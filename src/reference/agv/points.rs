@@ -8,6 +8,7 @@ use super::actions::Action;
 use super::book::Stop;
 use super::errors::ActiveError;
 use super::order_message::Edge;
+use super::rejection::Rule;
 
 /// A part of a message.
 #[derive(Clone, Copy)]
@@ -48,6 +49,19 @@ pub(crate) enum Permission<'a> {
     Say(&'static str, &'a Map<String, Value>),
     /// DISCONNECT is sent after OFFLINE (CONN-08).
     Disconnect,
+    /// A map is downloaded that is on board already (MAP-23).
+    DownloadAgain,
+}
+
+/// Why an error is listed.
+#[derive(Clone, Copy)]
+pub(crate) enum Cause<'a> {
+    /// An order was refused, by a rule; the message.
+    Refusal(Rule, &'a Value),
+    /// A cancelOrder found no order.
+    NothingToCancel,
+    /// An action has failed.
+    Failure(Option<&'a Action>),
 }
 
 /// What has a length in time.
@@ -72,6 +86,10 @@ pub(crate) enum Event {
     Leaving,
     /// OFFLINE was said.
     Left,
+    /// Time has passed.
+    Woken,
+    /// All consequences were drawn.
+    Settled,
 }
 
 /// A message that goes out.

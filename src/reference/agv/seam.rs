@@ -3,14 +3,20 @@
 //! The vehicle asks here at its points of decision and says here what happens (`points` has the words for both). Every
 //! default is the conformant behaviour; with nothing switched on there is nobody to be asked.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
 
 use super::Agv;
+use super::actions::Action;
+use super::deeds::Outcome;
+use super::errors::ActiveError;
+use super::rejection::Rule;
+use crate::clock::Moment;
 use crate::reference::ConnectOptions;
 
-pub(crate) use super::points::{Event, Head, Outgoing, Part, Permission, Span};
+pub(crate) use super::points::{Cause, Event, Head, Outgoing, Part, Permission, Span};
 
 /// One that is switched on.
 pub(crate) type Hook = Box<dyn Deviation>;
@@ -45,6 +51,32 @@ pub(crate) trait Deviation: Send {
     /// How long something lasts.
     fn lasts(&self, agv: &Agv, what: Span, usual: Duration) -> Duration {
         usual
+    }
+
+    /// An order is read; it may be taken for something else.
+    fn reads(&self, agv: &Agv, message: &mut Value) {}
+
+    /// An order is refused, and nothing was said about it yet.
+    fn refuses(&mut self, agv: &mut Agv, message: &Value, rule: Rule) {}
+
+    /// An error is to be listed; false to keep it to itself.
+    fn raises(&mut self, agv: &mut Agv, cause: Cause<'_>, error: &mut ActiveError) -> bool {
+        true
+    }
+
+    /// An action is to show its effect: what comes of it where it is done otherwise.
+    fn does(&mut self, agv: &mut Agv, action: &Action) -> Option<Outcome> {
+        None
+    }
+
+    /// What comes of an action that was done as usual.
+    fn ends(&mut self, agv: &mut Agv, action: &Action, outcome: Outcome) -> Outcome {
+        outcome
+    }
+
+    /// When it wants to be told that time has passed.
+    fn due(&self) -> Option<Moment> {
+        None
     }
 
     /// Something has happened, or is about to.
@@ -123,6 +155,63 @@ impl Agv {
     pub(crate) fn lasts(&self, what: Span, usual: Duration) -> Duration {
         let all = self.seam.all();
         all.fold(usual, |usual, one| one.lasts(self, what, usual))
+    }
+
+    /// An order as it is read.
+    pub(crate) fn read<'a>(&self, message: &'a Value) -> Cow<'a, Value> {
+        if self.seam.0.is_empty() {
+            return Cow::Borrowed(message);
+        }
+        let mut read = message.clone();
+        self.seam.all().for_each(|one| one.reads(self, &mut read));
+        Cow::Owned(read)
+    }
+
+    pub(crate) fn refusing(&mut self, message: &Value, rule: Rule) {
+        self.each(|one, agv| one.refuses(agv, message, rule));
+    }
+
+    fn raise(&mut self, cause: Cause<'_>, mut error: ActiveError) {
+        let mut said = true;
+        self.each(|one, agv| said = said && one.raises(agv, cause, &mut error));
+        if said {
+            self.errors.raise(error);
+        }
+    }
+
+    /// Lists the error of an order that is refused.
+    pub(crate) fn raise_refusal(&mut self, rule: Rule, message: &Value, error: ActiveError) {
+        self.raise(Cause::Refusal(rule, message), error);
+    }
+
+    /// Lists the error of a cancelOrder that finds no order.
+    pub(crate) fn raise_nothing_to_cancel(&mut self, error: ActiveError) {
+        self.raise(Cause::NothingToCancel, error);
+    }
+
+    /// Lists the error of an action that has failed.
+    pub(crate) fn raise_failure(&mut self, action: Option<&Action>, error: ActiveError) {
+        self.raise(Cause::Failure(action), error);
+    }
+
+    pub(crate) fn does(&mut self, action: &Action) -> Option<Outcome> {
+        let mut outcome = None;
+        self.each(|one, agv| {
+            if outcome.is_none() {
+                outcome = one.does(agv, action);
+            }
+        });
+        outcome
+    }
+
+    pub(crate) fn turned_out(&mut self, action: &Action, outcome: Outcome) -> Outcome {
+        let mut outcome = Some(outcome);
+        self.each(|one, agv| outcome = outcome.take().map(|outcome| one.ends(agv, action, outcome)));
+        outcome.unwrap_or(Outcome::Open)
+    }
+
+    pub(crate) fn due(&self) -> Option<Moment> {
+        self.seam.all().filter_map(Deviation::due).min()
     }
 
     pub(crate) fn happens(&mut self, event: Event) {

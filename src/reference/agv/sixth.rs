@@ -3,15 +3,12 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use serde_json::Value;
-
 use super::Agv;
-use super::action_kinds;
 use super::actions::{Action, Origin, Status};
 use super::book::Stop;
 use super::connection::Connection;
 use super::faults::FaultName as F;
-use super::order_message::{Blocking, Order};
+use super::order_message::Blocking;
 use super::tolerances::ToleranceName as T;
 use crate::clock::Moment;
 use crate::reference::Output;
@@ -84,24 +81,6 @@ impl Agv {
         if self.faults.has(F::R6LoopClearsBothVisits) {
             let again = self.book.nodes.iter().filter(|ahead| ahead.node.id == reached.node.id);
             self.sixth.hidden.extend(again.map(|ahead| ahead.node.sequence_id));
-        }
-    }
-
-    /// `r6-rejected-update-leaves-actions`: what an update brings is listed before it is looked at.
-    pub(crate) fn list_actions_of_refused_update(&mut self, message: &Value) {
-        let Ok(order) = Order::read(message) else { return };
-        if order.id != self.book.order_id {
-            return;
-        }
-        let nodes = order.nodes.iter().skip(1).flat_map(|node| &node.actions);
-        let edges = order.edges.iter().flat_map(|edge| &edge.actions);
-        for request in nodes.chain(edges) {
-            if self.actions.get(&request.id).is_none() {
-                let kind = action_kinds::find(&self.config, &request.action_type);
-                // Nothing ever triggers it.
-                let action = Action::waiting(request.clone(), kind, Origin::Node(u32::MAX));
-                self.actions.push(action);
-            }
         }
     }
 

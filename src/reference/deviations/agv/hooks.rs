@@ -6,11 +6,14 @@ use serde_json::{Map, Value, json};
 
 use crate::reference::ConnectOptions;
 use crate::reference::agv::Agv;
+use crate::reference::agv::action_kinds::Deed;
 use crate::reference::agv::actions::Action;
 use crate::reference::agv::book::Stop;
+use crate::reference::agv::deeds::Outcome;
 use crate::reference::agv::errors::ActiveError;
 use crate::reference::agv::order_message::Edge;
-use crate::reference::agv::seam::{Deviation, Event, Head, Outgoing, Part, Permission, Span};
+use crate::reference::agv::rejection::Rule;
+use crate::reference::agv::seam::{Cause, Deviation, Event, Head, Outgoing, Part, Permission, Span};
 use crate::reference::deviations::words::Words;
 
 /// A part of a message.
@@ -27,6 +30,10 @@ pub(super) struct Hooks<M> {
     lasts: Option<fn(&Agv, Span, Duration) -> Duration>,
     happens: Option<fn(&mut M, &mut Agv, Event)>,
     words: Option<Worded>,
+    refuses: Option<fn(&mut M, &mut Agv, &Value, Rule)>,
+    raises: Option<fn(&mut M, &mut Agv, Cause<'_>, &mut ActiveError) -> bool>,
+    does: Option<fn(&mut M, &mut Agv, &Action) -> Option<Outcome>>,
+    ends: Option<fn(&mut M, &mut Agv, &Action, Outcome) -> Outcome>,
 }
 
 /// The part of a message that is worded otherwise.
@@ -121,8 +128,113 @@ pub(super) fn sending(change: fn(&mut Agv, &mut Outgoing)) -> Box<Hooks<fn(&mut 
 pub(super) fn unsaid(which: fn(&Agv, &str, &Object) -> bool) -> Box<Hooks<fn(&Agv, &str, &Object) -> bool>> {
     holding(which).allows(|which, agv, what, usual| match what {
         Permission::Say(name, body) => usual && !which(agv, name, body),
-        Permission::Disconnect => usual,
+        _ => usual,
     })
+}
+
+/// Reads an order otherwise.
+pub(super) fn reading(change: fn(&Agv, &mut Object)) -> Box<dyn Deviation> {
+    struct Reading(fn(&Agv, &mut Object));
+    impl Deviation for Reading {
+        fn reads(&self, agv: &Agv, message: &mut Value) {
+            if let Value::Object(order) = message {
+                (self.0)(agv, order);
+            }
+        }
+    }
+    Box::new(Reading(change))
+}
+
+type Refused = fn(&mut Agv, &Value, Rule);
+
+/// Changes something beside refusing an order.
+pub(super) fn refusing(then: Refused) -> Box<Hooks<Refused>> {
+    holding(then).refuses(|then, agv, message, rule| then(agv, message, rule))
+}
+
+type Refusal = fn(&mut Agv, Rule, &Value, &mut ActiveError) -> bool;
+
+/// Words the error of a refused order otherwise, or keeps it to itself.
+pub(super) fn refusal(change: Refusal) -> Box<Hooks<Refusal>> {
+    holding(change).raises(|change, agv, cause, error| match cause {
+        Cause::Refusal(rule, message) => change(agv, rule, message, error),
+        _ => true,
+    })
+}
+
+type Idle = fn(&mut Agv, &mut ActiveError) -> bool;
+
+/// Words the error of a cancelOrder without an order otherwise, or keeps it to itself.
+pub(super) fn nothing_to_cancel(change: Idle) -> Box<Hooks<Idle>> {
+    holding(change).raises(|change, agv, cause, error| match cause {
+        Cause::NothingToCancel => change(agv, error),
+        _ => true,
+    })
+}
+
+type Failure = fn(&mut Agv, &Action, &mut ActiveError) -> bool;
+
+/// Words the error of a failed action otherwise, or keeps it to itself.
+pub(super) fn failure(change: Failure) -> Box<Hooks<Failure>> {
+    holding(change).raises(|change, agv, cause, error| match cause {
+        Cause::Failure(Some(action)) => change(agv, action, error),
+        _ => true,
+    })
+}
+
+type Instead = (Deed, fn(&mut Agv, &Action) -> Option<Outcome>);
+
+/// Does something else than an action asks for.
+pub(super) fn instead(deed: Deed, then: fn(&mut Agv, &Action) -> Option<Outcome>) -> Box<Hooks<Instead>> {
+    holding((deed, then)).does(|(deed, then), agv, action| match is(action, *deed) {
+        true => then(agv, action),
+        false => None,
+    })
+}
+
+type After = (Deed, fn(&mut Agv, &Action, Outcome) -> Outcome);
+
+/// Makes something else of what came of an action.
+pub(super) fn after(deed: Deed, then: fn(&mut Agv, &Action, Outcome) -> Outcome) -> Box<Hooks<After>> {
+    holding((deed, then)).ends(|(deed, then), agv, action, outcome| match is(action, *deed) {
+        true => then(agv, action, outcome),
+        false => outcome,
+    })
+}
+
+type Changing = (Deed, fn(&mut Agv, &Action));
+
+/// Changes something when an action has succeeded.
+pub(super) fn succeeded(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
+    holding((deed, then)).ends(|(deed, then), agv, action, outcome| {
+        if is(action, *deed) && matches!(outcome, Outcome::Done(_)) {
+            then(agv, action);
+        }
+        outcome
+    })
+}
+
+/// Changes something when an action has failed.
+pub(super) fn failed(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
+    holding((deed, then)).ends(|(deed, then), agv, action, outcome| {
+        if is(action, *deed) && matches!(outcome, Outcome::Failed(_)) {
+            then(agv, action);
+        }
+        outcome
+    })
+}
+
+/// Says FINISHED of an action that has failed.
+pub(super) fn fails_unseen(deed: Deed) -> Box<Hooks<After>> {
+    after(deed, |_, _, outcome| match outcome {
+        Outcome::Failed(_) => Outcome::Done(None),
+        other => other,
+    })
+}
+
+/// Whether the action is of that kind.
+pub(super) fn is(action: &Action, deed: Deed) -> bool {
+    action.kind.is_some_and(|kind| kind.deed == deed)
 }
 
 /// Does something when something happens.
@@ -159,6 +271,10 @@ fn holding<M>(memory: M) -> Box<Hooks<M>> {
         lasts: None,
         happens: None,
         words: None,
+        refuses: None,
+        raises: None,
+        does: None,
+        ends: None,
     })
 }
 
@@ -179,6 +295,10 @@ impl<M> Hooks<M> {
         allows: fn(&M, &Agv, Permission<'_>, bool) -> bool,
         lasts: fn(&Agv, Span, Duration) -> Duration,
         happens: fn(&mut M, &mut Agv, Event),
+        refuses: fn(&mut M, &mut Agv, &Value, Rule),
+        raises: fn(&mut M, &mut Agv, Cause<'_>, &mut ActiveError) -> bool,
+        does: fn(&mut M, &mut Agv, &Action) -> Option<Outcome>,
+        ends: fn(&mut M, &mut Agv, &Action, Outcome) -> Outcome,
     }
 }
 
@@ -229,6 +349,28 @@ impl<M: Send> Deviation for Hooks<M> {
 
     fn lasts(&self, agv: &Agv, what: Span, usual: Duration) -> Duration {
         self.lasts.map_or(usual, |last| last(agv, what, usual))
+    }
+
+    fn refuses(&mut self, agv: &mut Agv, message: &Value, rule: Rule) {
+        if let Some(refuse) = self.refuses {
+            refuse(&mut self.memory, agv, message, rule);
+        }
+    }
+
+    fn raises(&mut self, agv: &mut Agv, cause: Cause<'_>, error: &mut ActiveError) -> bool {
+        self.raises
+            .is_none_or(|raise| raise(&mut self.memory, agv, cause, error))
+    }
+
+    fn does(&mut self, agv: &mut Agv, action: &Action) -> Option<Outcome> {
+        self.does.and_then(|does| does(&mut self.memory, agv, action))
+    }
+
+    fn ends(&mut self, agv: &mut Agv, action: &Action, outcome: Outcome) -> Outcome {
+        match self.ends {
+            Some(end) => end(&mut self.memory, agv, action, outcome),
+            None => outcome,
+        }
     }
 
     fn happens(&mut self, agv: &mut Agv, event: Event) {

@@ -19,10 +19,14 @@ mod errors;
 mod factsheet;
 mod header;
 mod hooks;
+mod maps;
 mod motion;
+mod reading;
+mod refusals;
 mod route;
 mod sending;
 mod state;
+mod stations;
 #[cfg(test)]
 mod tests;
 mod visualization;
@@ -46,6 +50,10 @@ fn records() -> impl Iterator<Item = &'static Record<dyn Deviation>> {
         motion::RECORDS,
         actions::RECORDS,
         errors::RECORDS,
+        reading::RECORDS,
+        refusals::RECORDS,
+        stations::RECORDS,
+        maps::RECORDS,
         visualization::RECORDS,
         factsheet::RECORDS,
     ];

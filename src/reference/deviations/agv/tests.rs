@@ -6,6 +6,7 @@ use super::{BLIND_FAULTS, FAULTS, built, lapse};
 use crate::clock::{Moment, Stamp};
 use crate::reference::Device;
 use crate::reference::agv::AgvConfig;
+use serde_json::{Value, json};
 
 fn config() -> AgvConfig {
     AgvConfig {
@@ -57,4 +58,24 @@ fn faults_of_both_kinds_stand_side_by_side() {
 fn an_unknown_fault_is_refused_whatever_stands_beside_it() {
     let error = built(config(), &["will-qos-0", "no-such-fault"]).unwrap_err();
     assert_eq!(error.to_string(), "the reference AGV has no fault `no-such-fault`");
+}
+
+#[test]
+fn each_guesses_its_part_of_an_order() {
+    let agv = built(config(), &[]).unwrap();
+    let read = |name: &str, message: &Value| {
+        let mut read = message.clone();
+        (super::find(name).unwrap().make)().reads(&agv, &mut read);
+        read
+    };
+    let message = json!({ "orderUpdateId": "5", "nodes": [{ "sequenceId": -1, "actions": null }] });
+    assert_eq!(*agv.read(&message), message);
+    assert_eq!(read("text-read-as-number", &message)["orderUpdateId"], json!(5));
+    let wrapped = read("numbers-wrapped", &message);
+    assert_eq!(wrapped["nodes"][0]["sequenceId"], json!(u32::MAX));
+    let empty = read("null-read-as-default", &message);
+    assert_eq!(empty["nodes"][0]["actions"], json!([]));
+    let released = read("released-assumed", &message);
+    assert_eq!(released["nodes"][0]["released"], json!(true));
+    assert_eq!(read("missing-list-read-as-empty", &message)["edges"], json!([]));
 }
