@@ -170,7 +170,6 @@ with_blind_faults! { faults!
     DownloadFinishedEarly "download-finished-early" ["MAP-18", "MAP-21", "MAP-17"] "Reports downloadMap FINISHED when the first byte arrives.";
     ManualEnableUnreported "manual-enable-unreported" ["MAP-26", "STATE-10"] "Does not report a map enabled on the vehicle.";
     HashIgnored "hash-ignored" ["MAP-34"] "Does not verify the hash of a map.";
-    MapNotFetched "map-not-fetched" ["MAP-06"] "Reports downloadMap FINISHED without asking the server for anything.";
 
     // Actions
     ActionsIgnored "actions-ignored" ["ACT-01", "ORD-FLOW-07", "ORD-06"] "Never begins the actions of an order.";

@@ -1,6 +1,7 @@
 //! Deviations of what is done with maps, and of the actions a master control asks for at once (sections 6.7 and 6.8).
 
 use super::hooks::{after, failed, fails_unseen, failure, instead, is, keep, plain, succeeded};
+use crate::reference::Output;
 use crate::reference::agv::Agv;
 use crate::reference::agv::action_kinds::Deed;
 use crate::reference::agv::actions::{Action, Status};
@@ -144,6 +145,16 @@ records! {
                 deleted.drain(..).for_each(|(id, version)| agv.maps.store(&id, &version));
             });
 
+    fault "map-not-fetched" ["MAP-06"] "Reports downloadMap FINISHED without asking the server for anything."
+        => after(Deed::DownloadMap, |agv, action, outcome| match outcome {
+            Outcome::Open => {
+                agv.downloads.forget(&action.request.id);
+                agv.pending.retain(|output| !matches!(output, Output::Fetch { .. }));
+                agv.maps.store(action.text("mapId"), action.text("mapVersion"));
+                Outcome::Done(None)
+            }
+            other => other,
+        });
     fault "duplicate-map-accepted" ["MAP-23"] "Downloads a map again that it has."
         => plain().allows(|(), _, what, usual| usual || matches!(what, Permission::DownloadAgain));
     fault "r1-other-version-refused" ["MAP-18", "MAP-07"] "It refuses to download a new version of a map as a duplicate because it has another version."
