@@ -6,10 +6,9 @@ use std::time::Duration;
 use super::Agv;
 use super::action_kinds::Deed;
 use super::actions::{Action, Origin, Status};
-use super::faults::FaultName as F;
+use super::errors::{ActiveError, Life};
 use super::motion::Pose;
-use super::order_message::Blocking;
-use super::tolerances::ToleranceName as T;
+use super::points::{Event, Permission, Span};
 
 /// Coordinates beyond this are no place on any map of the site, in metres.
 const FARTHEST: f64 = 10_000.0;
@@ -76,64 +75,62 @@ impl From<Result<(), Problem>> for Outcome {
     }
 }
 
-/// How long what was held takes to go on (`resumes-in-a-moment`).
-const RESUMING: Duration = Duration::from_millis(500);
-
 impl Agv {
-    /// An action of the order begins.
+    /// An action of the order begins, with its preparation if it has one (ASTATE-03).
     pub(crate) fn begin_action(&mut self, id: &str) {
-        let moment = self.moment();
         let Some(action) = self.actions.get(id).filter(|action| action.status == Status::Waiting) else {
             return;
         };
-        let duration = self.duration_of(action);
-        let Some(action) = self.actions.get_mut(id) else { return };
-        match action.kind {
-            Some(kind) if kind.deed == Deed::WaitForTrigger && self.faults.has(F::TriggerSkipped) => {
-                action.end(Status::Finished);
-            }
-            None => action.end(Status::Failed),
-            Some(kind)
-                if kind.prepares && !self.config.tolerances.has(T::R1NeverPrepares)
-                    || self.config.tolerances.has(T::PreparesEverything) =>
-            {
+        let prepares = action.kind.map(|kind| self.allows(Permission::Prepare, kind.prepares));
+        let due = self.moment() + self.duration_of(action) / 3;
+        match (prepares, self.actions.get_mut(id)) {
+            (Some(true), Some(action)) => {
                 action.status = Status::Initializing;
-                action.due = Some(moment + duration / 3);
+                action.due = Some(due);
             }
-            Some(_) => self.run_action(id),
+            (Some(false), _) => self.run_action(id),
+            (None, Some(action)) => action.end(Status::Failed),
+            _ => {}
         }
     }
 
     /// An action does its work now.
     pub(crate) fn run_action(&mut self, id: &str) {
-        let moment = self.moment();
-        let Some(duration) = self.actions.get(id).map(|action| self.duration_of(action)) else {
+        let Some(lasts) = self.actions.get(id).map(|action| self.duration_of(action)) else {
             return;
         };
-        let given_up = self.faults.has(F::TriggerGivenUp);
-        let times_out = self.faults.has(F::R1TriggerTimesOut);
-        let awaits = !given_up && !times_out && !self.faults.has(F::TriggerNotAwaited);
-        let stuck = self.faults.has(F::InstantActionStuck);
-        let Some(action) = self.actions.get_mut(id) else { return };
-        action.status = Status::Running;
-        let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
-        let duration = match waits {
-            true if given_up => Duration::from_millis(1_500),
-            true if times_out => Duration::from_secs(5),
-            true => super::cancel::MOMENT,
-            false => duration,
+        let moment = self.moment();
+        if let Some(action) = self.actions.get_mut(id) {
+            action.status = Status::Running;
+            action.due = (lasts < Duration::MAX).then(|| moment + lasts);
+        }
+    }
+
+    /// How long an action runs; something else ends what waits for a trigger, or for the end of an edge.
+    pub(crate) fn duration_of(&self, action: &Action) -> Duration {
+        let endless = [Deed::WaitForTrigger, Deed::WarningLights];
+        let asked = action.number("duration");
+        let asked = asked.filter(|seconds| (0.0..=86_400.0).contains(seconds));
+        let usual = match asked {
+            _ if action.kind.is_some_and(|kind| endless.contains(&kind.deed)) => Duration::MAX,
+            Some(seconds) => Duration::from_secs_f64(seconds),
+            None => {
+                let by_type = self.config.action_durations.get(&action.request.action_type);
+                by_type.copied().unwrap_or(self.config.action_duration)
+            }
         };
-        let awaits = awaits && waits || action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights);
-        let endless = awaits || (stuck && !action.of_order());
-        action.due = (!endless).then(|| moment + duration);
+        self.lasts(Span::Action(action), usual)
     }
 
     /// A stage of an action has ended.
     pub(crate) fn stage_finished(&mut self, id: &str) {
-        let missed = !self.connection.online && self.faults.has(F::ActionEndMissedOffline);
+        let proceeds = self
+            .actions
+            .get(id)
+            .map(|action| self.allows(Permission::Proceed(action), true));
         let Some(action) = self.actions.get_mut(id) else { return };
         action.due = None;
-        if missed && action.of_order() {
+        if proceeds != Some(true) {
             return;
         }
         if action.kind.is_some_and(|kind| kind.deed == Deed::DownloadMap) {
@@ -152,8 +149,7 @@ impl Agv {
         let Some(action) = self.actions.get(id).cloned() else {
             return;
         };
-        if let Some(error_type) = self.persona.failure_of(&action.request.action_type, action.of_order()) {
-            self.fail_as_told(&action, error_type);
+        if self.fails_as_told(&action) {
             return;
         }
         let outcome = match self.does(&action) {
@@ -177,36 +173,22 @@ impl Agv {
 
     /// Ends an action with success.
     pub(crate) fn finish(&mut self, id: &str, result: Option<String>) {
-        let stuck = self.faults.has(F::InstantActionStuck);
-        let requests_stay = self.faults.has(F::StateRequestStuck);
-        self.forget_pause_after(id);
-        let late = self.takes(T::R3DrivesOnLate) && !self.book.nodes.is_empty();
-        let stops = |action: &Action| action.of_order() && action.request.blocking != Blocking::None;
-        if late && self.actions.get(id).is_some_and(stops) {
-            self.lingers_until = Some(self.moment() + RESUMING);
-        }
         if let Some(action) = self.actions.get_mut(id) {
-            let stuck = stuck || (requests_stay && action.request.action_type == "stateRequest");
-            let stuck = stuck && action.origin == Origin::Instant;
-            action.end(if stuck { Status::Running } else { Status::Finished });
+            action.end(Status::Finished);
             action.result = result;
         }
-        self.forget_if_faulty(id);
     }
 
     /// Ends an action without success, and says why (IACT-06, BP-03).
     pub(crate) fn fail(&mut self, id: &str, problem: &Problem) {
-        self.end_failed(id, problem);
+        self.end_failed(id);
         self.report_failure(id, problem);
     }
 
     /// Ends an action without success.
-    pub(crate) fn end_failed(&mut self, id: &str, problem: &Problem) {
+    pub(crate) fn end_failed(&mut self, id: &str) {
         if let Some(action) = self.actions.get_mut(id) {
             action.end(Status::Failed);
-            if self.config.tolerances.has(T::R2FailuresDescribed) {
-                action.result = Some(problem.reason.clone());
-            }
         }
     }
 
@@ -219,27 +201,15 @@ impl Agv {
             Area::Load => &names.load,
             Area::Charging => &names.charging,
         };
-        let error = self.warning(name.clone(), problem.references.clone(), problem.reason.clone());
+        let error = ActiveError {
+            error_type: name.clone(),
+            fatal: false,
+            references: problem.references.clone(),
+            description: problem.reason.clone(),
+            life: Life::Until(self.moment() + self.config.error_duration),
+        };
         let action = self.actions.get(id).cloned();
         self.raise_failure(action.as_ref(), error);
-    }
-
-    /// Ends an action without success because a test wants that.
-    pub(crate) fn fail_as_told(&mut self, action: &Action, error_type: String) {
-        let problem = Problem::unable(action, "the action did not succeed");
-        if let Some(action) = self.actions.get_mut(&action.request.id) {
-            action.end(Status::Failed);
-        }
-        self.warn(error_type, problem.references, problem.reason);
-    }
-
-    fn forget_if_faulty(&mut self, id: &str) {
-        let faults = self.faults;
-        self.actions.retain(|action| {
-            let forgotten = faults.has(F::FinishedActionsRemoved)
-                || (faults.has(F::FinishedInstantForgotten) && !action.of_order());
-            action.request.id != id || !forgotten
-        });
     }
 
     fn deed(&mut self, action: &Action) -> Outcome {
@@ -249,27 +219,10 @@ impl Agv {
             Deed::StopPause => self.stop_pause(action),
             Deed::StartCharging => self.start_charging(action).into(),
             Deed::StopCharging => self.stop_charging(action).into(),
-            Deed::InitPosition => {
-                let result = self.init_position(action);
-                self.third.posed |= result.is_ok() && !action.of_order();
-                result.into()
-            }
+            Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
                 let result = self.maps.enable(action.text("mapId"), action.text("mapVersion"));
                 result.map_err(|reason| Problem::map(action, reason)).into()
-            }
-            Deed::DeleteMap if self.takes(T::R1MapDelistedNext) => {
-                let before = self.maps.clone();
-                match self.delete_map(action) {
-                    Ok(()) => {
-                        let after = std::mem::replace(&mut self.maps, before);
-                        self.finish(&action.request.id, None);
-                        self.flush();
-                        self.maps = after;
-                        Outcome::Open
-                    }
-                    refused => refused.into(),
-                }
             }
             Deed::DeleteMap => self.delete_map(action).into(),
             Deed::StateRequest => {
@@ -279,10 +232,6 @@ impl Agv {
             Deed::LogReport => {
                 self.logs += 1;
                 let name = format!("log-{}.txt", self.logs);
-                if self.tells_logs() {
-                    self.last_log = Some((action.request.id.clone(), name));
-                    return Outcome::Done(None);
-                }
                 Outcome::Done(Some(name))
             }
             Deed::Pick => self.pick(action).into(),
@@ -304,52 +253,14 @@ impl Agv {
         }
     }
 
-    /// Whether the name of a log is in the information instead of the result of its action.
-    pub(crate) fn tells_logs(&self) -> bool {
-        self.takes(T::R2LogNameInInformation)
-            && !self.takes(T::R1InformationOmitted)
-            && !self.takes(T::R4OptionalStateFieldsLeftOut)
-    }
-
     /// Whether a switch forbids what a message asks for (ACT-16).
     fn is_pause_blocked(&self) -> bool {
-        self.pause_blocked && !self.faults.has(F::ButtonPauseOverridden)
+        self.allows(Permission::HeedSwitch, self.pause_blocked)
     }
 
     fn start_pause(&mut self, action: &Action) -> Outcome {
-        self.end_braking();
         if self.is_pause_blocked() {
-            if self.faults.has(F::BlockedPauseTaken) {
-                self.set_holds(|holds| holds.pause = true);
-            }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
-        }
-        if self.has_nothing_to_pause() {
-            return Outcome::Failed(Problem::unable(action, "there is no order to pause"));
-        }
-        self.pauses += u32::from(self.faults.has(F::PausesCounted));
-        if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
-            return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
-        }
-        if self.holds.pause && self.faults.has(F::R6SecondStartPauseResumes) {
-            self.set_holds(|holds| holds.pause = false);
-            return Outcome::Done(None);
-        }
-        if self.faults.has(F::R1PauseCutsHorizon) {
-            let gone = self.book.drop_horizon();
-            self.actions.retain(|action| match action.origin {
-                Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
-                Origin::Instant => true,
-            });
-        }
-        if self.faults.has(F::PauseDropsOrder) {
-            self.give_up_order();
-        }
-        if self.motion.is_moving() && self.faults.has(F::R3PauseFinishedBeforeStanding) {
-            self.third.braking = Some(self.moment() + Duration::from_secs(1));
-        }
-        if !self.holds.pause && self.faults.has(F::R2PausedFlagLate) {
-            self.pause_hidden_until = Some(self.moment() + Duration::from_millis(1_500));
         }
         self.set_holds(|holds| holds.pause = true);
         Outcome::Done(None)
@@ -358,128 +269,75 @@ impl Agv {
     /// A pause made with the button is lifted with the button (ACT-16).
     fn stop_pause(&mut self, action: &Action) -> Outcome {
         if self.is_pause_blocked() {
-            if self.faults.has(F::BlockedPauseTaken) {
-                self.set_holds(|holds| holds.pause = false);
-            }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle paused"));
         }
-        if !self.holds.pause && self.faults.has(F::R1StopPauseTwiceFails) {
-            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
-        }
-        if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
+        if self.allows(Permission::HeedSwitch, self.holds.button || self.holds.emergency) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
         }
-        if !self.holds.pause && self.faults.has(F::StopPauseIdleFails) {
-            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
-        }
-        self.pauses = self.pauses.saturating_sub(1);
-        if self.pauses > 0 {
-            return Outcome::Done(None);
-        }
-        if self.pause_outlives {
-            return Outcome::Done(None);
-        }
-        if self.faults.has(F::PauseNotLifted) {
-            self.set_holds(|holds| holds.stuck |= holds.pause);
-        }
-        let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
-        self.book.unbound |= waits && self.holds.pause && self.faults.has(F::R1HorizonDrivenAfterPause);
-        self.book.hurried |= self.book.entered && self.holds.pause && self.faults.has(F::R1MaxSpeedForgottenInPause);
-        self.book.heedless = false;
-        self.book.unblocked |= self.holds.pause && self.faults.has(F::R2BlockingForgottenAfterPause);
-        if self.holds.pause && self.faults.has(F::R2PauseForgetsQueue) {
-            self.actions.drop_lists();
-        }
         self.set_holds(|holds| holds.pause = false);
-        if self.faults.has(F::PausedOrderSurvivesCancel)
-            && let Some(order) = self.remembered.take()
-        {
-            self.book = order;
-        }
         Outcome::Done(None)
-    }
-
-    /// What was held goes on at the next cycle (`resumes-in-a-moment`).
-    pub(crate) fn resume_if_due(&mut self) {
-        let moment = self.moment();
-        if self.resumes_at.take_if(|at| *at <= moment).is_some() && !self.holds.any() {
-            self.actions.resume(moment, self.faults);
-        }
     }
 
     /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
     pub(crate) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
-        let before = self.holds.any();
-        let field = self.holds.field;
-        let paused = self.holds.pause;
+        let before = self.holds;
         change(&mut self.holds);
         let moment = self.moment();
-        let by_message = self.holds.pause && !self.holds.button && !self.holds.emergency && !self.holds.field;
-        let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
-        match (before, self.holds.any()) {
-            (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
-            (true, false) if paused && self.faults.has(F::R3PausedActionsStayPaused) => {}
-            (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
-            (false, true) if by_message && self.takes(T::R1ActionsRunOnInPause) => {}
-            (false, true) => self.actions.hold(moment, self.faults),
-            (true, false) if self.takes(T::ResumesInAMoment) => self.resumes_at = Some(moment + RESUMING),
+        match (before.any(), self.holds.any()) {
+            (false, true) if self.allows(Permission::HoldActions, true) => {
+                self.actions.hold(moment);
+                self.happens(Event::Held);
+            }
             (true, false) => {
-                self.note_what_waits_again();
-                self.actions.resume(moment, self.faults);
+                self.happens(Event::Resuming);
+                if self.allows(Permission::ResumeActions(before), true) {
+                    self.actions.resume(moment);
+                }
             }
             _ => {}
         }
     }
 
-    fn init_position(&mut self, action: &Action) -> Result<(), Problem> {
+    /// Finds itself where it is told that it is (ACT-23, ACT-24), if that can be (ACT-25).
+    pub(crate) fn init_position(&mut self, action: &Action) -> Result<(), Problem> {
         let invalid = |reason: &str| Err(Problem::new(Area::Localization, action, reason));
         let number = |key: &str| action.number(key).filter(|number| number.is_finite());
         let (Some(x), Some(y), Some(theta)) = (number("x"), number("y"), number("theta")) else {
             return invalid("the pose is not complete");
         };
-        let y = if self.faults.has(F::AxesMirrored) { -y } else { y };
-        let unchecked = self.faults.has(F::InitPositionUnchecked);
-        if !unchecked && (x.abs() > FARTHEST || y.abs() > FARTHEST || theta.abs() > PI + 0.01) {
+        if x.abs() > FARTHEST || y.abs() > FARTHEST || theta.abs() > PI + 0.01 {
             return invalid("the pose is on no map");
         }
         let map_id = action.text("mapId");
-        let any_map = unchecked || self.faults.has(F::R6InitPositionAnyMap);
-        if !any_map && !self.maps.on_board(map_id) {
-            self.take_map_anyway(action);
+        if !self.maps.on_board(map_id) {
             return invalid("the map is not on board");
         }
         if action.origin == Origin::Instant && (!self.book.nodes.is_empty() || self.actions.order_unfinished()) {
             return invalid("an order is active");
         }
-        self.lost = false;
-        self.persona.lost = false;
-        self.maps.enable_any(map_id);
-        self.motion.place(Pose {
+        let pose = Pose {
             x,
             y,
             theta: theta.clamp(-PI, PI),
             map_id: map_id.to_owned(),
-        });
-        action.text("lastNodeId").clone_into(&mut self.book.last_node);
-        if !action.of_order() && self.takes(T::R1InitPositionResetsSequence) {
-            self.book.last_sequence = 0;
-        }
+        };
+        self.take_pose(pose, action.text("lastNodeId"));
         Ok(())
     }
 
-    /// `init-position-taken-anyway`: the map of a pose that is refused.
-    pub(crate) fn take_map_anyway(&mut self, action: &Action) {
-        let init = action.kind.is_some_and(|kind| kind.deed == Deed::InitPosition);
-        if init && self.faults.has(F::InitPositionTakenAnyway) {
-            self.claimed_map = Some(action.text("mapId").to_owned());
-        }
+    /// Takes a pose over, and the node it is on.
+    pub(crate) fn take_pose(&mut self, pose: Pose, node: &str) {
+        self.find_position();
+        self.maps.enable_any(&pose.map_id);
+        self.motion.place(pose);
+        node.clone_into(&mut self.book.last_node);
     }
 
-    fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
+    /// Deletes a map that is not in use (MAP-29, MAP-32, MAP-33).
+    pub(crate) fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
         let here = self.motion.pose(self.moment()).map_id;
         let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
-        let kept = self.takes(T::R4EnabledUnusedMapNotDeleted);
-        let used = |map_id: &str| kept || here == map_id || needed.iter().any(|needed| needed == map_id);
+        let used = |map_id: &str| here == map_id || needed.iter().any(|needed| needed == map_id);
         let result = self.maps.delete(action.text("mapId"), action.text("mapVersion"), used);
         result.map_err(|reason| Problem::map(action, reason))
     }

@@ -2,15 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::reference::Download;
+use crate::reference::{Download, Output};
 
 use super::Agv;
 use super::actions::Status;
 use super::deeds::{Outcome, Problem};
-use super::faults::FaultName as F;
 use super::maps;
-use super::points::Permission;
-use super::tolerances::ToleranceName as T;
+use super::points::{Event, Permission};
 
 /// Downloads under way: actionId by token.
 #[derive(Clone, Debug, Default)]
@@ -42,8 +40,7 @@ impl Agv {
         let Some(action) = self.actions.get(action_id).cloned() else {
             return Outcome::Open;
         };
-        if let Some(error_type) = self.persona.map_refusal.clone() {
-            self.fail_as_told(&action, error_type);
+        if self.refuses_map_as_told(&action) {
             return Outcome::Open;
         }
         let (map_id, version, url) = (
@@ -71,13 +68,10 @@ impl Agv {
         self.downloads.next += 1;
         self.downloads.under_way.insert(token, action_id.to_owned());
         let url = url.to_owned();
-        let queued = self.takes(T::R6LibDownloadQueued);
-        self.fetch(token, url, queued);
+        self.pending.push(Output::Fetch { token, url });
         let due = self.moment() + self.config.download_timeout;
-        let due = if queued { due + super::sixth::QUEUING } else { due };
-        let at_once = self.takes(T::R1DownloadRunsAtOnce);
         if let Some(action) = self.actions.get_mut(action_id) {
-            action.status = if at_once { Status::Running } else { Status::Initializing };
+            action.status = Status::Initializing;
             action.due = Some(due);
         }
         Outcome::Open
@@ -90,11 +84,10 @@ impl Agv {
         };
         match progress {
             Download::Begun => {
-                let finished = self.faults.has(F::DownloadFinishedEarly);
-                let running = !self.faults.has(F::DownloadNeverRunning);
-                if let Some(action) = self.actions.get_mut(&action_id).filter(|_| running) {
-                    action.status = if finished { Status::Finished } else { Status::Running };
+                if let Some(action) = self.actions.get_mut(&action_id) {
+                    action.status = Status::Running;
                 }
+                self.happens(Event::DownloadRunning);
             }
             Download::Done(file) => self.download_done(&action_id, &file),
             Download::Failed(reason) => {
@@ -110,14 +103,11 @@ impl Agv {
         };
         if file.is_empty() {
             self.download_failed(action_id, "the file is empty");
-        } else if !maps::hash_fits(file, action.text("mapHash")) && !self.faults.has(F::HashIgnored) {
+        } else if !maps::hash_fits(file, action.text("mapHash")) && self.allows(Permission::CheckHash, true) {
             self.download_failed(action_id, "the file does not have the announced hash");
         } else {
             self.downloads.forget(action_id);
-            if self.takes(T::R1MapListedNext) {
-                self.finish(action_id, None);
-                self.flush();
-            }
+            self.happens(Event::Downloaded);
             self.maps.store(action.text("mapId"), action.text("mapVersion"));
             let outcome = self.turned_out(&action, Outcome::Done(None));
             self.conclude(action_id, outcome);

@@ -20,7 +20,7 @@ pub(crate) enum Life {
     WhileOutside,
     /// While the vehicle itself has a defect.
     WhileDefective,
-    /// Never (`r6-action-errors-never-clear` only).
+    /// Never.
     Always,
 }
 
@@ -63,7 +63,7 @@ impl Errors {
         });
     }
 
-    /// `r2-rejection-cleared-by-instant-action`: forgets what was refused.
+    /// Forgets what was refused.
     pub(crate) fn forget_refusals(&mut self) {
         self.active.retain(|error| error.life != Life::UntilNewOrder);
     }

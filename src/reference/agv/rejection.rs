@@ -5,7 +5,6 @@ use serde_json::Value;
 use super::Agv;
 use super::errors::{ActiveError, Life};
 use super::read::Defect;
-use super::tolerances::ToleranceName as T;
 
 /// Which rule refused an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +17,7 @@ pub(crate) enum Rule {
     StartOutOfRange,
     Outdated,
     BrokenUpdate,
-    /// Never raised by a faultless vehicle.
+    /// No reason to refuse an order (ORD-REJ-13).
     Duplicate,
 }
 
@@ -38,10 +37,6 @@ impl Refusal {
             reason: reason.to_owned(),
             culprits: Vec::new(),
         }
-    }
-
-    pub(crate) fn is_malformed(&self) -> bool {
-        self.rule == Rule::Malformed
     }
 
     pub(crate) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
@@ -69,9 +64,6 @@ impl Agv {
         let name = match refusal.rule {
             Rule::Malformed => &names.validation,
             Rule::Unable => &names.order,
-            Rule::Memory if self.takes(T::R1OwnErrorNames) => "insufficientMemory",
-            Rule::UnknownMap if self.takes(T::R1OwnErrorNames) => "unknownMapId",
-            Rule::OtherOrderActive if self.takes(T::R1OwnErrorNames) => "otherOrderActive",
             Rule::Memory => &names.memory,
             Rule::UnknownMap => &names.unknown_map,
             Rule::OtherOrderActive => &names.other_order_active,
@@ -80,8 +72,6 @@ impl Agv {
             Rule::BrokenUpdate => &names.broken_update,
         };
         let life = match refusal.rule {
-            Rule::Outdated if self.takes(T::R1OutdatedErrorBrief) => Life::Until(self.moment() + self.brief()),
-            Rule::Outdated if self.takes(T::R4OutdatedUpdateWarningUntilNextOrder) => Life::UntilNewOrder,
             Rule::Outdated | Rule::BrokenUpdate | Rule::Duplicate => {
                 Life::Until(self.moment() + self.config.error_duration)
             }
@@ -89,16 +79,6 @@ impl Agv {
         };
         let mut references = message_references(message);
         references.extend(refusal.culprits);
-        if self.takes(T::R3CulpritAsJsonPath) {
-            for (key, value) in references.iter_mut().filter(|(key, _)| key == "field") {
-                (*key, *value) = ("jsonPath".to_owned(), format!("$.{value}"));
-            }
-        }
-        if self.takes(T::R3ReferencesNameAllNodes) {
-            let nodes = message.get("nodes").and_then(Value::as_array).into_iter().flatten();
-            let ids = nodes.filter_map(|node| node.get("nodeId")?.as_str()).take(20);
-            references.extend(ids.map(|id| ("nodeId".to_owned(), id.chars().take(256).collect())));
-        }
         let error = ActiveError {
             error_type: name.to_owned(),
             fatal: false,
@@ -106,13 +86,6 @@ impl Agv {
             description: refusal.reason,
             life,
         };
-        if self.takes(T::R3RefusalInTwoErrors) {
-            self.errors.raise(ActiveError {
-                error_type: "orderRejected".to_owned(),
-                fatal: false,
-                ..error.clone()
-            });
-        }
         self.raise_refusal(refusal.rule, message, error);
     }
 }

@@ -5,7 +5,6 @@ use serde_json::Value;
 use super::action_kinds::LOAD_POSITIONS;
 use super::actions::{Action, Origin};
 use super::deeds::{Area, Outcome, Problem};
-use super::tolerances::ToleranceName as T;
 use super::{Agv, Load};
 
 impl Agv {
@@ -48,18 +47,13 @@ impl Agv {
             Some(true) => {}
             _ => return load_problem(action, "there is no load"),
         }
-        let read = if self.takes(T::R3LoadsIdentified) {
-            format!("RFID-{site}")
-        } else {
-            String::new()
-        };
         self.stations.insert(site, false);
         let given = |key: &str, other: &str| match action.request.parameter(key).and_then(Value::as_str) {
             Some(text) => text.to_owned(),
             None => other.to_owned(),
         };
         self.loads.push(Load {
-            id: given("loadId", &read),
+            id: given("loadId", ""),
             kind: given("loadType", "EPAL"),
             position: given("lhd", LOAD_POSITIONS[0]),
         });
@@ -94,14 +88,12 @@ impl Agv {
                 "the vehicle cannot leave the charger",
             ));
         }
-        self.third.charging_at = None;
         self.charging = false;
         Ok(())
     }
 
     /// The charger is at a node: there is none where the vehicle drives (ACT-20).
     pub(crate) fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
-        self.fourth.uncharged_at = None;
         if self.motion.is_moving() || !self.config.chargers.contains(&self.book.last_node) {
             return Err(Problem::new(Area::Charging, action, "the vehicle is not at a charger"));
         }

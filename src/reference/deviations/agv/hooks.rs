@@ -1,19 +1,25 @@
 //! What records are made of: a memory, and what is done at some points of the seam.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
+use crate::clock::Moment;
 use crate::reference::ConnectOptions;
 use crate::reference::agv::Agv;
 use crate::reference::agv::action_kinds::Deed;
-use crate::reference::agv::actions::Action;
+use crate::reference::agv::actions::{Action, Origin, Status};
 use crate::reference::agv::book::Stop;
 use crate::reference::agv::deeds::Outcome;
 use crate::reference::agv::errors::ActiveError;
-use crate::reference::agv::order_message::Edge;
-use crate::reference::agv::rejection::Rule;
-use crate::reference::agv::seam::{Cause, Deviation, Event, Head, Outgoing, Part, Permission, Span};
+use crate::reference::agv::order_message::{Edge, Order};
+use crate::reference::agv::rejection::{Refusal, Rule};
+use crate::reference::agv::report::{Changes, Telling};
+use crate::reference::agv::seam::{
+    Adoption, Cause, Course, Deviation, Event, Head, Hindrance, Leg, Objection, Outgoing, Part, Permission, Relation,
+    Span,
+};
 use crate::reference::deviations::words::Words;
 
 /// A part of a message.
@@ -27,13 +33,24 @@ pub(super) struct Hooks<M> {
     sends: Option<fn(&mut M, &mut Agv, &mut Outgoing) -> bool>,
     writes: Option<fn(&Agv, &Outgoing, &mut Vec<u8>)>,
     allows: Option<fn(&M, &Agv, Permission<'_>, bool) -> bool>,
-    lasts: Option<fn(&Agv, Span, Duration) -> Duration>,
+    lasts: Option<fn(&Agv, Span<'_>, Duration) -> Duration>,
     happens: Option<fn(&mut M, &mut Agv, Event)>,
     words: Option<Worded>,
     refuses: Option<fn(&mut M, &mut Agv, &Value, Rule)>,
     raises: Option<fn(&mut M, &mut Agv, Cause<'_>, &mut ActiveError) -> bool>,
     does: Option<fn(&mut M, &mut Agv, &Action) -> Option<Outcome>>,
     ends: Option<fn(&mut M, &mut Agv, &Action, Outcome) -> Outcome>,
+    says: Option<fn(&M, &Agv, Part<'_>, &mut Object) -> bool>,
+    hears: Option<fn(&mut M, &mut Agv, &str, &[u8]) -> bool>,
+    objects: Option<fn(&M, &Agv, &Order, Relation) -> Option<Refusal>>,
+    adopts: Option<fn(&mut M, &mut Agv, &mut Adoption<'_>) -> bool>,
+    steers: Option<fn(&M, &Agv, &mut Course<'_>)>,
+    plans: Option<fn(&M, &Agv, &mut Leg<'_>)>,
+    faces: Option<fn(&M, &Agv, &Stop, Option<f64>) -> Option<f64>>,
+    queues: Option<fn(&M, &Agv, Origin, &mut VecDeque<Vec<String>>)>,
+    breaks: Option<fn(&M, &Agv, &Action, Option<Status>) -> Option<Status>>,
+    due: Option<fn(&M) -> Option<Moment>>,
+    tells: Option<fn(&mut M, &mut Agv, Changes, bool) -> Telling>,
 }
 
 /// The part of a message that is worded otherwise.
@@ -152,10 +169,10 @@ pub(super) fn refusing(then: Refused) -> Box<Hooks<Refused>> {
     holding(then).refuses(|then, agv, message, rule| then(agv, message, rule))
 }
 
-type Refusal = fn(&mut Agv, Rule, &Value, &mut ActiveError) -> bool;
+type WordingRefusal = fn(&mut Agv, Rule, &Value, &mut ActiveError) -> bool;
 
 /// Words the error of a refused order otherwise, or keeps it to itself.
-pub(super) fn refusal(change: Refusal) -> Box<Hooks<Refusal>> {
+pub(super) fn refusal(change: WordingRefusal) -> Box<Hooks<WordingRefusal>> {
     holding(change).raises(|change, agv, cause, error| match cause {
         Cause::Refusal(rule, message) => change(agv, rule, message, error),
         _ => true,
@@ -246,12 +263,168 @@ pub(super) fn when(event: Event, then: fn(&mut Agv)) -> Box<Hooks<(Event, fn(&mu
     })
 }
 
+type Allowing = fn(&Agv, Permission<'_>, bool) -> bool;
+
+/// Allows something else.
+pub(super) fn allowing(change: Allowing) -> Box<Hooks<Allowing>> {
+    holding(change).allows(|change, agv, what, usual| change(agv, what, usual))
+}
+
+type Letting = fn(&Agv, Permission<'_>) -> bool;
+
+/// Allows what is not allowed.
+pub(super) fn letting(which: Letting) -> Box<Hooks<Letting>> {
+    holding(which).allows(|which, agv, what, usual| usual || which(agv, what))
+}
+
+/// Does not allow what is allowed.
+pub(super) fn forbidding(which: Letting) -> Box<Hooks<Letting>> {
+    holding(which).allows(|which, agv, what, usual| usual && !which(agv, what))
+}
+
+type Hindered = (Hindrance, fn(&Agv) -> bool);
+
+/// Drives although something forbids that, while something is so.
+pub(super) fn drives(against: Hindrance, while_so: fn(&Agv) -> bool) -> Box<Hooks<Hindered>> {
+    holding((against, while_so)).allows(|(against, while_so), agv, what, usual| {
+        usual || matches!(what, Permission::DriveAgainst(there) if there == *against) && while_so(agv)
+    })
+}
+
+type Seen = fn(&Agv, Objection<'_>) -> bool;
+
+/// Overlooks something that is wrong with an order.
+pub(super) fn overlooking(which: Seen) -> Box<Hooks<Seen>> {
+    holding(which).allows(|which, agv, what, usual| match what {
+        Permission::Overlook(objection) => usual || which(agv, objection),
+        _ => usual,
+    })
+}
+
+type Objecting = fn(&Agv, &Order, Relation) -> Option<Refusal>;
+
+/// Has an objection that nobody else has.
+pub(super) fn objecting(other: Objecting) -> Box<Hooks<Objecting>> {
+    holding(other).objects(|other, agv, order, relation| other(agv, order, relation))
+}
+
+type Adopting = fn(&mut Agv, &mut Order);
+
+/// Takes an order or an update over otherwise.
+pub(super) fn adopting(change: Adopting) -> Box<Hooks<Adopting>> {
+    holding(change).adopts(|change, agv, adoption| {
+        change(agv, adoption.order);
+        true
+    })
+}
+
+/// Takes an update over otherwise.
+pub(super) fn updating(change: Adopting) -> Box<Hooks<Adopting>> {
+    holding(change).adopts(|change, agv, adoption| {
+        if adoption.update {
+            change(agv, adoption.order);
+        }
+        true
+    })
+}
+
+type Planning = fn(&Agv, &mut Leg<'_>);
+
+/// Drives a leg otherwise.
+pub(super) fn planning(change: Planning) -> Box<Hooks<Planning>> {
+    holding(change).plans(|change, agv, leg| change(agv, leg))
+}
+
+type Steering = fn(&Agv, &mut Course<'_>);
+
+/// Takes another course.
+pub(super) fn steering(change: Steering) -> Box<Hooks<Steering>> {
+    holding(change).steers(|change, agv, course| change(agv, course))
+}
+
+type Facing = fn(&Agv, &Stop, f64) -> Option<f64>;
+
+/// Takes another orientation on a node than it should.
+pub(super) fn facing(change: Facing) -> Box<Hooks<Facing>> {
+    holding(change).faces(|change, agv, stop, wanted| wanted.and_then(|theta| change(agv, stop, theta)))
+}
+
+type Breaking = fn(&Agv, &Action, Option<Status>) -> Option<Status>;
+
+/// Ends actions otherwise because their order is cancelled.
+pub(super) fn breaking(change: Breaking) -> Box<Hooks<Breaking>> {
+    holding(change).breaks(|change, agv, action, usual| change(agv, action, usual))
+}
+
+type Raising = fn(&mut Agv, Cause<'_>, &mut ActiveError) -> bool;
+
+/// Words errors of all kinds otherwise, or keeps them to itself.
+pub(super) fn raising(change: Raising) -> Box<Hooks<Raising>> {
+    holding(change).raises(|change, agv, cause, error| change(agv, cause, error))
+}
+
+/// Stands still as long as it remembers that.
+pub(super) fn parked() -> Box<Hooks<bool>> {
+    keep::<bool>().allows(|parked, _, what, usual| usual && !(*parked && matches!(what, Permission::Drive)))
+}
+
+/// Drives into the horizon as long as it remembers that.
+pub(super) fn unbound() -> Box<Hooks<bool>> {
+    keep::<bool>().allows(|unbound, _, what, usual| usual || *unbound && matches!(what, Permission::Enter))
+}
+
+/// Drives although it is paused as long as it remembers that.
+pub(super) fn heedless() -> Box<Hooks<bool>> {
+    keep::<bool>().allows(|heedless, agv, what, usual| {
+        usual || *heedless && agv.holds.pause && matches!(what, Permission::DriveAgainst(Hindrance::Hold))
+    })
+}
+
+/// Knows whether its order was updated.
+pub(super) fn since_update() -> Box<Hooks<bool>> {
+    keep::<bool>().happens(|updated, _, event| {
+        *updated = match event {
+            Event::Updated => true,
+            Event::Begun => false,
+            _ => *updated,
+        }
+    })
+}
+
+/// How long it takes to do what it should not.
+pub(super) const MOMENT: Duration = Duration::from_millis(50);
+
+/// As short as something can be that has to be in a state.
+pub(super) fn brief(agv: &Agv) -> Duration {
+    MOMENT.max(agv.min_state_interval() * 2)
+}
+
+/// Stands still for so many milliseconds.
+pub(super) fn linger(agv: &mut Agv, millis: u64) {
+    agv.lingers_until = Some(agv.moment() + Duration::from_millis(millis));
+}
+
+/// Whether its base leads on to another node.
+pub(super) fn goes_on(agv: &Agv) -> bool {
+    agv.book.nodes.front().is_some_and(|next| next.node.released)
+}
+
+/// Whether an action of the order is under way.
+pub(super) fn is_acting(agv: &Agv) -> bool {
+    agv.actions.iter().any(Action::occupies)
+}
+
+/// Whether nothing but a message holds it, so that a message lifts its pause.
+pub(super) fn lifts_pause(agv: &Agv) -> bool {
+    !agv.pause_blocked && !agv.holds.button && !agv.holds.emergency
+}
+
 /// Takes as long as no good vehicle does from one state to the next, while something is so.
 pub(super) fn silent(while_so: fn(&Agv) -> bool) -> Box<dyn Deviation> {
     struct Silent(fn(&Agv) -> bool);
     impl Deviation for Silent {
-        fn lasts(&self, agv: &Agv, what: Span, usual: Duration) -> Duration {
-            match what == Span::BetweenStates && (self.0)(agv) {
+        fn lasts(&self, agv: &Agv, what: Span<'_>, usual: Duration) -> Duration {
+            match matches!(what, Span::BetweenStates) && (self.0)(agv) {
                 true => Duration::from_secs(45),
                 false => usual,
             }
@@ -260,7 +433,7 @@ pub(super) fn silent(while_so: fn(&Agv) -> bool) -> Box<dyn Deviation> {
     Box::new(Silent(while_so))
 }
 
-fn holding<M>(memory: M) -> Box<Hooks<M>> {
+pub(super) fn holding<M>(memory: M) -> Box<Hooks<M>> {
     Box::new(Hooks {
         memory,
         joins: None,
@@ -275,6 +448,17 @@ fn holding<M>(memory: M) -> Box<Hooks<M>> {
         raises: None,
         does: None,
         ends: None,
+        says: None,
+        hears: None,
+        objects: None,
+        adopts: None,
+        steers: None,
+        plans: None,
+        faces: None,
+        queues: None,
+        breaks: None,
+        due: None,
+        tells: None,
     })
 }
 
@@ -293,12 +477,23 @@ impl<M> Hooks<M> {
         sends: fn(&mut M, &mut Agv, &mut Outgoing) -> bool,
         writes: fn(&Agv, &Outgoing, &mut Vec<u8>),
         allows: fn(&M, &Agv, Permission<'_>, bool) -> bool,
-        lasts: fn(&Agv, Span, Duration) -> Duration,
+        lasts: fn(&Agv, Span<'_>, Duration) -> Duration,
         happens: fn(&mut M, &mut Agv, Event),
         refuses: fn(&mut M, &mut Agv, &Value, Rule),
         raises: fn(&mut M, &mut Agv, Cause<'_>, &mut ActiveError) -> bool,
         does: fn(&mut M, &mut Agv, &Action) -> Option<Outcome>,
         ends: fn(&mut M, &mut Agv, &Action, Outcome) -> Outcome,
+        says: fn(&M, &Agv, Part<'_>, &mut Object) -> bool,
+        hears: fn(&mut M, &mut Agv, &str, &[u8]) -> bool,
+        objects: fn(&M, &Agv, &Order, Relation) -> Option<Refusal>,
+        adopts: fn(&mut M, &mut Agv, &mut Adoption<'_>) -> bool,
+        steers: fn(&M, &Agv, &mut Course<'_>),
+        plans: fn(&M, &Agv, &mut Leg<'_>),
+        faces: fn(&M, &Agv, &Stop, Option<f64>) -> Option<f64>,
+        queues: fn(&M, &Agv, Origin, &mut VecDeque<Vec<String>>),
+        breaks: fn(&M, &Agv, &Action, Option<Status>) -> Option<Status>,
+        due: fn(&M) -> Option<Moment>,
+        tells: fn(&mut M, &mut Agv, Changes, bool) -> Telling,
     }
 }
 
@@ -324,7 +519,7 @@ impl<M: Send> Deviation for Hooks<M> {
             (Some(Worded::Error(change)), Part::Error(error)) => change(agv, error, words),
             _ => {}
         }
-        true
+        self.says.is_none_or(|say| say(&self.memory, agv, part, words))
     }
 
     fn heads(&mut self, agv: &mut Agv, head: Head, header: &mut Object) {
@@ -347,8 +542,64 @@ impl<M: Send> Deviation for Hooks<M> {
         self.allows.map_or(usual, |allow| allow(&self.memory, agv, what, usual))
     }
 
-    fn lasts(&self, agv: &Agv, what: Span, usual: Duration) -> Duration {
+    fn lasts(&self, agv: &Agv, what: Span<'_>, usual: Duration) -> Duration {
         self.lasts.map_or(usual, |last| last(agv, what, usual))
+    }
+
+    fn hears(&mut self, agv: &mut Agv, name: &str, payload: &[u8]) -> bool {
+        self.hears.is_none_or(|hear| hear(&mut self.memory, agv, name, payload))
+    }
+
+    fn objects(&self, agv: &Agv, order: &Order, relation: Relation) -> Option<Refusal> {
+        self.objects
+            .and_then(|object| object(&self.memory, agv, order, relation))
+    }
+
+    fn adopts(&mut self, agv: &mut Agv, adoption: &mut Adoption<'_>) -> bool {
+        self.adopts.is_none_or(|adopt| adopt(&mut self.memory, agv, adoption))
+    }
+
+    fn steers(&self, agv: &Agv, course: &mut Course<'_>) {
+        if let Some(steer) = self.steers {
+            steer(&self.memory, agv, course);
+        }
+    }
+
+    fn plans(&self, agv: &Agv, leg: &mut Leg<'_>) {
+        if let Some(plan) = self.plans {
+            plan(&self.memory, agv, leg);
+        }
+    }
+
+    fn faces(&self, agv: &Agv, stop: &Stop, wanted: Option<f64>) -> Option<f64> {
+        match self.faces {
+            Some(face) => face(&self.memory, agv, stop, wanted),
+            None => wanted,
+        }
+    }
+
+    fn queues(&self, agv: &Agv, origin: Origin, phases: &mut VecDeque<Vec<String>>) {
+        if let Some(queue) = self.queues {
+            queue(&self.memory, agv, origin, phases);
+        }
+    }
+
+    fn breaks(&self, agv: &Agv, action: &Action, usual: Option<Status>) -> Option<Status> {
+        match self.breaks {
+            Some(end) => end(&self.memory, agv, action, usual),
+            None => usual,
+        }
+    }
+
+    fn tells(&mut self, agv: &mut Agv, changes: Changes, requested: bool) -> Telling {
+        match self.tells {
+            Some(tell) => tell(&mut self.memory, agv, changes, requested),
+            None => Telling::Now,
+        }
+    }
+
+    fn due(&self) -> Option<Moment> {
+        self.due.and_then(|due| due(&self.memory))
     }
 
     fn refuses(&mut self, agv: &mut Agv, message: &Value, rule: Rule) {

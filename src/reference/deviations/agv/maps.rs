@@ -1,6 +1,6 @@
 //! Deviations of what is done with maps, and of the actions a master control asks for at once (sections 6.7 and 6.8).
 
-use super::hooks::{after, failed, fails_unseen, failure, instead, is, keep, plain, succeeded};
+use super::hooks::{Hooks, after, failed, fails_unseen, failure, holding, instead, is, keep, plain, succeeded};
 use crate::reference::Output;
 use crate::reference::agv::Agv;
 use crate::reference::agv::action_kinds::Deed;
@@ -8,8 +8,9 @@ use crate::reference::agv::actions::{Action, Status};
 use crate::reference::agv::config::OnboardMap;
 use crate::reference::agv::deeds::{Outcome, Problem};
 use crate::reference::agv::motion::{Motion, Pose};
-use crate::reference::agv::seam::{Deviation, Event, Permission};
+use crate::reference::agv::seam::{Deviation, Event, Part, Permission};
 use crate::reference::deviations::record::Record;
+use crate::reference::deviations::words::Words;
 
 records! {
     fault "enable-unknown-disables" ["MAP-25"] "Disables its maps before it fails to enable one it does not have."
@@ -220,8 +221,8 @@ records! {
         });
     fault "download-failure-silent" ["MAP-19"] "Raises no error when a download fails."
         => after(Deed::DownloadMap, |agv, action, outcome| match outcome {
-            Outcome::Failed(problem) if under_way(action) => {
-                agv.end_failed(&action.request.id, &problem);
+            Outcome::Failed(_) if under_way(action) => {
+                agv.end_failed(&action.request.id);
                 Outcome::Open
             }
             other => other,
@@ -304,9 +305,9 @@ records! {
                 outcome
             });
     fault "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose."
-        => succeeded(Deed::InitPosition, |agv, _| agv.lost = true);
+        => lost(|outcome| matches!(outcome, Outcome::Done(_)));
     fault "r3-refused-pose-loses-position" ["ACT-25"] "It reports positionInitialized false after an initPosition that it refused."
-        => failed(Deed::InitPosition, |agv, _| agv.lost = true);
+        => lost(|outcome| matches!(outcome, Outcome::Failed(_)));
     fault "r1-init-position-enables-all" ["MAP-14"] "An initPosition enables all versions of the map it names."
         => succeeded(Deed::InitPosition, |agv, action| {
             agv.maps.all.iter_mut().filter(|map| is_of(map, action)).for_each(|map| map.enabled = true);
@@ -443,4 +444,22 @@ fn unanswered(agv: &mut Agv) {
 fn is_refused_instant(agv: &Agv, action: &Action, error_type: &str) -> bool {
     let pause = is(action, Deed::StartPause) || is(action, Deed::StopPause);
     !action.of_order() && !pause && error_type == agv.config.errors.instant_action
+}
+
+/// Says that it does not know where it is after an initPosition with some outcome.
+fn lost(after: fn(&Outcome) -> bool) -> Box<Hooks<(bool, fn(&Outcome) -> bool)>> {
+    holding((false, after))
+        .ends(|(lost, after), _, action, outcome| {
+            if is(action, Deed::InitPosition) {
+                *lost = after(&outcome) || *lost && matches!(outcome, Outcome::Failed(_));
+            }
+            outcome
+        })
+        .happens(|(lost, _), _, event| *lost &= event != Event::Begun)
+        .says(|(lost, _), _, part, m| {
+            if *lost && matches!(part, Part::Position) {
+                m.set("positionInitialized", false);
+            }
+            true
+        })
 }

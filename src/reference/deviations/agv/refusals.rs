@@ -1,12 +1,11 @@
 //! Deviations of what is reported, and what is changed, when an order is refused or nothing is there to cancel
 //! (sections 6.6.4 and 6.6.3).
 
-use super::hooks::{nothing_to_cancel, refusal, refusing};
+use super::hooks::{MOMENT, keep, nothing_to_cancel, parked, refusal, refusing};
 use crate::clock::Moment;
 use crate::reference::agv::Agv;
 use crate::reference::agv::action_kinds;
 use crate::reference::agv::actions::{Action, Origin, Status};
-use crate::reference::agv::cancel::MOMENT;
 use crate::reference::agv::errors::{ActiveError, Life};
 use crate::reference::agv::order_message::Order;
 use crate::reference::agv::rejection::{Rule, message_references};
@@ -136,7 +135,9 @@ records! {
             }
         });
     fault "r1-outdated-halts-driving" ["ORD-REJ-11", "ORD-FLOW-12"] "An outdated update makes it stand still until there is a new order, though it keeps the order it has."
-        => refusing(|agv, _, rule| agv.book.stunned |= rule == Rule::Outdated);
+        => parked()
+            .refuses(|parked, _, _, rule| *parked |= rule == Rule::Outdated)
+            .happens(|parked, _, event| *parked &= event != Event::Begun);
     fault "refusal-stalls-action" ["ACT-01", "ORD-FLOW-12"] "An order it refuses makes it forget to end the action that runs."
         => refusing(|agv, _, _| {
             let of_order = agv.actions.iter_mut().filter(|action| action.of_order());
@@ -182,7 +183,9 @@ records! {
             running.for_each(|action| action.end(Status::Failed));
         });
     fault "pause-stuck-after-refusal" ["ACT-13"] "Reports stopPause FINISHED and stays paused when it has refused an order or an update in the pause."
-        => refusing(|agv, _, _| agv.pause_outlives |= agv.holds.pause);
+        => keep::<bool>()
+            .refuses(|stuck, agv, _, _| *stuck |= agv.holds.pause)
+            .does(|stuck, agv, action| super::pause::stays_paused(*stuck, agv, action));
     fault "r2-rejection-lifts-pause" ["ORD-FLOW-12", "ACT-14"] "Rejecting an order ends the pause of the vehicle, and it drives on with its current order."
         => refusing(|agv, _, _| agv.set_holds(|holds| holds.pause = false));
     fault "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12", "ORD-FLOW-03"] "Forgets its horizon when it has to refuse a message."
@@ -196,9 +199,16 @@ records! {
     fault "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives."
         => refusing(|agv, _, rule| if rule == Rule::Outdated { agv.give_up_order() });
     fault "order-error-locks" ["ORD-FLOW-06", "ORD-REJ-08"] "Refuses the order that follows one it could not perform."
-        => refusing(|agv, _, rule| agv.locked |= rule == Rule::Unable);
+        => super::orders::locking().refuses(|locked, _, _, rule| *locked = rule == Rule::Unable);
     fault "r2-refused-order-queued" ["ORD-FLOW-01", "ORD-REJ-17"] "A new order that was refused because another one is active is begun all the same as soon as that one has ended."
-        => refusing(|agv, message, rule| if rule == Rule::OtherOrderActive { agv.queued = Some(message.clone()) });
+        => keep::<Option<Value>>()
+            .refuses(|queued, _, message, rule| if rule == Rule::OtherOrderActive { *queued = Some(message.clone()) })
+            .happens(|queued, agv, event| if event == Event::Settled && !agv.is_busy() && let Some(message) = queued.take() {
+                agv.flush();
+                if agv.order_decided(&message).is_ok() {
+                    agv.settle();
+                }
+            });
 }
 
 /// Says the error, changed if that is meant.

@@ -1,12 +1,16 @@
 //! Deviations of what is done at a station: picking, dropping, detecting, aligning, charging (section 6.8).
 
-use super::hooks::{after, failed, fails_unseen, failure, instead, is, keep, succeeded};
+use super::hooks::{after, brief, failed, fails_unseen, failure, holding, instead, is, keep, succeeded};
+use crate::clock::Moment;
 use crate::reference::agv::action_kinds::{Deed, LOAD_POSITIONS};
 use crate::reference::agv::actions::Action;
 use crate::reference::agv::deeds::{Area, Outcome, Problem};
-use crate::reference::agv::seam::{Cause, Deviation};
+use crate::reference::agv::rejection::{Refusal, Rule};
+use crate::reference::agv::seam::{Cause, Deviation, Event, Part, Relation};
 use crate::reference::agv::{Agv, Load};
 use crate::reference::deviations::record::Record;
+use crate::reference::deviations::words::Words;
+use serde_json::json;
 use std::time::Duration;
 
 records! {
@@ -19,7 +23,23 @@ records! {
     fault "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was nothing to pick."
         => fails_unseen(Deed::Pick);
     fault "r1-pick-reported-late" ["ACT-28", "STATE-04", "STATE-MSG-06"] "It reports a load it has picked two seconds after the pick is FINISHED."
-        => succeeded(Deed::Pick, |agv, _| agv.hidden_load = Some(agv.moment() + Duration::from_secs(2)));
+        => keep::<Option<Moment>>()
+            .ends(|hidden, agv, action, outcome| {
+                if is(action, Deed::Pick) && matches!(outcome, Outcome::Done(_)) {
+                    *hidden = Some(agv.moment() + Duration::from_secs(2));
+                }
+                outcome
+            })
+            .happens(|hidden, agv, event| if event == Event::Woken {
+                *hidden = hidden.filter(|hidden| *hidden > agv.moment());
+            })
+            .says(|hidden, _, part, m| {
+                if hidden.is_some() && matches!(part, Part::State) {
+                    m.set("loads", json!([]));
+                }
+                true
+            })
+            .due(|hidden| *hidden);
     fault "drop-failure-finished" ["ACT-29"] "Reports drop FINISHED although the place was taken."
         => after(Deed::Drop, |_, _, outcome| match outcome {
             Outcome::Failed(problem) if problem.reason == "the place is taken" => Outcome::Done(None),
@@ -30,7 +50,7 @@ records! {
     fault "drop-reported-late" ["ACT-28"] "Shows its load for another second after drop is FINISHED."
         => dropping_late(|_| Duration::from_secs(1));
     fault "r6-drop-finished-before-load-gone" ["ACT-28"] "It reports drop FINISHED while loads still lists the load, which goes one state later."
-        => dropping_late(Agv::brief);
+        => dropping_late(brief);
     fault "failure-changes-load" ["ACT-29"] "Changes the load it shows although its pick or drop has failed."
         => keep::<()>().ends(|(), agv, action, outcome| {
             if matches!(outcome, Outcome::Failed(_)) && is(action, Deed::Pick) && agv.loads.is_empty() {
@@ -108,7 +128,7 @@ records! {
     fault "r3-charging-reported-late" ["ACT-19"] "It reports startCharging FINISHED two seconds before charging becomes true."
         => charging_late(|_| Duration::from_secs(2));
     fault "r6-charging-flag-lags" ["ACT-19"] "It reports startCharging FINISHED one state before charging becomes true."
-        => charging_late(Agv::brief);
+        => charging_late(brief);
     fault "charging-end-failure-finished" ["ACT-20", "ACT-19"] "Reports stopCharging FINISHED although it cannot leave the charger."
         => fails_unseen(Deed::StopCharging);
     fault "charging-end-shown-anyway" ["ACT-20"] "Reports that it does not charge any more although stopCharging failed."
@@ -118,16 +138,20 @@ records! {
     fault "charging-end-toggled" ["ACT-11"] "Begins to charge again when stopCharging comes a second time."
         => succeeded_again(Deed::StopCharging, |was| !was);
     fault "charging-ends-early" ["ACT-22"] "Reports that it does not charge any more while it cannot take orders yet."
-        => keep::<bool>()
-            .does(|was, agv, _| {
+        => keep::<(bool, Option<Moment>)>()
+            .does(|(was, _), agv, _| {
                 *was = agv.charging;
                 None
             })
-            .ends(|was, agv, action, outcome| {
+            .ends(|(was, until), agv, action, outcome| {
                 if *was && is(action, Deed::StopCharging) && matches!(outcome, Outcome::Done(_)) {
-                    agv.undocking = Some(agv.moment() + Duration::from_secs(40));
+                    *until = Some(agv.moment() + Duration::from_secs(40));
                 }
                 outcome
+            })
+            .objects(|(_, until), agv, _, relation| {
+                let refused = relation != Relation::Known && until.is_some_and(|until| until > agv.moment());
+                refused.then(|| Refusal::new(Rule::OtherOrderActive, "the vehicle is still at the charger"))
             });
     fault "r1-node-stop-charging-unreported" ["ACT-19"] "A stopCharging on a node is FINISHED while charging stays true."
         => keep::<bool>()
@@ -147,13 +171,21 @@ records! {
             idle.then(|| Outcome::Failed(Problem::new(Area::Charging, action, "the vehicle does not charge")))
         });
     fault "r4-stop-charging-flag-late" ["ACT-19"] "It reports stopCharging FINISHED while batteryState.charging is still true for some seconds."
-        => instead(Deed::StopCharging, |agv, _| {
-            let longer = agv.charging && !agv.charger_locked;
-            longer.then(|| {
-                agv.fourth.uncharged_at = Some(agv.moment() + Duration::from_secs(3));
-                Outcome::Done(None)
+        => keep::<Option<Moment>>()
+            .does(|due, agv, action| {
+                if is(action, Deed::StartCharging) {
+                    *due = None;
+                }
+                let longer = is(action, Deed::StopCharging) && agv.charging && !agv.charger_locked;
+                longer.then(|| {
+                    *due = Some(agv.moment() + Duration::from_secs(3));
+                    Outcome::Done(None)
+                })
             })
-        });
+            .happens(|due, agv, event| if event == Event::Woken && due.take_if(|due| *due <= agv.moment()).is_some() {
+                agv.charging = false;
+            })
+            .due(|due| *due);
 }
 
 /// Says nothing about the result.
@@ -168,39 +200,67 @@ fn at_charger(agv: &Agv) -> bool {
     !agv.motion.is_moving() && agv.config.chargers.contains(&agv.book.last_node)
 }
 
-/// Shows a load for a while that was put down.
-fn dropping_late(lasts: fn(&Agv) -> Duration) -> Box<dyn Deviation> {
-    struct Late(fn(&Agv) -> Duration, Option<Load>);
-    impl Deviation for Late {
-        fn does(&mut self, agv: &mut Agv, _: &Action) -> Option<Outcome> {
-            self.1 = agv.loads.first().cloned();
-            None
-        }
+type Lasting = fn(&Agv) -> Duration;
 
-        fn ends(&mut self, agv: &mut Agv, action: &Action, outcome: Outcome) -> Outcome {
-            if is(action, Deed::Drop) && matches!(outcome, Outcome::Done(_)) && agv.loads.is_empty() {
-                let until = agv.moment() + (self.0)(agv);
-                agv.shadow = self.1.take().map(|load| (until, load));
-            }
-            outcome
-        }
+/// Shows a load for a while that was put down.
+fn dropping_late(lasts: Lasting) -> Box<dyn Deviation> {
+    struct Late {
+        lasts: Lasting,
+        before: Option<Load>,
+        shadow: Option<(Moment, Load)>,
     }
-    Box::new(Late(lasts, None))
+    holding(Late {
+        lasts,
+        before: None,
+        shadow: None,
+    })
+    .does(|late, agv, _| {
+        late.before = agv.loads.first().cloned();
+        None
+    })
+    .ends(|late, agv, action, outcome| {
+        if is(action, Deed::Drop) && matches!(outcome, Outcome::Done(_)) && agv.loads.is_empty() {
+            let until = agv.moment() + (late.lasts)(agv);
+            late.shadow = late.before.take().map(|load| (until, load));
+        }
+        outcome
+    })
+    .happens(|late, agv, event| {
+        if event == Event::Woken {
+            late.shadow.take_if(|(until, _)| *until <= agv.moment());
+        }
+    })
+    .says(|late, _, part, m| {
+        if let (Part::State, Some((_, load))) = (part, &late.shadow) {
+            m.add("loads", Agv::load_picture(load));
+        }
+        true
+    })
+    .due(|late| late.shadow.as_ref().map(|(until, _)| *until))
 }
 
 /// Shows after a while that it charges.
-fn charging_late(lasts: fn(&Agv) -> Duration) -> Box<dyn Deviation> {
-    struct Late(fn(&Agv) -> Duration);
-    impl Deviation for Late {
-        fn does(&mut self, agv: &mut Agv, action: &Action) -> Option<Outcome> {
+fn charging_late(lasts: Lasting) -> Box<dyn Deviation> {
+    holding((lasts, None))
+        .does(|(lasts, due), agv, action| {
+            if is(action, Deed::StopCharging) {
+                *due = None;
+            }
             let begins = is(action, Deed::StartCharging) && at_charger(agv) && !agv.charging;
             begins.then(|| {
-                agv.third.charging_at = Some(agv.moment() + (self.0)(agv));
+                *due = Some(agv.moment() + lasts(agv));
                 Outcome::Done(None)
             })
-        }
-    }
-    Box::new(Late(lasts))
+        })
+        .happens(|(_, due), agv, event| {
+            if agv.motion.is_moving() {
+                *due = None;
+            }
+            if event == Event::Woken && due.take_if(|due| *due <= agv.moment()).is_some() {
+                agv.charging = true;
+            }
+        })
+        .due(|(_, due)| *due)
 }
 
 /// Shows what it makes of whether it charged before.
