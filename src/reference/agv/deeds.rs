@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use super::Agv;
-use super::action_kinds::Deed;
+use super::action_kinds::{ActionKind, Deed};
 use super::actions::{Action, Origin, Status};
 use super::errors::{ActiveError, Life};
 use super::motion::Pose;
@@ -82,7 +82,7 @@ impl Agv {
             return;
         };
         let prepares = action.kind.map(|kind| self.allows(Permission::Prepare, kind.prepares));
-        let due = self.moment() + self.duration_of(action) / 3;
+        let due = self.moment() + self.lasts(Span::Action(action), self.working_time(action)) / 3;
         match (prepares, self.actions.get_mut(id)) {
             (Some(true), Some(action)) => {
                 action.status = Status::Initializing;
@@ -107,19 +107,25 @@ impl Agv {
     }
 
     /// How long an action runs; something else ends what waits for a trigger, or for the end of an edge.
-    pub(crate) fn duration_of(&self, action: &Action) -> Duration {
-        let endless = [Deed::WaitForTrigger, Deed::WarningLights];
+    fn duration_of(&self, action: &Action) -> Duration {
+        let endless = |kind: &ActionKind| matches!(kind.deed, Deed::WaitForTrigger | Deed::WarningLights);
+        let usual = match action.kind.is_some_and(endless) {
+            true => Duration::MAX,
+            false => self.working_time(action),
+        };
+        self.lasts(Span::Action(action), usual)
+    }
+
+    /// As long as the action asks for, or as actions of its type take.
+    fn working_time(&self, action: &Action) -> Duration {
         let asked = action.number("duration");
-        let asked = asked.filter(|seconds| (0.0..=86_400.0).contains(seconds));
-        let usual = match asked {
-            _ if action.kind.is_some_and(|kind| endless.contains(&kind.deed)) => Duration::MAX,
+        match asked.filter(|seconds| (0.0..=86_400.0).contains(seconds)) {
             Some(seconds) => Duration::from_secs_f64(seconds),
             None => {
                 let by_type = self.config.action_durations.get(&action.request.action_type);
                 by_type.copied().unwrap_or(self.config.action_duration)
             }
-        };
-        self.lasts(Span::Action(action), usual)
+        }
     }
 
     /// A stage of an action has ended.

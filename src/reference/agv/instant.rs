@@ -115,11 +115,11 @@ impl Agv {
     }
 
     fn begin_instant(&mut self, id: &str) {
-        self.happens(Event::InstantBegun);
         let lasting = self.actions.get(id).is_some_and(|action| {
             let usual = action.kind.is_some_and(|kind| kind.lasting);
             self.allows(Permission::TakeTime(action), usual)
         });
+        self.happens(Event::InstantBegun);
         if lasting {
             self.run_action(id);
         } else {

@@ -3,7 +3,7 @@
 use super::Agv;
 use super::actions::{Action, Origin};
 use super::objections::{Objection, Relation};
-use super::order_message::Order;
+use super::order_message::{Node, Order};
 use super::points::{Event, Permission};
 use super::rejection::{Refusal, Rule};
 
@@ -16,18 +16,24 @@ impl Agv {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the order was cancelled");
             self.object(Objection::Cancelled, refusal)?;
         }
+        self.objects(order, Relation::Update)?;
         let first = &order.nodes[0];
-        let joint = if cancelled || self.is_busy() {
+        if !self.joins(first) {
+            let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
+            self.object(Objection::Joint(first), refusal.naming("nodeId", &first.id))?;
+        }
+        self.check_ability(order, 1)
+    }
+
+    /// Whether an update that begins with this node continues the order there is.
+    pub(crate) fn joins(&self, first: &Node) -> bool {
+        let runs = self.is_busy() || self.book.cancelled;
+        let joint = if runs {
             (&self.book.base_end.0, self.book.base_end.1)
         } else {
             (&self.book.last_node, self.book.last_sequence)
         };
-        if joint != (&first.id, first.sequence_id) {
-            let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
-            self.object(Objection::Joint(first), refusal.naming("nodeId", &first.id))?;
-        }
-        self.objects(order, Relation::Update)?;
-        self.check_ability(order, 1)
+        joint == (&first.id, first.sequence_id)
     }
 
     /// Rows 8 and 10: takes over an update. What the first transmission of the stitching node said stands (ORD-UPD-07).

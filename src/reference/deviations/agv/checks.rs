@@ -126,7 +126,8 @@ records! {
             });
     liberty "r1-altered-joint-rejected" ["ORD-UPD-07"] "It rejects an update whose stitching node has an action that it did not have before."
         => objecting(|agv, order, relation| {
-            let mut actions = order.nodes[0].actions.iter().filter(|_| relation == Relation::Update);
+            let first = &order.nodes[0];
+            let mut actions = first.actions.iter().filter(|_| relation == Relation::Update && agv.joins(first));
             let altered = actions.find(|action| agv.actions.get(&action.id).is_none())?;
             let reason = "the stitching node has another action than before";
             Some(Refusal::at_field(Rule::Unable, reason, &altered.path).naming("actionId", &altered.id))

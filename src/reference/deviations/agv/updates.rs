@@ -245,6 +245,7 @@ records! {
                 *planned = agv.actions.iter().filter(again).cloned().collect();
                 true
             })
+            .allows(|_, _, what, usual| usual && !matches!(what, Permission::ForgetWithHorizon))
             .happens(|planned, agv, event| if event == Event::Updated {
                 planned.drain(..).for_each(|action| agv.actions.push(action));
             });
