@@ -200,8 +200,10 @@ impl Agv {
         self.motion.reached = false;
         self.book.entered = false;
         let behind = |edge: &Edge| edge.sequence_id < sequence_id;
-        while let Some(edge) = self.book.edges.pop_front_if(|edge| behind(edge)) {
-            self.leave(edge);
+        while self.book.edges.front().is_some_and(behind) {
+            if let Some(edge) = self.book.edges.pop_front() {
+                self.leave(edge);
+            }
         }
         self.motion.set_map(stop.place.map_id.clone());
         self.happens(Event::NodeReached(sequence_id));

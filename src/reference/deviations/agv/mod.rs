@@ -25,6 +25,7 @@ mod hooks;
 mod instants;
 mod manner;
 mod maps;
+mod memory;
 mod modes;
 mod motion;
 mod nature;
