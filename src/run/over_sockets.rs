@@ -298,8 +298,7 @@ impl Stage<'_> {
         let recorder = Recorder::begin(&self.library.rules, self.writer, first)?;
         let operator = match &fleet {
             None => WithFleet::alone(operator),
-            Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter())
-                .map_err(|unknown| UnknownName(unknown.to_string()))?,
+            Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter()),
         };
         let mut engine = Engine::new(link, operator, recorder, composer, self.interrupt);
         let end = run(&mut engine, setup, progress, saved).await;

@@ -18,7 +18,8 @@ use crate::pack::Participant;
 use crate::pack::Role;
 use crate::profile::TimeLimits;
 use crate::reference::Fault;
-use crate::reference::agv::{Agv, Tolerance};
+use crate::reference::agv::Agv;
+use crate::reference::deviations::agv::Tolerance;
 use crate::reference::deviations::{agv as vehicles, master_control as deviations};
 
 /// A built-in device under test.
@@ -140,7 +141,7 @@ impl BuiltIn {
     #[must_use]
     pub fn tolerances(role: Role) -> &'static [Tolerance] {
         match role {
-            Role::Agv => crate::reference::agv::TOLERANCES,
+            Role::Agv => &vehicles::TOLERANCES,
             Role::MasterControl => &deviations::TOLERANCES,
         }
     }
@@ -236,9 +237,6 @@ impl BuiltIn {
     /// The mock AGVs, for a bench in memory.
     pub fn mock_peers(&self) -> impl Iterator<Item = Box<dyn Peer>> {
         let vehicles = self.fleet().into_iter().flat_map(|fleet| &fleet.vehicles);
-        vehicles.filter_map(|vehicle| {
-            let agv = Agv::new(vehicle.config.clone(), &[]).ok()?;
-            Some(Box::new(DevicePeer(agv)) as Box<dyn Peer>)
-        })
+        vehicles.map(|vehicle| Box::new(DevicePeer(Agv::new(vehicle.config.clone()))) as Box<dyn Peer>)
     }
 }

@@ -9,8 +9,8 @@ use crate::course::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout};
 use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{Place, SAMPLE_ACTIONS, SampleAction, SampleActions, TimeLimits};
-use crate::reference::agv::tolerances::UnknownTolerance;
 use crate::reference::agv::{AgvConfig, LayoutNode, OnboardMap};
+use crate::reference::deviations::agv::UnknownTolerance;
 
 /// The reference AGV and everything a run must know about it.
 #[derive(Clone, Debug)]

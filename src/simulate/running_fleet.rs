@@ -10,7 +10,7 @@ use crate::bench::endpoint::Endpoint;
 use crate::clock::WallClock;
 use crate::engine::{HookOutcome, Operator};
 use crate::link::mqtt::Reporter;
-use crate::reference::agv::{Agv, UnknownFault};
+use crate::reference::agv::Agv;
 
 /// Hooks, and the mock AGVs of the harness; none when an AGV is tested.
 pub struct WithFleet<O> {
@@ -28,22 +28,13 @@ impl<O> WithFleet<O> {
     }
 
     /// Starts the vehicles at the broker itself, not at the tap. What they publish is reported as sent by the harness.
-    ///
-    /// # Errors
-    /// Never for a fleet that was made by [`Fleet::new`]: its vehicles have no faults.
-    pub fn start(
-        operator: O,
-        fleet: &Fleet,
-        broker: &Endpoint,
-        clock: WallClock,
-        reporter: &Reporter,
-    ) -> Result<Self, UnknownFault> {
+    pub fn start(operator: O, fleet: &Fleet, broker: &Endpoint, clock: WallClock, reporter: &Reporter) -> Self {
         let mut vehicles = Vec::with_capacity(fleet.vehicles.len());
         for vehicle in &fleet.vehicles {
-            let agv = Agv::new(vehicle.config.clone(), &[])?;
+            let agv = Agv::new(vehicle.config.clone());
             vehicles.push(RunningDevice::start(agv, broker.clone(), clock, Some(reporter.clone())));
         }
-        Ok(Self { operator, vehicles })
+        Self { operator, vehicles }
     }
 
     /// Signs the vehicles off; gives the hooks back.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::pack::Role;
 use crate::profile::{HookInfo, VehicleWord};
 use crate::reference::Fault;
-use crate::reference::agv::Tolerance;
+use crate::reference::deviations::agv::Tolerance;
 
 /// Every hook with its parameters, by role.
 #[must_use]

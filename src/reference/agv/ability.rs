@@ -3,8 +3,8 @@
 use super::action_kinds::{self, Scope};
 use super::actions::Origin;
 use super::book::Place;
-use super::faults::FaultName as F;
-use super::order_message::{ActionRequest, Edge, Node, Order};
+use super::objections::{Asked, Lack, Objection};
+use super::order_message::{Edge, Node, Order};
 use super::rejection::{Refusal, Rule};
 use super::{Agv, motion};
 
@@ -18,11 +18,9 @@ impl Agv {
     /// Where a node is: as the order says, else as the layout knows. A line-guided vehicle only knows its layout.
     pub(crate) fn place(&self, node: &Node) -> Option<Place> {
         if let Some(position) = node.position.as_ref().filter(|_| !self.config.line_guided()) {
-            // With its axes mirrored it reads places it does not know as it reports them.
-            let mirrored = self.faults.has(F::AxesMirrored) && self.config.node(&node.id).is_none();
             return Some(Place {
                 x: position.x,
-                y: if mirrored { -position.y } else { position.y },
+                y: position.y,
                 map_id: position.map_id.clone(),
             });
         }
@@ -34,47 +32,25 @@ impl Agv {
     }
 
     /// Whether the vehicle can do all this; the first `known` nodes are only the joint.
-    pub(crate) fn check_ability(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
+    pub(crate) fn check_ability(&self, order: &Order, known: usize) -> Result<(), Refusal> {
+        let update = known > 0;
         self.check_memory(order, known)?;
-        let usable = |path: &&String| path.rsplit('.').next().is_some_and(|field| self.config.uses(field));
         self.check_zone_set(order)?;
-        let unread = known > 0 && self.faults.has(F::R3UnsupportedFieldInUpdateIgnored);
-        if unread && !self.config.trajectories {
-            for edge in &mut order.edges {
-                (edge.trajectory, edge.corridor) = (None, None);
-            }
-        }
-        if let Some(path) = order
-            .unsupported
-            .iter()
-            .filter(|path| !(path.ends_with("minHeight") && self.faults.has(F::R2MinHeightIgnored)))
-            .find(|path| !usable(path))
-            .filter(|_| !unread && !self.faults.has(F::UnsupportedFieldIgnored))
-        {
-            return Err(Refusal::at_field(
-                Rule::Unable,
-                &format!("the vehicle has no use for {path}"),
-                path,
-            ));
+        let usable = |path: &String| path.rsplit('.').next().is_some_and(|field| self.config.uses(field));
+        for path in order.unsupported.iter().filter(|path| !usable(path)) {
+            let refusal = Refusal::at_field(Rule::Unable, &format!("the vehicle has no use for {path}"), path);
+            self.object(Objection::Unused(path, update), refusal)?;
         }
         if let Some(defect) = order.defects.first().filter(|_| self.config.trajectories) {
             return Err(defect.clone().into());
         }
         for (index, node) in order.nodes.iter().enumerate() {
-            if node.position.is_none() && self.faults.has(F::R3NodePositionDemanded) {
-                let path = format!("{}.nodePosition", node.path);
-                let refusal = Refusal::at_field(Rule::Unable, "the vehicle needs the position of the node", &path);
-                return Err(refusal.naming("nodeId", &node.id));
-            }
             let Some(place) = self.place(node) else {
                 let path = format!("{}.nodePosition", node.path);
                 let refusal = Refusal::at_field(Rule::Unable, "the vehicle does not know where the node is", &path);
                 return Err(refusal.naming("nodeId", &node.id));
             };
-            let skipped = known > 0 && self.faults.has(F::R4MapCheckSkippedInUpdate);
-            if !skipped && (index == 0 || !self.faults.has(F::R3OnlyFirstMapChecked)) {
-                self.check_map(node, &place)?;
-            }
+            self.check_map(node, &place, (index, update))?;
         }
         for (index, edge) in order.edges.iter().enumerate() {
             let ends = order.nodes.get(index).zip(order.nodes.get(index + 1));
@@ -85,70 +61,46 @@ impl Agv {
 
     /// It plans with the zone set it has, or not at all.
     fn check_zone_set(&self, order: &Order) -> Result<(), Refusal> {
-        let Some(wanted) = &order.zone_set else { return Ok(()) };
-        let known = self.config.zone_set.as_ref() == Some(wanted);
-        if known || self.faults.has(F::ZoneSetUnchecked) {
+        if order.zone_set.is_none() || order.zone_set == self.config.zone_set {
             return Ok(());
         }
-        Err(Refusal::at_field(
-            Rule::Unable,
-            "the vehicle does not have the zone set",
-            "zoneSetId",
-        ))
+        let refusal = Refusal::at_field(Rule::Unable, "the vehicle does not have the zone set", "zoneSetId");
+        self.object(Objection::ZoneSet, refusal)
     }
 
-    fn check_memory(&self, order: &mut Order, known: usize) -> Result<(), Refusal> {
-        let limit = self.config.max_nodes;
-        let actions = |actions: &Vec<ActionRequest>| actions.len() > self.config.max_actions;
-        let too_many_actions = order.nodes.iter().any(|node| actions(&node.actions))
-            || order.edges.iter().any(|edge| actions(&edge.actions));
-        let left = if known == 0 {
-            0
-        } else {
-            self.book.nodes.iter().filter(|stop| stop.node.released).count()
-        };
-        let too_many_nodes = left + order.nodes.len() > limit;
-        let too_many_actions = too_many_actions && !self.faults.has(F::R1SurplusActionsDropped);
-        if self.faults.has(F::R1SurplusActionsDropped) {
-            let most = self.config.max_actions;
-            order.nodes.iter_mut().for_each(|node| node.actions.truncate(most));
-            order.edges.iter_mut().for_each(|edge| edge.actions.truncate(most));
+    /// An order that does not fit into the memory is refused as a whole (ORD-REJ-15).
+    fn check_memory(&self, order: &Order, known: usize) -> Result<(), Refusal> {
+        let released = self.book.nodes.iter().filter(|stop| stop.node.released);
+        let left = if known == 0 { 0 } else { released.count() };
+        if left + order.nodes.len() > self.config.max_nodes {
+            let refusal = Refusal::at_field(Rule::Memory, "the order has too many nodes", "nodes");
+            self.object(Objection::Nodes, refusal)?;
         }
-        if self.faults.has(F::MemoryUnchecked) {
-            order.nodes.truncate(limit);
-            order.edges.truncate(limit.saturating_sub(1));
-            return Ok(());
-        }
-        if too_many_nodes {
-            return Err(Refusal::at_field(Rule::Memory, "the order has too many nodes", "nodes"));
-        }
-        if too_many_actions {
-            return Err(Refusal::at_field(
-                Rule::Memory,
-                "a node or edge has too many actions",
-                "actions",
-            ));
+        let of_nodes = order.nodes.iter().map(|node| node.actions.len());
+        let of_edges = order.edges.iter().map(|edge| edge.actions.len());
+        if of_nodes
+            .chain(of_edges)
+            .any(|actions| actions > self.config.max_actions)
+        {
+            let refusal = Refusal::at_field(Rule::Memory, "a node or edge has too many actions", "actions");
+            self.object(Objection::Actions, refusal)?;
         }
         Ok(())
     }
 
-    fn check_map(&self, node: &Node, place: &Place) -> Result<(), Refusal> {
+    /// A node is on a map that is on board and enabled (MAP-08, MAP-13).
+    fn check_map(&self, node: &Node, place: &Place, (index, update): (usize, bool)) -> Result<(), Refusal> {
         let refusal = |reason| {
-            Err(Refusal::new(Rule::UnknownMap, reason)
-                .naming("mapId", &place.map_id)
-                .naming("nodeId", &node.id))
+            let refusal = Refusal::new(Rule::UnknownMap, reason).naming("mapId", &place.map_id);
+            refusal.naming("nodeId", &node.id)
         };
-        if !node.released && self.faults.has(F::R2MapOfHorizonUnchecked) {
-            return Ok(());
-        }
-        if self.faults.has(F::UnknownMapAccepted) {
-            return Ok(());
-        }
         if !self.maps.on_board(&place.map_id) {
-            return refusal("the map is not on board");
-        }
-        if !self.maps.enabled(&place.map_id) && !self.faults.has(F::DisabledMapUsed) {
-            return refusal("the map is not enabled");
+            self.object(Objection::Map(node, index, update), refusal("the map is not on board"))?;
+        } else if !self.maps.enabled(&place.map_id) {
+            self.object(
+                Objection::DisabledMap(node, index, update),
+                refusal("the map is not enabled"),
+            )?;
         }
         Ok(())
     }
@@ -156,16 +108,16 @@ impl Agv {
     fn check_edge(&self, edge: &Edge, ends: Option<(&Node, &Node)>) -> Result<(), Refusal> {
         let unable = |field: &str, reason: &str| {
             let path = format!("{}.{field}", edge.path);
-            Err(Refusal::at_field(Rule::Unable, reason, &path).naming("edgeId", &edge.id))
+            Refusal::at_field(Rule::Unable, reason, &path).naming("edgeId", &edge.id)
         };
         if edge.max_speed.is_some_and(|speed| speed < SLOWEST) {
-            return unable("maxSpeed", "the vehicle cannot drive so slowly");
+            return Err(unable("maxSpeed", "the vehicle cannot drive so slowly"));
         }
         if edge.max_rotation_speed.is_some_and(|speed| speed < SLOWEST) {
-            return unable("maxRotationSpeed", "the vehicle cannot turn so slowly");
+            return Err(unable("maxRotationSpeed", "the vehicle cannot turn so slowly"));
         }
-        if edge.max_height.is_some_and(|height| height < self.config.height) && !self.faults.has(F::MaxHeightIgnored) {
-            return unable("maxHeight", "the vehicle is higher");
+        if edge.max_height.is_some_and(|height| height < self.config.height) {
+            self.object(Objection::Height, unable("maxHeight", "the vehicle is higher"))?;
         }
         self.check_way(edge, ends)?;
         let Some(orientation) = edge.orientation else {
@@ -183,68 +135,56 @@ impl Agv {
         })
         .abs();
         let possible = relative <= SIDEWAYS || relative >= std::f64::consts::PI - SIDEWAYS;
-        if possible || self.faults.has(F::OrientationUnchecked) {
+        if possible {
             return Ok(());
         }
-        unable("orientation", "the vehicle cannot drive sideways")
+        let refusal = unable("orientation", "the vehicle cannot drive sideways");
+        self.object(Objection::Orientation, refusal)
     }
 
+    /// Every action is known, possible where it is asked for, and has its parameters (ORD-REJ-04, ACT-10).
     fn check_actions(&self, order: &Order, known: usize) -> Result<(), Refusal> {
-        if known > 0 && self.faults.has(F::R4UpdateActionsNotChecked) {
-            return Ok(());
-        }
-        let all = !self.faults.has(F::R2HorizonActionsUnchecked);
-        let nodes = order.nodes.iter().skip(known).filter(|node| node.released || all);
-        let nodes = nodes.flat_map(|node| &node.actions);
-        let none = self.faults.has(F::R3EdgeActionsUnchecked);
-        let edges = order.edges.iter().filter(|edge| (edge.released || all) && !none);
-        let edges = edges.flat_map(|edge| &edge.actions);
-        let scoped = nodes
-            .map(|action| (action, Scope::Node))
-            .chain(edges.map(|action| (action, Scope::Edge)));
+        let asked = |(of_edge, released): (bool, bool)| {
+            move |request| Asked {
+                request,
+                released,
+                of_edge,
+                update: known > 0,
+            }
+        };
+        let nodes = order.nodes.iter().skip(known);
+        let of_nodes = nodes.flat_map(|node| node.actions.iter().map(asked((false, node.released))));
+        let edges = order.edges.iter();
+        let of_edges = edges.flat_map(|edge| edge.actions.iter().map(asked((true, edge.released))));
         let mut seen: Vec<&str> = Vec::new();
-        for (request, scope) in scoped {
-            let unable = |reason: &str, field: &str| {
-                let refusal = Refusal::at_field(Rule::Unable, reason, field).naming("actionId", &request.id);
-                Err(refusal.naming("actionType", &request.action_type))
-            };
-            if seen.contains(&request.id.as_str()) || self.id_taken(&request.id, known) {
-                return unable("the actionId is not unique", &request.path);
-            }
-            seen.push(&request.id);
-            let Some(kind) = action_kinds::find(&self.config, &request.action_type) else {
-                if self.faults.has(F::UnknownActionAccepted) {
-                    continue;
-                }
-                return unable("the vehicle does not know the action", &request.path);
-            };
-            let listed_refused = self.faults.has(F::ListedActionRefused)
-                && matches!(
-                    kind.deed,
-                    action_kinds::Deed::FinePositioning | action_kinds::Deed::DetectObject
-                );
-            let request_taken = self.faults.has(F::R2RequestsOnNodesTaken)
-                && matches!(
-                    kind.deed,
-                    action_kinds::Deed::StateRequest
-                        | action_kinds::Deed::FactsheetRequest
-                        | action_kinds::Deed::LogReport
-                );
-            let of_edge = scope == Scope::Edge && self.faults.has(F::R4EdgeScopeNotChecked);
-            let charges = scope == Scope::Edge && kind.deed == action_kinds::Deed::StartCharging;
-            let of_edge = of_edge || charges && self.faults.has(F::R6ChargingOnEdgeAccepted);
-            if listed_refused
-                || (!request_taken && !of_edge && !kind.scopes.contains(&scope) && !self.faults.has(F::ScopeUnchecked))
-            {
-                return unable("the action is not possible here", &request.path);
-            }
-            let found = action_kinds::refusal(kind, request, &self.config, true)
-                .filter(|(_, reason)| !(reason.ends_with("missing") && self.faults.has(F::R1MissingParameterTaken)))
-                .filter(|_| !self.faults.has(F::ParametersUnchecked));
-            if let Some((key, reason)) = found {
-                let refusal = Refusal::at_field(Rule::Unable, reason, &request.path).naming("actionParameter", key);
-                return Err(refusal.naming("actionId", &request.id));
-            }
+        for asked in of_nodes.chain(of_edges) {
+            let taken = seen.contains(&asked.request.id.as_str()) || self.id_taken(&asked.request.id, known);
+            self.check_action(asked, taken)?;
+            seen.push(&asked.request.id);
+        }
+        Ok(())
+    }
+
+    fn check_action(&self, asked: Asked<'_>, id_taken: bool) -> Result<(), Refusal> {
+        let request = asked.request;
+        let unable = |reason: &str| {
+            let refusal = Refusal::at_field(Rule::Unable, reason, &request.path).naming("actionId", &request.id);
+            refusal.naming("actionType", &request.action_type)
+        };
+        let object = |lack: Lack<'_>, refusal: Refusal| self.object(Objection::Action(asked, lack), refusal);
+        if id_taken {
+            object(Lack::Id, unable("the actionId is not unique"))?;
+        }
+        let Some(kind) = action_kinds::find(&self.config, &request.action_type) else {
+            return object(Lack::Kind, unable("the vehicle does not know the action"));
+        };
+        let scope = if asked.of_edge { Scope::Edge } else { Scope::Node };
+        if !kind.scopes.contains(&scope) {
+            object(Lack::Scope(kind), unable("the action is not possible here"))?;
+        }
+        if let Some((key, reason)) = action_kinds::refusal(kind, request, &self.config, true) {
+            let refusal = Refusal::at_field(Rule::Unable, reason, &request.path).naming("actionParameter", key);
+            object(Lack::Parameter(reason), refusal.naming("actionId", &request.id))?;
         }
         Ok(())
     }
@@ -253,9 +193,7 @@ impl Agv {
     fn id_taken(&self, id: &str, known: usize) -> bool {
         self.actions.get(id).is_some_and(|action| match action.origin {
             Origin::Instant => known > 0 || !action.status.is_terminal(),
-            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => {
-                known > 0 && sequence_id <= self.book.base_end.1 && !self.faults.has(F::OutdatedUpdateTakenOver)
-            }
+            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => known > 0 && sequence_id <= self.book.base_end.1,
         })
     }
 }

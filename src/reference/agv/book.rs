@@ -1,8 +1,6 @@
 //! The order book: the order, what is left of it, and where the vehicle was last.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-
-use crate::clock::Moment;
+use std::collections::VecDeque;
 
 use super::order_message::{Edge, Node};
 
@@ -48,46 +46,12 @@ pub(crate) struct Book {
     pub(crate) cancel: Option<Cancel>,
     /// The node traversed last, and the edge left last.
     pub(crate) left: (Option<Stop>, Option<Edge>),
-    /// First sequenceId by nodeId (`loop-confused` only).
-    pub(crate) visits: BTreeMap<String, u32>,
     /// The order was cancelled, so it cannot be continued.
     pub(crate) cancelled: bool,
-    /// The order was updated.
-    pub(crate) updated: bool,
-    /// The link broke since the order came (`update-refused-after-cut` only).
-    pub(crate) cut: bool,
-    /// sequenceId behind which everything comes from updates (`update-actions-not-performed` only).
-    pub(crate) first_end: u32,
-    /// actionIds of the horizon an update has just replaced.
-    pub(crate) dropped: Vec<String>,
-    /// It has asked for a new base (`new-base-request-stays` only).
-    pub(crate) asked: bool,
-    /// Where the order began (`distance-not-reset` only).
-    pub(crate) begun_at: Option<(f64, f64)>,
-    /// The order was complete and is continued (`continuation-not-driven` only).
-    pub(crate) continued: bool,
-    /// When a faulty vehicle does what it does a moment later.
-    pub(crate) soon: Option<Moment>,
-    /// It left the decision point by itself (`horizon-slipped-into` only).
-    pub(crate) slipped: bool,
-    /// The order names a zone set (`zone-set-invented` only).
+    /// The order names a zone set.
     pub(crate) zoned: bool,
-    /// It drives as if the horizon were released (`r1-horizon-…` only).
-    pub(crate) unbound: bool,
-    /// Where it ends its way (`r1-stops-at-stitch` only).
-    pub(crate) stuck_at: Option<u32>,
-    /// It does not drive any more (`r1-outdated-halts-driving` only).
-    pub(crate) stunned: bool,
-    /// It drives although it is paused (`r1-update-drives-in-pause` only).
-    pub(crate) heedless: bool,
-    /// It went on after a pause on this edge (`r1-max-speed-forgotten-in-pause` only).
-    pub(crate) hurried: bool,
-    /// lastNodeId and lastNodeSequenceId before the present ones (`r1-last-node-after-actions` only).
+    /// lastNodeId and lastNodeSequenceId before the present ones.
     pub(crate) previous: (String, u32),
-    /// sequenceIds that were in the horizon once (`r2-released-not-updated` only).
-    pub(crate) planned: BTreeSet<u32>,
-    /// It drives whatever its actions forbid (`r2-blocking-forgotten-after-pause` only).
-    pub(crate) unblocked: bool,
 }
 
 impl Book {
@@ -104,26 +68,9 @@ impl Book {
             entered: false,
             cancel: None,
             left: (None, None),
-            visits: BTreeMap::new(),
             cancelled: false,
-            updated: false,
-            cut: false,
-            first_end: u32::MAX,
-            dropped: Vec::new(),
-            asked: false,
-            begun_at: None,
-            continued: false,
-            soon: None,
-            slipped: false,
             zoned: false,
-            unbound: false,
-            stuck_at: None,
-            stunned: false,
-            heedless: false,
-            hurried: false,
             previous: (String::new(), 0),
-            planned: BTreeSet::new(),
-            unblocked: false,
         }
     }
 

@@ -1,7 +1,5 @@
 //! What people and tests do to the vehicle: buttons, switches, moving it by hand.
 
-use std::time::Duration;
-
 use serde_json::{Value, json};
 
 use crate::reference::Output;
@@ -10,8 +8,8 @@ use super::action_kinds::Deed;
 use super::actions::Status;
 use super::book::Book;
 use super::errors::{ActiveError, Life};
-use super::faults::FaultName as F;
 use super::motion::Pose;
+use super::points::{Cause, Event, Permission};
 use super::{Agv, Mode};
 
 /// The commands of [`crate::reference::Input::Command`]; unknown ones are ignored.
@@ -76,13 +74,11 @@ pub const COMMANDS: &[&str] = &[
 
 /// More things than this do not stand about.
 const MAX_OBSTACLES: usize = 100;
-/// How long a faulty vehicle keeps its errors.
-const KEPT: Duration = Duration::from_secs(60);
 
 impl Agv {
     pub(crate) fn command(&mut self, name: &str, arguments: &Value) {
         let text = |key: &str| arguments.get(key).and_then(Value::as_str).unwrap_or_default();
-        if self.persona_command(name, arguments) {
+        if self.told_how_to_behave(name, arguments) {
             return;
         }
         match name {
@@ -107,7 +103,7 @@ impl Agv {
             "clear-error" => self.clear_error(),
             "emergency-stop" => self.emergency_stop(),
             "release-emergency-stop" => {
-                self.latched = self.holds.emergency && self.faults.has(F::R1EStopLatched);
+                self.happens(Event::Releasing);
                 self.errors.released();
                 self.set_holds(|holds| holds.emergency = false);
             }
@@ -119,15 +115,12 @@ impl Agv {
             "unlock-charger" => self.charger_locked = false,
             "enter-field" => self.set_holds(|holds| holds.field = true),
             "leave-field" => {
-                self.field_latched = self.holds.field && self.faults.has(F::R2FieldViolationLatched);
+                self.happens(Event::FieldFreed);
                 self.set_holds(|holds| holds.field = false);
             }
-            "enable-map" if self.faults.has(F::ManualEnableUnreported) => {}
-            "enable-map" => {
+            "enable-map" if self.allows(Permission::EnableByHand, true) => {
                 // A map that is not on board cannot be chosen on the vehicle's panel.
-                let _ = self
-                    .maps
-                    .enable(text("mapId"), text("mapVersion"), super::Faults::default());
+                let _ = self.maps.enable(text("mapId"), text("mapVersion"));
             }
             "place-load" => self.place_load(text("loadId"), text("loadType")),
             "remove-load" => self.loads.clear(),
@@ -142,20 +135,12 @@ impl Agv {
         self.motion.halt(moment);
         self.motion.reached = false;
         let last_node = std::mem::take(&mut self.book.last_node);
-        let known = (std::mem::take(&mut self.book.order_id), self.book.update_id);
         self.book = Book::empty(last_node);
-        if self.takes(super::tolerances::ToleranceName::R1OrderIdSurvivesPowerCycle) {
-            (self.book.order_id, self.book.update_id) = known;
-            self.book.cancelled = self.book.has_order();
-        }
         self.actions.clear();
         self.errors.clear();
         self.downloads.clear();
-        self.sixth = super::sixth::Sixth::default();
         self.holds = super::Holds::default();
         self.strayed = false;
-        self.locked = false;
-        self.deaf = false;
         self.mode = Mode::Automatic;
         self.charging = false;
         self.report = super::Report::default();
@@ -164,6 +149,7 @@ impl Agv {
         }
         self.connection.dropped(moment + self.config.reconnect_delay);
         self.connection.count_anew();
+        self.happens(Event::PowerCycled);
     }
 
     /// The button that waitForTrigger waits for; it serves all of them unless one is named.
@@ -195,63 +181,18 @@ impl Agv {
             _ => return,
         };
         let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
-        let leaves = !self.mode.takes_orders() && self.faults.has(F::ManualTakesOrders);
-        let drives = self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen);
-        let acts = self
-            .actions
-            .iter()
-            .any(|action| action.of_order() && action.status.is_active());
-        let waits = mode == Mode::Manual && self.waits_at_decision_point() && !self.motion.is_moving() && !acts;
-        let keeps = leaves || drives || waits && self.faults.has(F::R2ManualKeepsWaitingOrder);
-        let keeps = keeps || self.faults.has(F::ManualKeepsOrder) || self.faults.has(F::ManualDrivesOn);
-        if by_hand && mode != self.mode && !keeps && self.is_occupied() {
-            let given_up = self.book.clone();
-            if self.faults.has(F::R1ManualFinishesActions) {
-                for action in self.actions.iter_mut() {
-                    if action.of_order() && action.status.is_active() {
-                        action.end(Status::Finished);
-                    }
-                }
-            }
-            if self.faults.has(F::ManualKeepsActions) {
-                self.motion.halt(self.now.moment);
-                self.book.drop_route();
-                self.book.cancelled = true;
-            } else {
-                let waiting = self.waiting_order_actions();
-                self.give_up_order();
-                let manual = mode == Mode::Manual || self.mode == Mode::Manual;
-                if manual && self.faults.has(F::R6ManualLeavesActionsWaiting) {
-                    self.leave_waiting(&waiting);
-                }
-            }
-            if mode == Mode::Manual && self.faults.has(F::R3ManualDropsActionStates) {
-                self.actions.retain(|action| !action.of_order());
-            }
-            if self.faults.has(F::R1ManualKeepsHorizon) {
-                let planned = given_up.nodes.iter().filter(|stop| !stop.node.released);
-                self.book.nodes.extend(planned.cloned());
-                let planned = given_up.edges.iter().filter(|edge| !edge.released);
-                self.book.edges.extend(planned.cloned());
-            }
-            self.remembered = Some(given_up).filter(|_| self.faults.has(F::OrderTakenUpAgain));
-        }
-        if !by_hand && mode != self.mode && self.is_occupied() && self.faults.has(F::R2ModeSwitchParks) {
-            self.book.stunned = true;
-        }
-        if mode == Mode::Semiautomatic && self.faults.has(F::SemiautomaticEndsOrder) {
+        self.happens(Event::ModeChanging(mode));
+        let kept = self.allows(Permission::KeepOrder(mode), !by_hand || mode == self.mode);
+        if !kept && self.is_occupied() {
             self.give_up_order();
+            self.happens(Event::GivenUpForMode(mode));
         }
-        if mode.takes_orders() != self.mode.takes_orders() && self.faults.has(F::R2OfflineInManual) {
-            self.publish_connection(if mode.takes_orders() { "ONLINE" } else { "OFFLINE" });
-        }
-        self.mode = mode;
-        if let Some(order) = self.remembered.take_if(|_| mode.takes_orders()) {
-            self.book = order;
-        }
+        let before = std::mem::replace(&mut self.mode, mode);
+        self.happens(Event::ModeChanged(before));
     }
 
-    fn is_occupied(&self) -> bool {
+    /// Whether there is an order to be given up.
+    pub(crate) fn is_occupied(&self) -> bool {
         !self.book.nodes.is_empty() || self.actions.order_unfinished() || self.book.cancel.is_some()
     }
 
@@ -276,7 +217,7 @@ impl Agv {
 
     /// Pushed or steered by hand, which is only possible outside the automatic modes (MODE-06).
     fn move_to(&mut self, arguments: &Value) {
-        if self.mode.takes_orders() || self.faults.has(F::ManualPositionStale) {
+        if !self.allows(Permission::MoveByHand, !self.mode.takes_orders()) {
             return;
         }
         if let Some(node) = arguments.get("nodeId").and_then(Value::as_str) {
@@ -294,7 +235,7 @@ impl Agv {
 
     /// A short way ahead, by hand.
     fn drive_manually(&mut self) {
-        self.locked = self.faults.has(F::ManualLocks);
+        self.happens(Event::DrivenByHand);
         let pose = self.motion.pose(self.moment());
         let (x, y) = (pose.x + pose.theta.cos() / 2.0, pose.y + pose.theta.sin() / 2.0);
         self.move_to(&json!({ "x": x, "y": y }));
@@ -307,19 +248,15 @@ impl Agv {
             "" => "maintenanceDue",
             named => named,
         };
-        let life = match () {
-            () if self.faults.has(F::OwnErrorForgotten) => Life::Until(self.moment() + super::cancel::MOMENT),
-            () if self.faults.has(F::OwnErrorKept) => Life::Until(self.moment() + KEPT),
-            () => Life::WhileDefective,
-        };
-        self.errors.raise(ActiveError {
+        let error = ActiveError {
             error_type: name.to_owned(),
-            fatal: fatal && !self.faults.has(F::OwnErrorMild),
+            fatal,
             references: Vec::new(),
             description: "a part of the vehicle is not in order".into(),
-            life,
-        });
-        let stops = fatal && !self.faults.has(F::FatalDrives);
+            life: Life::WhileDefective,
+        };
+        self.raise(Cause::Defect, error);
+        let stops = self.allows(Permission::StopForDefect, fatal);
         self.set_holds(|holds| holds.defect |= stops);
     }
 
@@ -330,21 +267,14 @@ impl Agv {
 
     fn emergency_stop(&mut self) {
         self.set_holds(|holds| holds.emergency = true);
-        self.errors.raise(ActiveError {
-            error_type: if self.faults.has(F::R1EmergencyStopUntyped) {
-                String::new()
-            } else {
-                self.config.errors.emergency_stop.clone()
-            },
-            fatal: !self.faults.has(F::EmergencyStopWarning),
+        let error = ActiveError {
+            error_type: self.config.errors.emergency_stop.clone(),
+            fatal: true,
             references: Vec::new(),
             description: "the emergency stop is pressed".into(),
-            life: if self.faults.has(F::OwnErrorKept) {
-                Life::Until(self.moment() + KEPT)
-            } else {
-                Life::WhileStopped
-            },
-        });
+            life: Life::WhileStopped,
+        };
+        self.raise(Cause::EmergencyStop, error);
     }
 
     fn place_load(&mut self, id: &str, load_type: &str) {

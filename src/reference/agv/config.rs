@@ -9,7 +9,6 @@ use std::time::Duration;
 use super::action_kinds::LOAD_POSITIONS;
 use super::instant::MAX_INSTANT_ACTIONS;
 use super::read::MAX_STRING;
-use super::tolerances::Tolerances;
 
 /// A node of the layout the vehicle knows.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,16 +155,16 @@ pub struct AgvConfig {
     pub zone_set: Option<String>,
     /// Driving speed in metres per second. Acceleration is ignored.
     pub speed: f64,
-    /// How many times slower than usual it is by its tolerances.
+    /// How many times slower than usual it is for reasons of its own.
     pub slowness: f64,
     /// Turning speed in radians per second.
     pub rotation_speed: f64,
     /// Height of the vehicle in metres, against edge.maxHeight.
     pub height: f64,
     /// How far from a node the vehicle may stand and still be on it, in metres, where the order does not say.
-    pub tolerance: f64,
+    pub reach: f64,
     /// The same for its orientation, in radians.
-    pub tolerance_theta: f64,
+    pub reach_theta: f64,
     /// A state is sent at the latest after this time (STATE-02).
     pub state_interval: Duration,
     /// No state is sent sooner after another than this (FACT-14).
@@ -217,8 +216,8 @@ pub struct AgvConfig {
     pub load_positions: Vec<String>,
     /// Largest message in bytes.
     pub max_message: usize,
-    /// The liberties it takes; see [`AgvConfig::tolerate`].
-    pub tolerances: Tolerances,
+    /// What is switched on at the seam, by name.
+    pub switched_on: Vec<&'static str>,
 }
 
 impl Default for AgvConfig {
@@ -267,8 +266,8 @@ impl Default for AgvConfig {
             slowness: 1.0,
             rotation_speed: std::f64::consts::PI,
             height: 1.0,
-            tolerance: 0.1,
-            tolerance_theta: 0.05,
+            reach: 0.1,
+            reach_theta: 0.05,
             state_interval: Duration::from_secs(10),
             min_state_interval: Duration::ZERO,
             answers_after: Duration::ZERO,
@@ -298,7 +297,7 @@ impl Default for AgvConfig {
             max_id: MAX_STRING,
             load_positions: LOAD_POSITIONS.map(str::to_owned).to_vec(),
             max_message: 1 << 20,
-            tolerances: Tolerances::default(),
+            switched_on: Vec::new(),
         }
     }
 }

@@ -4,12 +4,11 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use super::Agv;
-use super::action_kinds::Deed;
+use super::action_kinds::{ActionKind, Deed};
 use super::actions::{Action, Origin, Status};
-use super::faults::FaultName as F;
+use super::errors::{ActiveError, Life};
 use super::motion::Pose;
-use super::order_message::Blocking;
-use super::tolerances::ToleranceName as T;
+use super::points::{Event, Permission, Span};
 
 /// Coordinates beyond this are no place on any map of the site, in metres.
 const FARTHEST: f64 = 10_000.0;
@@ -27,10 +26,9 @@ pub(crate) enum Area {
 /// Why an action failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Problem {
-    area: Area,
-    reason: String,
+    pub(crate) area: Area,
+    pub(crate) reason: String,
     pub(crate) references: Vec<(String, String)>,
-    silent: bool,
 }
 
 impl Problem {
@@ -45,7 +43,6 @@ impl Problem {
             area,
             reason: reason.to_owned(),
             references,
-            silent: false,
         }
     }
 
@@ -61,12 +58,6 @@ impl Problem {
     /// An instant action that cannot be performed.
     pub(crate) fn unable(action: &Action, reason: &str) -> Self {
         Self::new(Area::InstantAction, action, reason)
-    }
-
-    /// The same, without an error.
-    pub(crate) fn silent_if(mut self, silent: bool) -> Self {
-        self.silent |= silent;
-        self
     }
 }
 
@@ -84,64 +75,68 @@ impl From<Result<(), Problem>> for Outcome {
     }
 }
 
-/// How long what was held takes to go on (`resumes-in-a-moment`).
-const RESUMING: Duration = Duration::from_millis(500);
-
 impl Agv {
-    /// An action of the order begins.
+    /// An action of the order begins, with its preparation if it has one (ASTATE-03).
     pub(crate) fn begin_action(&mut self, id: &str) {
-        let moment = self.moment();
         let Some(action) = self.actions.get(id).filter(|action| action.status == Status::Waiting) else {
             return;
         };
-        let duration = self.duration_of(action);
-        let Some(action) = self.actions.get_mut(id) else { return };
-        match action.kind {
-            Some(kind) if kind.deed == Deed::WaitForTrigger && self.faults.has(F::TriggerSkipped) => {
-                action.end(Status::Finished);
-            }
-            None => action.end(Status::Failed),
-            Some(kind)
-                if kind.prepares && !self.config.tolerances.has(T::R1NeverPrepares)
-                    || self.config.tolerances.has(T::PreparesEverything) =>
-            {
+        let prepares = action.kind.map(|kind| self.allows(Permission::Prepare, kind.prepares));
+        let due = self.moment() + self.lasts(Span::Action(action), self.working_time(action)) / 3;
+        match (prepares, self.actions.get_mut(id)) {
+            (Some(true), Some(action)) => {
                 action.status = Status::Initializing;
-                action.due = Some(moment + duration / 3);
+                action.due = Some(due);
             }
-            Some(_) => self.run_action(id),
+            (Some(false), _) => self.run_action(id),
+            (None, Some(action)) => action.end(Status::Failed),
+            _ => {}
         }
     }
 
     /// An action does its work now.
     pub(crate) fn run_action(&mut self, id: &str) {
-        let moment = self.moment();
-        let Some(duration) = self.actions.get(id).map(|action| self.duration_of(action)) else {
+        let Some(lasts) = self.actions.get(id).map(|action| self.duration_of(action)) else {
             return;
         };
-        let given_up = self.faults.has(F::TriggerGivenUp);
-        let times_out = self.faults.has(F::R1TriggerTimesOut);
-        let awaits = !given_up && !times_out && !self.faults.has(F::TriggerNotAwaited);
-        let stuck = self.faults.has(F::InstantActionStuck);
-        let Some(action) = self.actions.get_mut(id) else { return };
-        action.status = Status::Running;
-        let waits = action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger);
-        let duration = match waits {
-            true if given_up => Duration::from_millis(1_500),
-            true if times_out => Duration::from_secs(5),
-            true => super::cancel::MOMENT,
-            false => duration,
+        let moment = self.moment();
+        if let Some(action) = self.actions.get_mut(id) {
+            action.status = Status::Running;
+            action.due = (lasts < Duration::MAX).then(|| moment + lasts);
+        }
+    }
+
+    /// How long an action runs; something else ends what waits for a trigger, or for the end of an edge.
+    fn duration_of(&self, action: &Action) -> Duration {
+        let endless = |kind: &ActionKind| matches!(kind.deed, Deed::WaitForTrigger | Deed::WarningLights);
+        let usual = match action.kind.is_some_and(endless) {
+            true => Duration::MAX,
+            false => self.working_time(action),
         };
-        let awaits = awaits && waits || action.kind.is_some_and(|kind| kind.deed == Deed::WarningLights);
-        let endless = awaits || (stuck && !action.of_order());
-        action.due = (!endless).then(|| moment + duration);
+        self.lasts(Span::Action(action), usual)
+    }
+
+    /// As long as the action asks for, or as actions of its type take.
+    fn working_time(&self, action: &Action) -> Duration {
+        let asked = action.number("duration");
+        match asked.filter(|seconds| (0.0..=86_400.0).contains(seconds)) {
+            Some(seconds) => Duration::from_secs_f64(seconds),
+            None => {
+                let by_type = self.config.action_durations.get(&action.request.action_type);
+                by_type.copied().unwrap_or(self.config.action_duration)
+            }
+        }
     }
 
     /// A stage of an action has ended.
     pub(crate) fn stage_finished(&mut self, id: &str) {
-        let missed = !self.connection.online && self.faults.has(F::ActionEndMissedOffline);
+        let proceeds = self
+            .actions
+            .get(id)
+            .map(|action| self.allows(Permission::Proceed(action), true));
         let Some(action) = self.actions.get_mut(id) else { return };
         action.due = None;
-        if missed && action.of_order() {
+        if proceeds != Some(true) {
             return;
         }
         if action.kind.is_some_and(|kind| kind.deed == Deed::DownloadMap) {
@@ -160,11 +155,22 @@ impl Agv {
         let Some(action) = self.actions.get(id).cloned() else {
             return;
         };
-        if let Some(error_type) = self.persona.failure_of(&action.request.action_type, action.of_order()) {
-            self.fail_as_told(&action, error_type);
+        if self.fails_as_told(&action) {
             return;
         }
-        match self.deed(&action) {
+        let outcome = match self.does(&action) {
+            Some(outcome) => outcome,
+            None => {
+                let outcome = self.deed(&action);
+                self.turned_out(&action, outcome)
+            }
+        };
+        self.conclude(id, outcome);
+    }
+
+    /// An action comes to this.
+    pub(crate) fn conclude(&mut self, id: &str, outcome: Outcome) {
+        match outcome {
             Outcome::Done(result) => self.finish(id, result),
             Outcome::Failed(problem) => self.fail(id, &problem),
             Outcome::Open => {}
@@ -173,47 +179,26 @@ impl Agv {
 
     /// Ends an action with success.
     pub(crate) fn finish(&mut self, id: &str, result: Option<String>) {
-        let stuck = self.faults.has(F::InstantActionStuck);
-        let requests_stay = self.faults.has(F::StateRequestStuck);
-        self.forget_pause_after(id);
-        let late = self.takes(T::R3DrivesOnLate) && !self.book.nodes.is_empty();
-        let stops = |action: &Action| action.of_order() && action.request.blocking != Blocking::None;
-        if late && self.actions.get(id).is_some_and(stops) {
-            self.lingers_until = Some(self.moment() + RESUMING);
-        }
         if let Some(action) = self.actions.get_mut(id) {
-            let stuck = stuck || (requests_stay && action.request.action_type == "stateRequest");
-            let stuck = stuck && action.origin == Origin::Instant;
-            action.end(if stuck { Status::Running } else { Status::Finished });
+            action.end(Status::Finished);
             action.result = result;
         }
-        self.forget_if_faulty(id);
     }
 
     /// Ends an action without success, and says why (IACT-06, BP-03).
     pub(crate) fn fail(&mut self, id: &str, problem: &Problem) {
+        self.end_failed(id);
+        self.report_failure(id, problem);
+    }
+
+    /// Ends an action without success.
+    pub(crate) fn end_failed(&mut self, id: &str) {
         if let Some(action) = self.actions.get_mut(id) {
             action.end(Status::Failed);
-            if self.config.tolerances.has(T::R2FailuresDescribed) {
-                action.result = Some(problem.reason.clone());
-            }
         }
-        let retried = |action: &Action| {
-            let deed = action.kind.map(|kind| kind.deed);
-            action.of_order() && matches!(deed, Some(Deed::Pick | Deed::Drop))
-        };
-        if self.faults.has(F::R3FailedPickRetried)
-            && self.actions.get(id).is_some_and(retried)
-            && !self.third.retried.iter().any(|other| other == id)
-        {
-            self.third.retried.push(id.to_owned());
-            self.flush();
-            self.run_action(id);
-            return;
-        }
-        if problem.silent {
-            return;
-        }
+    }
+
+    fn report_failure(&mut self, id: &str, problem: &Problem) {
         let names = &self.config.errors;
         let name = match problem.area {
             Area::InstantAction => &names.instant_action,
@@ -222,37 +207,15 @@ impl Agv {
             Area::Load => &names.load,
             Area::Charging => &names.charging,
         };
-        let mut references = problem.references.clone();
-        let of_order = self.actions.get(id).is_some_and(Action::of_order);
-        let first = self
-            .actions
-            .iter()
-            .find(|action| action.of_order())
-            .filter(|_| of_order);
-        if let Some(first) = first.filter(|_| self.faults.has(F::R3FailureBlamesFirstAction)) {
-            let named = references.iter_mut().filter(|(key, _)| key == "actionId");
-            named.for_each(|(_, value)| value.clone_from(&first.request.id));
-        }
-        references.retain(|(key, _)| key != "actionId" || !self.faults.has(F::FailureUnreferenced));
-        self.warn(name.clone(), references, problem.reason.clone());
-    }
-
-    /// Ends an action without success because a test wants that.
-    pub(crate) fn fail_as_told(&mut self, action: &Action, error_type: String) {
-        let problem = Problem::unable(action, "the action did not succeed");
-        if let Some(action) = self.actions.get_mut(&action.request.id) {
-            action.end(Status::Failed);
-        }
-        self.warn(error_type, problem.references, problem.reason);
-    }
-
-    fn forget_if_faulty(&mut self, id: &str) {
-        let faults = self.faults;
-        self.actions.retain(|action| {
-            let forgotten = faults.has(F::FinishedActionsRemoved)
-                || (faults.has(F::FinishedInstantForgotten) && !action.of_order());
-            action.request.id != id || !forgotten
-        });
+        let error = ActiveError {
+            error_type: name.clone(),
+            fatal: false,
+            references: problem.references.clone(),
+            description: problem.reason.clone(),
+            life: Life::Until(self.moment() + self.config.error_duration),
+        };
+        let action = self.actions.get(id).cloned();
+        self.raise_failure(action.as_ref(), error);
     }
 
     fn deed(&mut self, action: &Action) -> Outcome {
@@ -262,79 +225,29 @@ impl Agv {
             Deed::StopPause => self.stop_pause(action),
             Deed::StartCharging => self.start_charging(action).into(),
             Deed::StopCharging => self.stop_charging(action).into(),
-            Deed::InitPosition => {
-                let result = self.init_position(action);
-                self.lost |= result.is_err() && self.faults.has(F::R3RefusedPoseLosesPosition);
-                self.third.posed |= result.is_ok() && !action.of_order();
-                result.into()
-            }
+            Deed::InitPosition => self.init_position(action).into(),
             Deed::EnableMap => {
-                let (id, version) = (action.text("mapId"), action.text("mapVersion"));
-                let busy = !self.book.nodes.is_empty() || self.actions.order_unfinished();
-                let known = self.maps.has_version(id, version);
-                if known && action.of_order() && self.faults.has(F::R3EnableOnNodeWithoutEffect) {
-                    return Outcome::Done(None);
-                }
-                if self.maps.is_enabled(id, version) && self.faults.has(F::R3EnableTwiceFails) {
-                    return Outcome::Failed(Problem::map(action, "the map is enabled already"));
-                }
-                if busy && known && self.enables_later(id, version) {
-                    return Outcome::Done(None);
-                }
-                if busy && self.maps.has_version(id, version) && self.faults.has(F::R2EnableIgnoredMidOrder) {
-                    return Outcome::Done(None);
-                }
-                if self.maps.has_version(id, version) && self.faults.has(F::R1EnableInTwoStates) {
-                    self.maps.disable_all(id);
-                    self.flush();
-                }
-                let result = self
-                    .maps
-                    .enable(action.text("mapId"), action.text("mapVersion"), self.faults);
+                let result = self.maps.enable(action.text("mapId"), action.text("mapVersion"));
                 result.map_err(|reason| Problem::map(action, reason)).into()
-            }
-            Deed::DeleteMap if self.takes(T::R1MapDelistedNext) => {
-                let before = self.maps.clone();
-                match self.delete_map(action) {
-                    Ok(()) => {
-                        let after = std::mem::replace(&mut self.maps, before);
-                        self.finish(&action.request.id, None);
-                        self.flush();
-                        self.maps = after;
-                        Outcome::Open
-                    }
-                    refused => refused.into(),
-                }
             }
             Deed::DeleteMap => self.delete_map(action).into(),
             Deed::StateRequest => {
-                let paused = self.holds.pause && self.faults.has(F::R1StateRequestUnansweredInPause);
-                self.report.requested = !paused && !self.faults.has(F::StateRequestUnanswered);
-                self.report.silenced = !self.report.requested;
+                self.report.requested = true;
                 Outcome::Done(None)
             }
             Deed::LogReport => {
                 self.logs += 1;
                 let name = format!("log-{}.txt", self.logs);
-                if self.tells_logs() {
-                    self.last_log = Some((action.request.id.clone(), name));
-                    return Outcome::Done(None);
-                }
-                Outcome::Done(Some(name).filter(|_| !self.faults.has(F::LogNameMissing)))
+                Outcome::Done(Some(name))
             }
             Deed::Pick => self.pick(action).into(),
             Deed::Drop => self.put_down(action).into(),
             Deed::DetectObject => self.detect(action),
             Deed::FinePositioning => self.align(action).into(),
             Deed::FactsheetRequest => {
-                let mid_order = self.is_busy() && self.faults.has(F::R1FactsheetNotMidOrder);
-                let again = std::mem::replace(&mut self.connection.factsheet_given, true);
-                let again = again && self.faults.has(F::R2FactsheetOnlyOnce);
-                if !self.faults.has(F::FactsheetRequestUnanswered) && !mid_order && !again {
-                    self.connection.factsheet_asked = true;
-                    self.publish_factsheet();
-                    self.connection.factsheet_asked = false;
-                }
+                self.connection.factsheet_asked = true;
+                self.publish_factsheet();
+                self.connection.factsheet_asked = false;
                 Outcome::Done(None)
             }
             Deed::WaitForTrigger | Deed::WarningLights | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
@@ -342,59 +255,18 @@ impl Agv {
                 self.cancel_order(&action.request.id);
                 Outcome::Open
             }
-            Deed::DownloadMap => {
-                self.begin_download(&action.request.id);
-                Outcome::Open
-            }
+            Deed::DownloadMap => self.begin_download(&action.request.id),
         }
-    }
-
-    /// Whether the name of a log is in the information instead of the result of its action.
-    pub(crate) fn tells_logs(&self) -> bool {
-        self.takes(T::R2LogNameInInformation)
-            && !self.takes(T::R1InformationOmitted)
-            && !self.takes(T::R4OptionalStateFieldsLeftOut)
     }
 
     /// Whether a switch forbids what a message asks for (ACT-16).
     fn is_pause_blocked(&self) -> bool {
-        self.pause_blocked && !self.faults.has(F::ButtonPauseOverridden)
+        self.allows(Permission::HeedSwitch, self.pause_blocked)
     }
 
     fn start_pause(&mut self, action: &Action) -> Outcome {
-        self.end_braking();
         if self.is_pause_blocked() {
-            if self.faults.has(F::BlockedPauseTaken) {
-                self.set_holds(|holds| holds.pause = true);
-            }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle from pausing"));
-        }
-        if self.has_nothing_to_pause() {
-            return Outcome::Failed(Problem::unable(action, "there is no order to pause"));
-        }
-        self.pauses += u32::from(self.faults.has(F::PausesCounted));
-        if self.holds.pause && self.faults.has(F::PauseTwiceFails) {
-            return Outcome::Failed(Problem::unable(action, "the vehicle is paused already"));
-        }
-        if self.holds.pause && self.faults.has(F::R6SecondStartPauseResumes) {
-            self.set_holds(|holds| holds.pause = false);
-            return Outcome::Done(None);
-        }
-        if self.faults.has(F::R1PauseCutsHorizon) {
-            let gone = self.book.drop_horizon();
-            self.actions.retain(|action| match action.origin {
-                Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
-                Origin::Instant => true,
-            });
-        }
-        if self.faults.has(F::PauseDropsOrder) {
-            self.give_up_order();
-        }
-        if self.motion.is_moving() && self.faults.has(F::R3PauseFinishedBeforeStanding) {
-            self.third.braking = Some(self.moment() + Duration::from_secs(1));
-        }
-        if !self.holds.pause && self.faults.has(F::R2PausedFlagLate) {
-            self.pause_hidden_until = Some(self.moment() + Duration::from_millis(1_500));
         }
         self.set_holds(|holds| holds.pause = true);
         Outcome::Done(None)
@@ -403,168 +275,76 @@ impl Agv {
     /// A pause made with the button is lifted with the button (ACT-16).
     fn stop_pause(&mut self, action: &Action) -> Outcome {
         if self.is_pause_blocked() {
-            if self.faults.has(F::BlockedPauseTaken) {
-                self.set_holds(|holds| holds.pause = false);
-            }
             return Outcome::Failed(Problem::unable(action, "a switch keeps the vehicle paused"));
         }
-        if !self.holds.pause && self.faults.has(F::R1StopPauseTwiceFails) {
-            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
-        }
-        if (self.holds.button || self.holds.emergency) && !self.faults.has(F::ButtonPauseOverridden) {
+        if self.allows(Permission::HeedSwitch, self.holds.button || self.holds.emergency) {
             return Outcome::Failed(Problem::unable(action, "the vehicle is stopped by hand"));
         }
-        if !self.holds.pause && self.faults.has(F::StopPauseIdleFails) {
-            return Outcome::Failed(Problem::unable(action, "the vehicle is not paused"));
-        }
-        self.pauses = self.pauses.saturating_sub(1);
-        if self.pauses > 0 {
-            return Outcome::Done(None);
-        }
-        if self.pause_outlives {
-            return Outcome::Done(None);
-        }
-        if self.faults.has(F::PauseNotLifted) {
-            self.set_holds(|holds| holds.stuck |= holds.pause);
-        }
-        let waits = self.book.nodes.front().is_some_and(|stop| !stop.node.released);
-        self.book.unbound |= waits && self.holds.pause && self.faults.has(F::R1HorizonDrivenAfterPause);
-        self.book.hurried |= self.book.entered && self.holds.pause && self.faults.has(F::R1MaxSpeedForgottenInPause);
-        self.book.heedless = false;
-        self.book.unblocked |= self.holds.pause && self.faults.has(F::R2BlockingForgottenAfterPause);
-        if self.holds.pause && self.faults.has(F::R2PauseForgetsQueue) {
-            self.actions.drop_lists();
-        }
         self.set_holds(|holds| holds.pause = false);
-        if self.faults.has(F::PausedOrderSurvivesCancel)
-            && let Some(order) = self.remembered.take()
-        {
-            self.book = order;
-        }
         Outcome::Done(None)
-    }
-
-    /// What was held goes on at the next cycle (`resumes-in-a-moment`).
-    pub(crate) fn resume_if_due(&mut self) {
-        let moment = self.moment();
-        if self.resumes_at.take_if(|at| *at <= moment).is_some() && !self.holds.any() {
-            self.actions.resume(moment, self.faults);
-        }
     }
 
     /// Changes what holds the vehicle; actions are held and go on with it (ACT-15, ACT-18).
     pub(crate) fn set_holds(&mut self, change: impl FnOnce(&mut super::Holds)) {
-        let before = self.holds.any();
-        let field = self.holds.field;
-        let paused = self.holds.pause;
+        let before = self.holds;
         change(&mut self.holds);
         let moment = self.moment();
-        let by_message = self.holds.pause && !self.holds.button && !self.holds.emergency && !self.holds.field;
-        let only_field = !(self.holds.pause || self.holds.button || self.holds.emergency);
-        match (before, self.holds.any()) {
-            (false, true) if only_field && self.faults.has(F::FieldDoesNotPause) => {}
-            (true, false) if paused && self.faults.has(F::R3PausedActionsStayPaused) => {}
-            (true, false) if field && self.faults.has(F::FieldPauseStuck) => {}
-            (false, true) if by_message && self.takes(T::R1ActionsRunOnInPause) => {}
-            (false, true) => self.actions.hold(moment, self.faults),
-            (true, false) if self.takes(T::ResumesInAMoment) => self.resumes_at = Some(moment + RESUMING),
+        match (before.any(), self.holds.any()) {
+            (false, true) if self.allows(Permission::HoldActions, true) => {
+                self.actions.hold(moment);
+                self.happens(Event::Held);
+            }
             (true, false) => {
-                self.note_what_waits_again();
-                self.actions.resume(moment, self.faults);
+                self.happens(Event::Resuming);
+                if self.allows(Permission::ResumeActions(before), true) {
+                    self.actions.resume(moment);
+                }
             }
             _ => {}
         }
     }
 
-    fn init_position(&mut self, action: &Action) -> Result<(), Problem> {
+    /// Finds itself where it is told that it is (ACT-23, ACT-24), if that can be (ACT-25).
+    pub(crate) fn init_position(&mut self, action: &Action) -> Result<(), Problem> {
         let invalid = |reason: &str| Err(Problem::new(Area::Localization, action, reason));
         let number = |key: &str| action.number(key).filter(|number| number.is_finite());
         let (Some(x), Some(y), Some(theta)) = (number("x"), number("y"), number("theta")) else {
             return invalid("the pose is not complete");
         };
-        let y = if self.faults.has(F::AxesMirrored) { -y } else { y };
-        let unchecked = self.faults.has(F::InitPositionUnchecked);
-        if !unchecked && (x.abs() > FARTHEST || y.abs() > FARTHEST || theta.abs() > PI + 0.01) {
+        if x.abs() > FARTHEST || y.abs() > FARTHEST || theta.abs() > PI + 0.01 {
             return invalid("the pose is on no map");
         }
         let map_id = action.text("mapId");
-        let any_map = unchecked || self.faults.has(F::R6InitPositionAnyMap);
-        if !any_map && !self.maps.on_board(map_id) {
-            self.take_map_anyway(action);
+        if !self.maps.on_board(map_id) {
             return invalid("the map is not on board");
         }
         if action.origin == Origin::Instant && (!self.book.nodes.is_empty() || self.actions.order_unfinished()) {
             return invalid("an order is active");
         }
-        if self.faults.has(F::InitPositionWithoutEffect) {
-            return Ok(());
-        }
-        self.lost = self.faults.has(F::InitPositionUninitialized);
-        self.persona.lost = false;
-        if !self.faults.has(F::R4InitPositionOntoDisabledMap) {
-            self.maps.enable_any(map_id);
-        }
-        if self.faults.has(F::R1InitPositionEnablesAll) {
-            self.maps.enable_all(map_id);
-        }
-        let node = self.config.node(action.text("lastNodeId"));
-        let snapped = node.filter(|node| node.map_id == map_id && self.faults.has(F::R3InitPositionSnapsToNode));
-        let (x, y) = snapped.map_or((x, y), |node| (node.x, node.y));
-        let stale = action.of_order() && self.faults.has(F::LiftMapStale);
-        let stale = stale || self.faults.has(F::R6InitPositionKeepsMap);
-        let old = self.motion.pose(self.moment()).map_id;
-        let kept = self.motion.pose(self.moment());
-        let (x, y) = if self.faults.has(F::InitPositionKeepsPose) {
-            (kept.x, kept.y)
-        } else {
-            (x, y)
-        };
-        self.motion.place(Pose {
+        let pose = Pose {
             x,
             y,
-            theta: if self.faults.has(F::R1InitPositionThetaLost) {
-                0.0
-            } else {
-                theta.clamp(-PI, PI)
-            },
-            map_id: if stale { old } else { map_id.to_owned() },
-        });
-        if !self.faults.has(F::InitPositionKeepsNode) {
-            action.text("lastNodeId").clone_into(&mut self.book.last_node);
-        }
-        if !action.of_order() && self.takes(T::R1InitPositionResetsSequence) {
-            self.book.last_sequence = 0;
-        }
+            theta: theta.clamp(-PI, PI),
+            map_id: map_id.to_owned(),
+        };
+        self.take_pose(pose, action.text("lastNodeId"));
         Ok(())
     }
 
-    /// `init-position-taken-anyway`: the map of a pose that is refused.
-    pub(crate) fn take_map_anyway(&mut self, action: &Action) {
-        let init = action.kind.is_some_and(|kind| kind.deed == Deed::InitPosition);
-        if init && self.faults.has(F::InitPositionTakenAnyway) {
-            self.claimed_map = Some(action.text("mapId").to_owned());
-        }
+    /// Takes a pose over, and the node it is on.
+    pub(crate) fn take_pose(&mut self, pose: Pose, node: &str) {
+        self.find_position();
+        self.maps.enable_any(&pose.map_id);
+        self.motion.place(pose);
+        node.clone_into(&mut self.book.last_node);
     }
 
-    fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
+    /// Deletes a map that is not in use (MAP-29, MAP-32, MAP-33).
+    pub(crate) fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
         let here = self.motion.pose(self.moment()).map_id;
         let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
-        let ahead = !self.faults.has(F::R1MapOfOrderDeleted);
-        let idle = self.book.nodes.is_empty() && !self.actions.order_unfinished();
-        let free = idle && self.faults.has(F::R2CurrentMapDeletedWhenIdle);
-        let kept = self.takes(T::R4EnabledUnusedMapNotDeleted);
-        let used =
-            |map_id: &str| kept || here == map_id && !free || ahead && needed.iter().any(|needed| needed == map_id);
-        let result = self
-            .maps
-            .delete(action.text("mapId"), action.text("mapVersion"), used, self.faults);
-        if result == Err("the map is in use") && self.faults.has(F::R3UsedMapDeletionFinished) {
-            return Ok(());
-        }
-        if result.is_ok() && self.faults.has(F::R3DeletedMapBackAfterReconnect) {
-            let deleted = (action.text("mapId").to_owned(), action.text("mapVersion").to_owned());
-            self.third.deleted_maps.push(deleted);
-        }
+        let used = |map_id: &str| here == map_id || needed.iter().any(|needed| needed == map_id);
+        let result = self.maps.delete(action.text("mapId"), action.text("mapVersion"), used);
         result.map_err(|reason| Problem::map(action, reason))
     }
 }

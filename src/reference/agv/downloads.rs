@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::reference::Download;
+use crate::reference::{Download, Output};
 
 use super::Agv;
 use super::actions::Status;
-use super::deeds::Problem;
-use super::faults::FaultName as F;
+use super::deeds::{Outcome, Problem};
 use super::maps;
-use super::tolerances::ToleranceName as T;
+use super::points::{Event, Permission};
 
 /// Downloads under way: actionId by token.
 #[derive(Clone, Debug, Default)]
@@ -37,13 +36,12 @@ impl Downloads {
 
 impl Agv {
     /// A downloadMap action begins: asks for the file, if the map is new and there is room.
-    pub(crate) fn begin_download(&mut self, action_id: &str) {
+    pub(crate) fn begin_download(&mut self, action_id: &str) -> Outcome {
         let Some(action) = self.actions.get(action_id).cloned() else {
-            return;
+            return Outcome::Open;
         };
-        if let Some(error_type) = self.persona.map_refusal.clone() {
-            self.fail_as_told(&action, error_type);
-            return;
+        if self.refuses_map_as_told(&action) {
+            return Outcome::Open;
         }
         let (map_id, version, url) = (
             action.text("mapId"),
@@ -54,43 +52,29 @@ impl Agv {
         let twice = under_way
             .into_iter()
             .any(|other| other.text("mapId") == map_id && other.text("mapVersion") == version);
-        let failed = (map_id.to_owned(), version.to_owned());
-        let twice = twice || self.third.failed_downloads.contains(&failed);
-        let refusal = match self.maps.room_for(map_id, version, self.faults) {
-            Err(reason) => Some(reason),
-            Ok(()) if twice => Some("the map is being downloaded already"),
-            Ok(()) if map_id.is_empty() || version.is_empty() => Some("mapId or mapVersion is empty"),
-            Ok(()) if !(url.starts_with("http://") || url.starts_with("https://")) => Some("the link is not HTTP"),
-            Ok(()) => None,
+        let known = self.maps.has_version(map_id, version) && !self.allows(Permission::DownloadAgain, false);
+        let refusal = match () {
+            () if known => Some("the map is on board already"),
+            () if self.maps.is_full() => Some("there is no room for another map"),
+            () if twice => Some("the map is being downloaded already"),
+            () if map_id.is_empty() || version.is_empty() => Some("mapId or mapVersion is empty"),
+            () if !(url.starts_with("http://") || url.starts_with("https://")) => Some("the link is not HTTP"),
+            () => None,
         };
         if let Some(reason) = refusal {
-            let silent = self.faults.has(F::DuplicateMapSilent) && reason.contains("already")
-                || self.faults.has(F::StorageFullSilent) && reason.contains("room");
-            self.fail(action_id, &Problem::map(&action, reason).silent_if(silent));
-            self.renumber_if(F::FailedDownloadRenumbers);
-            return;
-        }
-        if self.faults.has(F::MapNotFetched) {
-            self.maps.store(map_id, version, self.faults);
-            self.finish(action_id, None);
-            return;
+            return Outcome::Failed(Problem::map(&action, reason));
         }
         let token = self.downloads.next;
         self.downloads.next += 1;
         self.downloads.under_way.insert(token, action_id.to_owned());
         let url = url.to_owned();
-        let queued = self.takes(T::R6LibDownloadQueued);
-        self.fetch(token, url, queued);
-        if self.faults.has(F::MapListedWhileLoading) {
-            self.maps.store(map_id, version, self.faults);
-        }
+        self.pending.push(Output::Fetch { token, url });
         let due = self.moment() + self.config.download_timeout;
-        let due = if queued { due + super::sixth::QUEUING } else { due };
-        let at_once = self.takes(T::R1DownloadRunsAtOnce);
         if let Some(action) = self.actions.get_mut(action_id) {
-            action.status = if at_once { Status::Running } else { Status::Initializing };
+            action.status = Status::Initializing;
             action.due = Some(due);
         }
+        Outcome::Open
     }
 
     /// The server was heard of.
@@ -100,11 +84,10 @@ impl Agv {
         };
         match progress {
             Download::Begun => {
-                let finished = self.faults.has(F::DownloadFinishedEarly);
-                let running = !self.faults.has(F::DownloadNeverRunning);
-                if let Some(action) = self.actions.get_mut(&action_id).filter(|_| running) {
-                    action.status = if finished { Status::Finished } else { Status::Running };
+                if let Some(action) = self.actions.get_mut(&action_id) {
+                    action.status = Status::Running;
                 }
+                self.happens(Event::DownloadRunning);
             }
             Download::Done(file) => self.download_done(&action_id, &file),
             Download::Failed(reason) => {
@@ -120,59 +103,24 @@ impl Agv {
         };
         if file.is_empty() {
             self.download_failed(action_id, "the file is empty");
-        } else if !maps::hash_fits(file, action.text("mapHash")) && !self.faults.has(F::HashIgnored) {
+        } else if !maps::hash_fits(file, action.text("mapHash")) && self.allows(Permission::CheckHash, true) {
             self.download_failed(action_id, "the file does not have the announced hash");
         } else {
             self.downloads.forget(action_id);
-            self.renumber_if(F::DownloadRenumbers);
-            if self.takes(T::R1MapListedNext) {
-                self.finish(action_id, None);
-                self.flush();
-            }
-            self.maps
-                .store(action.text("mapId"), action.text("mapVersion"), self.faults);
-            if self.faults.has(F::DownloadNeverEnds) {
-                return;
-            }
-            self.finish(action_id, None);
+            self.happens(Event::Downloaded);
+            self.maps.store(action.text("mapId"), action.text("mapVersion"));
+            let outcome = self.turned_out(&action, Outcome::Done(None));
+            self.conclude(action_id, outcome);
         }
     }
 
     /// The map did not arrive; all else stays as it was (MAP-19, MAP-22).
     pub(crate) fn download_failed(&mut self, action_id: &str, reason: &str) {
         self.downloads.forget(action_id);
-        if self.faults.has(F::R1DownloadFailureHangs) {
-            if let Some(action) = self.actions.get_mut(action_id) {
-                action.due = None;
-            }
-            return;
-        }
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
-        if self.faults.has(F::DownloadFailureFinished) {
-            self.finish(action_id, None);
-            return;
-        }
-        if self.faults.has(F::R2BrokenDownloadListed) {
-            let (id, version) = (action.text("mapId"), action.text("mapVersion"));
-            self.maps.store(id, version, self.faults);
-        }
-        if self.faults.has(F::R1FailedDownloadPurges) {
-            self.maps.purge(action.text("mapId"));
-        }
-        if self.faults.has(F::R3FailedDownloadBlocksRetry) {
-            let failed = (action.text("mapId").to_owned(), action.text("mapVersion").to_owned());
-            self.third.failed_downloads.push(failed);
-        }
-        let silent = self.faults.has(F::DownloadFailureSilent);
-        self.fail(action_id, &Problem::map(&action, reason).silent_if(silent));
-        self.renumber_if(F::FailedDownloadRenumbers);
-    }
-
-    fn renumber_if(&mut self, fault: F) {
-        if self.faults.has(fault) {
-            self.maps.renumber();
-        }
+        let outcome = self.turned_out(&action, Outcome::Failed(Problem::map(&action, reason)));
+        self.conclude(action_id, outcome);
     }
 }

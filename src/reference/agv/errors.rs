@@ -1,12 +1,8 @@
 //! The active errors of the vehicle and how long each of them is reported.
 
-use std::time::Duration;
-
 use serde_json::{Value, json};
 
 use crate::clock::Moment;
-
-use super::faults::{FaultName as F, Faults};
 
 /// At most this many errors are reported; older ones give way.
 pub(crate) const MAX_ERRORS: usize = 20;
@@ -24,7 +20,7 @@ pub(crate) enum Life {
     WhileOutside,
     /// While the vehicle itself has a defect.
     WhileDefective,
-    /// Never (`r6-action-errors-never-clear` only).
+    /// Never.
     Always,
 }
 
@@ -42,12 +38,7 @@ pub(crate) struct ActiveError {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Errors {
     pub(crate) active: Vec<ActiveError>,
-    /// What a faulty vehicle says instead of an error, from a moment on.
-    pub(crate) corrected: Option<(Moment, ActiveError, ActiveError)>,
 }
-
-/// How long a faulty vehicle stands by a wrong report.
-const CORRECTION: Duration = Duration::from_millis(800);
 
 impl Errors {
     /// Adds an error; one with the same type and references is replaced.
@@ -62,27 +53,8 @@ impl Errors {
         self.active.push(error);
     }
 
-    /// Reports that something was refused. A faulty vehicle does it wrong at first.
-    pub(crate) fn refused(&mut self, right: ActiveError, now: Moment, faults: Faults) {
-        let mut wrong = right.clone();
-        if faults.has(F::RefusalLevelCorrected) {
-            wrong.fatal = !right.fatal;
-        } else if faults.has(F::RefusalTypeCorrected) {
-            "internalError".clone_into(&mut wrong.error_type);
-        } else if faults.has(F::RefusalReferencesCorrected) {
-            wrong.references.clear();
-        } else {
-            self.raise(right);
-            return;
-        }
-        wrong.life = Life::UntilNewOrder;
-        self.raise(wrong.clone());
-        self.corrected = Some((now + CORRECTION, wrong, right));
-    }
-
     /// A new order was accepted.
     pub(crate) fn new_order(&mut self) {
-        self.corrected = None;
         self.active.retain(|error| {
             matches!(
                 error.life,
@@ -91,25 +63,9 @@ impl Errors {
         });
     }
 
-    /// `r2-rejection-cleared-by-instant-action`: forgets what was refused.
+    /// Forgets what was refused.
     pub(crate) fn forget_refusals(&mut self) {
         self.active.retain(|error| error.life != Life::UntilNewOrder);
-    }
-
-    /// `r4-new-rejection-replaces-old-warning`: forgets the orders that were refused.
-    pub(crate) fn forget_refused_orders(&mut self) {
-        let of_order = |error: &ActiveError| {
-            let mut references = error.references.iter();
-            references.any(|(key, value)| key == "topic" && value == "order")
-        };
-        self.active.retain(|error| !of_order(error));
-    }
-
-    /// What the error of that type references, if there is one (`r6-no-order-to-cancel-keeps-first-id` only).
-    pub(crate) fn references_of(&self, error_type: &str) -> Option<Vec<(String, String)>> {
-        let mut listed = self.active.iter();
-        let found = listed.find(|error| error.error_type == error_type)?;
-        Some(found.references.clone())
     }
 
     /// Whether anything that was refused is still listed.
@@ -134,10 +90,6 @@ impl Errors {
 
     /// Drops what has run out.
     pub(crate) fn expire(&mut self, now: Moment) {
-        if let Some((_, wrong, right)) = self.corrected.take_if(|(due, _, _)| *due <= now) {
-            self.active.retain(|error| *error != wrong);
-            self.raise(right);
-        }
         self.active
             .retain(|error| !matches!(error.life, Life::Until(end) if end <= now));
     }
@@ -148,7 +100,7 @@ impl Errors {
             Life::Until(end) => Some(end),
             _ => None,
         });
-        ends.chain(self.corrected.as_ref().map(|(due, _, _)| *due)).min()
+        ends.min()
     }
 
     /// Whether nothing is wrong.
@@ -159,7 +111,6 @@ impl Errors {
     /// Forgets everything.
     pub(crate) fn clear(&mut self) {
         self.active.clear();
-        self.corrected = None;
     }
 }
 

@@ -3,12 +3,11 @@
 use serde_json::{Map, Value, json};
 
 use super::ability::SLOWEST;
-use super::action_kinds::{self, ActionKind, Deed, LOAD_POSITIONS, MAX_HEIGHT};
+use super::action_kinds::{self, ActionKind, LOAD_POSITIONS, MAX_HEIGHT};
 use super::errors::MAX_ERRORS;
 use super::path::{HALF_LENGTH, HALF_WIDTH};
 use super::points::Part;
 use super::read::MAX_STRING;
-use super::tolerances::ToleranceName as T;
 use super::{Agv, AgvConfig};
 
 /// Optional parameters the vehicle acts on.
@@ -71,15 +70,6 @@ impl Agv {
         if self.config.has("vehicleConfig") {
             let version = env!("CARGO_PKG_VERSION");
             factsheet["vehicleConfig"] = json!({ "versions": [{ "key": "softwareVersion", "value": version }] });
-            if self.takes(T::R3NetworkTold) {
-                factsheet["vehicleConfig"]["network"] = json!({
-                    "dnsServers": ["10.1.0.1"],
-                    "ntpServers": ["10.1.0.2"],
-                    "localIpAddress": "10.1.0.20",
-                    "netmask": "255.255.255.0",
-                    "defaultGateway": "10.1.0.1",
-                });
-            }
         }
         if let Value::Object(body) = &mut factsheet {
             self.says(Part::Factsheet, body);
@@ -121,7 +111,6 @@ impl Agv {
 
     fn protocol_limits(&self) -> Value {
         let nodes = self.config.max_nodes;
-        let min_order_interval = if self.takes(T::OrdersSpaced) { 0.25 } else { 0.0 };
         let mut limits = json!({
             "maxStringLens": {
                 "msgLen": self.config.max_message,
@@ -141,20 +130,11 @@ impl Agv {
                 "state.errors": MAX_ERRORS,
             },
             "timing": {
-                "minOrderInterval": min_order_interval,
+                "minOrderInterval": 0.0,
                 "minStateInterval": self.config.min_state_interval.as_secs_f64(),
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },
         });
-        // What else it takes in little would not be true then.
-        if self.takes(T::R4LimitsOfZeroInFactsheet) && !self.takes(T::LittleFits) {
-            for list in ["maxStringLens", "maxArrayLens"] {
-                let members = limits[list].as_object_mut().into_iter().flat_map(Map::values_mut);
-                members
-                    .filter(|limit| limit.is_number())
-                    .for_each(|limit| *limit = json!(0));
-            }
-        }
         if let Some(interval) = self.config.visualization_interval {
             limits["timing"]["visualizationInterval"] = json!(interval.as_secs_f64());
         }
@@ -186,15 +166,6 @@ impl Agv {
         let actions: Vec<Value> = action_kinds::offered(&self.config)
             .map(|kind| self.action_picture(kind))
             .collect();
-        let reversed = self.takes(super::tolerances::ToleranceName::R1FactsheetListsReversed);
-        let (parameters, actions): (Vec<Value>, Vec<Value>) = if reversed {
-            (
-                parameters.into_iter().rev().collect(),
-                actions.into_iter().rev().collect(),
-            )
-        } else {
-            (parameters, actions)
-        };
         json!({ "optionalParameters": parameters, "agvActions": actions })
     }
 
@@ -206,23 +177,15 @@ impl Agv {
         picture.insert("actionScopes".into(), json!(scopes));
         if !kind.parameters.is_empty() {
             let parameters = kind.parameters.iter().map(|parameter| {
-                let mut picture = json!({
+                json!({
                     "key": parameter.key,
                     "valueDataType": parameter.data_type,
                     "isOptional": parameter.optional,
-                });
-                if let Some(fields) = picture
-                    .as_object_mut()
-                    .filter(|_| !parameter.optional && self.takes(T::R3OptionalFlagOmitted))
-                {
-                    fields.remove("isOptional");
-                }
-                picture
+                })
             });
             picture.insert("actionParameters".into(), parameters.collect());
         }
-        let told = kind.deed == Deed::LogReport && self.tells_logs();
-        if let Some(result) = kind.result.filter(|_| !told) {
+        if let Some(result) = kind.result {
             picture.insert("resultDescription".into(), json!(result));
         }
         if self.config.has("vehicleConfig") {

@@ -3,14 +3,13 @@
 use serde_json::Value;
 
 use super::Agv;
-use super::action_kinds::{self, Scope};
+use super::action_kinds::{self, ActionKind, Scope};
 use super::actions::{Action, Origin, Status};
 use super::deeds::Problem;
 use super::errors::{ActiveError, Life};
-use super::faults::FaultName as F;
 use super::order_message::{ActionRequest, Blocking, read_parameters};
+use super::points::{Cause, Event, Permission};
 use super::read::{Defect, Fields};
-use super::tolerances::ToleranceName as T;
 
 /// At most this many actions of one message are taken.
 pub(crate) const MAX_INSTANT_ACTIONS: usize = 50;
@@ -21,9 +20,6 @@ const MAX_REMEMBERED: usize = 500;
 impl Agv {
     /// Takes an instantActions message.
     pub(crate) fn instant_actions_received(&mut self, payload: &[u8]) {
-        if self.deaf {
-            return;
-        }
         let too_long = payload.len() > self.config.max_message;
         let message = if too_long {
             None
@@ -42,76 +38,26 @@ impl Agv {
             self.malformed("the message has no array of actions");
             return;
         };
-        if !elements.is_empty() && self.faults.has(F::R2RejectionClearedByInstantAction) {
-            self.errors.forget_refusals();
-        }
-        if self.faults.has(F::LastInstantActionOnly) {
-            self.actions
-                .retain(|action| action.of_order() || !action.status.is_terminal());
-        }
-        if self.faults.has(F::InstantActionFadesAway) {
-            self.actions
-                .retain(|action| action.of_order() || action.status.is_terminal());
-        }
-        let limit = if self.faults.has(F::OnlyFirstInstantAction) {
-            1
-        } else {
-            self.config.max_instant_actions
-        };
-        let mut types: Vec<&Value> = Vec::new();
         let mut elements: Vec<&Value> = elements.iter().collect();
-        if self.takes(T::R3BatchReversed) {
-            elements.reverse();
-        }
-        for element in elements.iter().copied().take(limit) {
-            if let Some(action_type) = element
-                .get("actionType")
-                .filter(|_| self.faults.has(F::R2SameTypeInMessageDropped))
-            {
-                if types.contains(&action_type) {
-                    continue;
-                }
-                types.push(action_type);
-            }
-            self.instant_action(element);
-            let id = element.get("actionId").and_then(Value::as_str).unwrap_or_default();
-            let failed = self
-                .actions
-                .get(id)
-                .is_some_and(|action| action.status == Status::Failed);
-            if failed && self.faults.has(F::R1BatchEndsAtFailure) {
-                break;
-            }
-            let unknown = self.actions.get(id).is_some_and(|action| action.kind.is_none());
-            if unknown && self.faults.has(F::R4UnknownActionEndsTheMessage) {
-                break;
+        self.reads_instants(&mut elements);
+        let limit = self.config.max_instant_actions;
+        for element in elements.into_iter().take(limit) {
+            if self.allows(Permission::TakeInstant, true) {
+                self.instant_action(element);
             }
         }
-        if !elements.is_empty() && self.faults.has(F::R2AcknowledgesOnInstantActions) {
-            self.acknowledge_instant_actions();
-        }
+        self.happens(Event::InstantsRead);
     }
 
     fn malformed(&mut self, reason: &str) {
-        self.malformed_side_effects();
-        if self.takes(T::R2UnreadableInstantIgnored) && reason.starts_with("the message") {
-            return;
-        }
-        self.errors.raise(ActiveError {
+        let error = ActiveError {
             error_type: self.config.errors.validation.clone(),
             fatal: false,
             references: vec![("topic".into(), "instantActions".into())],
             description: reason.to_owned(),
             life: Life::UntilNewOrder,
-        });
-    }
-
-    /// What a faulty vehicle does beside refusing.
-    fn malformed_side_effects(&mut self) {
-        self.deaf |= self.faults.has(F::MalformedInstantDeafens);
-        if self.faults.has(F::MalformedInstantStopsOrder) {
-            self.give_up_order();
-        }
+        };
+        self.raise(Cause::Unreadable(reason), error);
     }
 
     fn instant_action(&mut self, element: &Value) {
@@ -129,90 +75,29 @@ impl Agv {
         }
         let (request, defect) = read_leniently(&fields, id.clone());
         let kind = action_kinds::find(&self.config, &request.action_type);
-        let anywhere = self.faults.has(F::R1InstantScopeUnchecked);
-        let fit = kind.filter(|kind| kind.scopes.contains(&Scope::Instant) || anywhere);
-        let by_hand = self.mode == super::Mode::Semiautomatic && self.faults.has(F::R1SemiautomaticInstantRefused);
-        let fit = fit.filter(|_| !by_hand);
-        let fit = fit
-            .filter(|kind| kind.deed != action_kinds::Deed::LogReport || !self.faults.has(F::R2LogReportListedRefused));
-        let not_understood = |kind: &&action_kinds::ActionKind| {
-            kind.deed == action_kinds::Deed::StateRequest && self.faults.has(F::StateRequestListedRefused)
-        };
-        let fit = fit.filter(|kind| !not_understood(kind));
+        let instant = |kind: &&ActionKind| kind.scopes.contains(&Scope::Instant);
+        let fit = kind.filter(|kind| self.allows(Permission::Fit(kind), instant(kind)));
         let refusal = match (&defect, fit) {
             (Some(defect), _) => Some(format!("{} {}", defect.path, defect.reason)),
             (None, None) => Some("the vehicle does not offer the action as an instant action".to_owned()),
             (None, Some(kind)) => {
-                let nodeless = kind.deed == action_kinds::Deed::InitPosition
-                    && request.parameter("lastNodeId").is_none()
-                    && self.faults.has(F::R2InitPositionWithoutNodeTaken);
                 let found = action_kinds::refusal(kind, &request, &self.config, false);
-                let found = found.filter(|(key, _)| !(nodeless && key == "lastNodeId"));
                 found.map(|(key, reason)| format!("{key}: {reason}"))
             }
         };
         if defect.is_some() {
-            self.malformed_side_effects();
+            self.happens(Event::InstantUnreadable);
         }
-        let warned = !self.errors.is_empty() && self.faults.has(F::R4WarningBlocksInstantActions);
-        let refusal = refusal.or_else(|| warned.then(|| "there are warnings".to_owned()));
         self.make_room();
         let action = Action::waiting(request, kind, Origin::Instant);
         self.actions.push(action.clone());
         match refusal {
-            Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantWaits) => {}
-            Some(_) if fit.is_none() && self.faults.has(F::UnknownInstantFinished) => self.finish(&id, None),
-            Some(_) if kind.is_none() && self.faults.has(F::R1UnknownInstantWaits) => {}
-            Some(_) if fit.is_some() && defect.is_none() && self.faults.has(F::R2BadParameterInstantFinished) => {
-                self.finish(&id, None);
+            Some(reason) if self.allows(Permission::RefuseInstant(&action), true) => {
+                self.fail(&id, &Problem::unable(&action, &reason));
             }
-            None if !self.downloads.is_idle()
-                && self.faults.has(F::R3InstantWaitsForDownload)
-                && !matches!(
-                    action.request.action_type.as_str(),
-                    "startPause" | "stopPause" | "cancelOrder"
-                ) => {}
-            None if self.is_acting()
-                && self.faults.has(F::R2InstantWaitsForRunningAction)
-                && !matches!(
-                    action.request.action_type.as_str(),
-                    "startPause" | "stopPause" | "cancelOrder"
-                ) => {}
-            None if self.acts_alone() && self.faults.has(F::R6InstantActionWaitsForHardAction) => {}
-            None if self.holds.pause
-                && self.faults.has(F::R1InstantActionsWaitForPause)
-                && !matches!(
-                    action.request.action_type.as_str(),
-                    "startPause" | "stopPause" | "cancelOrder"
-                ) => {}
-            Some(reason) => {
-                self.take_map_anyway(&action);
-                let silent = self.faults.has(F::UnknownInstantSilent)
-                    || self.takes(super::tolerances::ToleranceName::R1RefusedInstantWithoutError);
-                let mut problem = Problem::unable(&action, &reason).silent_if(silent);
-                if self.faults.has(F::UnknownInstantUnreferenced) {
-                    problem.references.clear();
-                }
-                self.fail(&id, &problem);
-            }
-            None if self.faults.has(F::InstantActionDeferred) && action.request.action_type != "cancelOrder" => {}
-            None => self.begin_instant(&id),
+            None if self.allows(Permission::BeginInstant(&action), true) => self.begin_instant(&id),
+            _ => {}
         }
-    }
-
-    /// Whether an action of the order is under way.
-    fn is_acting(&self) -> bool {
-        self.actions
-            .iter()
-            .any(|action| action.of_order() && action.status.is_active())
-    }
-
-    /// Whether a HARD action of a node is under way.
-    fn acts_alone(&self) -> bool {
-        self.actions.iter().any(|action| {
-            let of_node = matches!(action.origin, Origin::Node(_));
-            of_node && action.request.blocking == Blocking::Hard && action.status.is_active()
-        })
     }
 
     fn make_room(&mut self) {
@@ -230,49 +115,23 @@ impl Agv {
     }
 
     fn begin_instant(&mut self, id: &str) {
-        if self.faults.has(F::UndescribedStatus)
-            && let Some(action) = self.actions.get_mut(id)
-        {
-            action.status = Status::Initializing;
-            self.flush();
-        }
-        let lasting = self
-            .actions
-            .get(id)
-            .and_then(|action| action.kind)
-            .is_some_and(|kind| kind.lasting || self.takes_time(kind.deed));
+        let lasting = self.actions.get(id).is_some_and(|action| {
+            let usual = action.kind.is_some_and(|kind| kind.lasting);
+            self.allows(Permission::TakeTime(action), usual)
+        });
+        self.happens(Event::InstantBegun);
         if lasting {
-            self.brake_if_slow(id);
             self.run_action(id);
         } else {
             self.complete(id);
         }
     }
 
-    /// Whether it says RUNNING before an action that others do at once is done.
-    fn takes_time(&self, deed: action_kinds::Deed) -> bool {
-        use action_kinds::Deed;
-        match deed {
-            Deed::StartPause if self.motion.is_moving() && self.takes(T::R4BrakesLongOnPause) => true,
-            Deed::StartPause | Deed::StopPause => self.takes(T::R2PauseTakesTime),
-            Deed::InitPosition => self.takes(T::R2InitPositionTakesTime),
-            Deed::EnableMap | Deed::DeleteMap => self.takes(T::R2MapActionsTakeTime),
-            _ => false,
-        }
-    }
-
-    /// `instant-action-deferred`: begins what had to wait for the end of the order.
-    pub(crate) fn begin_deferred(&mut self) -> bool {
-        let after_pause = self.faults.has(F::R1InstantActionsWaitForPause) && !self.holds.pause;
-        let after_order = self.faults.has(F::InstantActionDeferred) && !self.is_busy();
-        let after_action = self.faults.has(F::R2InstantWaitsForRunningAction) && !self.is_acting();
-        let after_download = self.faults.has(F::R3InstantWaitsForDownload) && self.downloads.is_idle();
-        let after_hard = self.faults.has(F::R6InstantActionWaitsForHardAction) && !self.acts_alone();
-        if !after_pause && !after_order && !after_action && !after_download && !after_hard {
-            return false;
-        }
-        let waits = |action: &&Action| !action.of_order() && action.status == Status::Waiting;
-        let next = self.actions.iter().find(waits).map(|action| action.request.id.clone());
+    /// Begins an instant action that had to wait, if there is one.
+    pub(crate) fn begin_waiting_instants(&mut self) -> bool {
+        let waits = |action: &&Action| !action.of_order() && action.status == Status::Waiting && action.held.is_none();
+        let begins = |action: &&Action| waits(action) && self.allows(Permission::BeginInstant(action), true);
+        let next = self.actions.iter().find(begins).map(Action::id);
         if let Some(id) = &next {
             self.begin_instant(id);
         }

@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 use super::Agv;
 use super::book::{Place, Stop};
 use super::errors::{ActiveError, Life};
-use super::faults::FaultName as F;
 use super::order_message::{Corridor, Edge, Node};
+use super::points::{Cause, Event, Permission};
 use super::rejection::{Refusal, Rule};
 use crate::nurbs::Path;
 
@@ -41,15 +41,12 @@ const POINTS: u32 = 48;
 impl Agv {
     /// The path over the rest of an edge with a trajectory, from where the vehicle is; `None` on a straight edge.
     pub(crate) fn curve_ahead(&self, edge: &Edge, stop: &Stop) -> Option<Path> {
-        let trajectory = edge
-            .trajectory
-            .as_ref()
-            .filter(|_| !self.faults.has(F::TrajectoryCut))?;
+        let whole = edge.trajectory.as_ref()?.path.clone();
         let path = match self.detour(edge) {
-            Some(lateral) => beside(&trajectory.path, lateral),
-            None if self.faults.has(F::R4DrivesTheControlPolygon) => super::fourth::control_polygon(&trajectory.sent),
-            None => trajectory.path.clone(),
+            Some(lateral) => beside(&whole, lateral),
+            None => whole,
         };
+        let path = self.bends(edge, path)?;
         let pose = self.motion.pose(self.moment());
         let beside = path.beside(pose.x, pose.y)?;
         let rest = if self.book.entered {
@@ -71,18 +68,7 @@ impl Agv {
     /// The corridor as the vehicle understands it.
     fn corridor(&self, edge: &Edge) -> Option<Corridor> {
         let mut corridor = edge.corridor?;
-        if self.faults.has(F::CorridorOverrun) {
-            corridor.left *= 2.0;
-            corridor.right *= 2.0;
-        }
-        if self.faults.has(F::R2CorridorSidesSwapped) {
-            std::mem::swap(&mut corridor.left, &mut corridor.right);
-        }
-        if self.faults.has(F::R6CorridorIsSymmetric) {
-            let wider = corridor.left.max(corridor.right);
-            (corridor.left, corridor.right) = (wider, wider);
-        }
-        corridor.contour &= !self.faults.has(F::CorridorContourIgnored);
+        self.keeps_to(&mut corridor);
         Some(corridor)
     }
 
@@ -105,18 +91,17 @@ impl Agv {
         if self.holds.outside || self.strayed || !self.book.entered {
             return false;
         }
-        let edge = self.book.edge_ahead();
-        let of_update = |edge: &&Edge| self.fourth.joints.is_some_and(|(first, _)| edge.sequence_id > first);
-        let edge = edge.filter(|edge| !(of_update(edge) && self.faults.has(F::R4CorridorOfUpdateNotWatched)));
-        let Some((corridor, trajectory)) = edge.and_then(|edge| self.corridor(edge).zip(edge.trajectory.as_ref()))
-        else {
+        let Some(edge) = self.book.edge_ahead() else {
+            return false;
+        };
+        let Some((corridor, trajectory)) = self.corridor(edge).zip(edge.trajectory.as_ref()) else {
             return false;
         };
         let pose = self.motion.pose(self.moment());
         let Some(beside) = trajectory.path.beside(pose.x, pose.y) else {
             return false;
         };
-        if beside.left && self.faults.has(F::R1CorridorLeftUnwatched) {
+        if !self.allows(Permission::Watch(edge, beside.left), true) {
             return false;
         }
         let width = if beside.left { corridor.left } else { corridor.right };
@@ -125,20 +110,16 @@ impl Agv {
             return false;
         }
         self.strayed = true;
-        if !self.faults.has(F::CorridorExitSilent) {
-            self.errors.raise(ActiveError {
-                error_type: self.config.errors.outside_of_corridor.clone(),
-                fatal: true,
-                references: Vec::new(),
-                description: "the vehicle is outside the corridor of its edge".into(),
-                life: Life::WhileOutside,
-            });
-        }
-        if self.faults.has(F::CorridorExitForgotten) {
-            self.lingers_until = Some(self.moment() + super::cancel::MOMENT);
-        } else if !self.faults.has(F::CorridorExitDrivenOn) {
-            self.set_holds(|holds| holds.outside = true);
-        }
+        let error = ActiveError {
+            error_type: self.config.errors.outside_of_corridor.clone(),
+            fatal: true,
+            references: Vec::new(),
+            description: "the vehicle is outside the corridor of its edge".into(),
+            life: Life::WhileOutside,
+        };
+        self.raise(Cause::Outside, error);
+        self.set_holds(|holds| holds.outside = true);
+        self.happens(Event::Strayed);
         true
     }
 
@@ -196,18 +177,10 @@ impl Agv {
     /// Where a branch of the line leads.
     fn branch(&self, start: &str, direction: &str) -> Option<&str> {
         let branches = self.config.branches.as_ref()?;
-        let mut from_here = branches
+        let mut told = branches
             .iter()
-            .filter(|(from, ..)| from == start)
-            .cycle()
-            .take(branches.len());
-        let told = |(_, other, _): &&(String, String, String)| other == direction;
-        let found = match () {
-            () if self.faults.has(F::DirectionIgnored) => from_here.next(),
-            () if self.faults.has(F::DirectionMistaken) => from_here.find(told).and_then(|_| from_here.next()),
-            () => from_here.find(told),
-        };
-        found.map(|(.., end)| end.as_str())
+            .filter(|(from, other, _)| from == start && other == direction);
+        told.next().map(|(.., end)| end.as_str())
     }
 
     /// Where the vehicle gets to over an edge: a line-guided one to where the branch leads.
@@ -227,19 +200,13 @@ impl Agv {
     pub(crate) fn mark_below(&self) -> Option<String> {
         let pose = self.motion.pose(self.moment());
         let mut nodes = self.config.nodes.iter().filter(|_| self.config.line_guided());
-        let on = nodes.find(|node| pose.distance(node.x, node.y) <= self.config.tolerance);
+        let on = nodes.find(|node| pose.distance(node.x, node.y) <= self.config.reach);
         on.map(|node| node.id.clone())
     }
 
     /// The path a self-planning vehicle reports for an edge (STATE-14).
     pub(crate) fn planned_path(&self, edge: &Edge) -> Option<Value> {
-        if self.faults.has(F::TrajectoryWithoutPoints) {
-            return Some(json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0] }));
-        }
-        let unplanned = !edge.released && self.faults.has(F::PlannedPathOfBaseOnly);
-        let plans = self.config.plans
-            || self.takes(super::tolerances::ToleranceName::R1PathsReported) && !self.config.line_guided();
-        if !plans || unplanned || self.faults.has(F::PlannedPathMissing) {
+        if !self.allows(Permission::ReportPath, self.config.plans) {
             return None;
         }
         if let Some(trajectory) = &edge.trajectory {
@@ -253,37 +220,12 @@ impl Agv {
         let known = |id: &str| self.config.node(id).map(|node| (node.x, node.y));
         let from = stop(edge.sequence_id.checked_sub(1)?).or_else(|| known(&edge.start))?;
         let to = stop(edge.sequence_id + 1)?;
-        let mut points = vec![from, to];
-        let entered = self.book.entered && self.book.edge_ahead() == Some(edge);
-        if entered && self.faults.has(F::PlannedPathChanges) {
-            points.insert(
-                1,
-                (f64::midpoint(from.0, to.0) + 1.0, f64::midpoint(from.1, to.1) + 1.0),
-            );
-        }
-        if self.faults.has(F::PlannedPathWithoutEnds) {
-            let part = |share: f64| (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share);
-            points = vec![part(-0.7), part(0.5), part(1.7)];
-        }
-        let mut knots: Vec<f64> = vec![0.0, 0.0];
-        if points.len() == 3 {
-            knots.push(0.5);
-        }
-        knots.push(1.0);
-        if !self.faults.has(F::KnotsTooFew) {
-            knots.push(1.0);
-        }
-        if self.faults.has(F::R2KnotsNotNormalized) {
-            let length = (to.0 - from.0).hypot(to.1 - from.1).max(2.0);
-            for knot in &mut knots {
-                *knot *= length;
-            }
-        }
+        let points = [from, to];
         let points: Vec<Value> = points
             .iter()
             .map(|(x, y)| json!({ "x": x, "y": y, "weight": 1.0 }))
             .collect();
-        Some(json!({ "degree": 1, "knotVector": knots, "controlPoints": points }))
+        Some(json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0], "controlPoints": points }))
     }
 }
 

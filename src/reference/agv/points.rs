@@ -4,10 +4,14 @@
 
 use serde_json::{Map, Value};
 
-use super::actions::Action;
+use super::action_kinds::ActionKind;
+use super::actions::{Action, Origin};
 use super::book::Stop;
 use super::errors::ActiveError;
-use super::order_message::Edge;
+use super::objections::Objection;
+use super::order_message::{Edge, Node, Order};
+use super::rejection::Rule;
+use super::{Holds, Mode};
 
 /// A part of a message.
 #[derive(Clone, Copy)]
@@ -46,17 +50,151 @@ pub(crate) struct Head {
 pub(crate) enum Permission<'a> {
     /// A message of a topic name goes out at all; without header.
     Say(&'static str, &'a Map<String, Value>),
+    /// ONLINE is said on a new connection (CONN-05).
+    SayOnline,
+    /// The factsheet is published on a new connection (FACT-01).
+    SayFactsheet,
     /// DISCONNECT is sent after OFFLINE (CONN-08).
     Disconnect,
+    /// A map is downloaded that is on board already (MAP-23).
+    DownloadAgain,
+    /// It drives at all.
+    Drive,
+    /// It drives although something forbids that.
+    DriveAgainst(Hindrance),
+    /// It drives while the action is not done (BLOCK-03, BLOCK-04).
+    DriveDuring(&'a Action),
+    /// It drives over an edge without stopping for one of its actions (NODE-06).
+    PassOver(&'a Action),
+    /// It goes on to a node (ORD-07).
+    Enter,
+    /// It sets out for a node that it may go on to.
+    SetOut(&'a Stop),
+    /// It rolls as it is turned.
+    RollAsTurned,
+    /// It turns the long way round.
+    TurnTheLongWay,
+    /// A node that was reached counts as the last one (NODE-03).
+    Note(&'a Stop),
+    /// The actions of an edge end because the vehicle leaves it (NODE-05).
+    LeaveEdge,
+    /// One of them does.
+    EndWithEdge(&'a Action),
+    /// The actions of the order go on.
+    Act,
+    /// The actions of a node or an edge are triggered (NODE-04, NODE-06).
+    Trigger(Origin),
+    /// Those of a node or an edge wait for an action (BLOCK-05).
+    Await(&'a Action, Origin),
+    /// Something that is wrong with an order is overlooked.
+    Overlook(Objection<'a>),
+    /// A new order may begin at a node (ORD-04, ORD-05).
+    BeginAt(&'a Node),
+    /// An order that is known is begun once more (ORD-REJ-13).
+    BeginAgain,
+    /// An action that has not ended keeps the order from being complete (ORD-FLOW-02).
+    Count(&'a Action),
+    /// A node that is not traversed does (ORD-FLOW-03).
+    CountNode(&'a Stop),
+    /// An order is under way, so that no other one is taken over (ORD-FLOW-01).
+    BeBusy,
+    /// An action is forgotten because of a new order (ORD-FLOW-05).
+    Forget(&'a Action),
+    /// An update leaves the horizon as it is (ORD-UPD-08, ORD-UPD-09).
+    KeepHorizon(&'a Order),
+    /// An action is forgotten with the horizon (ORD-UPD-10).
+    ForgetWithHorizon,
+    /// It drives to its next node before a cancellation ends (ORD-CANCEL-09).
+    CancelAtNode,
+    /// A cancellation lasts until it has driven its way.
+    CancelAwaitsWay,
+    /// A cancellation lasts until an action has ended (ORD-CANCEL-06).
+    CancelAwaits(&'a Action),
+    /// A cancellation ends (ORD-CANCEL-07).
+    EndCancel,
+    /// What was triggered and not begun is forgotten with a cancellation.
+    ForgetQueue,
+    /// An action begins with a preparation (ASTATE-03).
+    Prepare,
+    /// An action goes on when one of its stages has ended.
+    Proceed(&'a Action),
+    /// A switch or a button forbids what a message asks for (ACT-16).
+    HeedSwitch,
+    /// Actions are held with the vehicle (ACT-15).
+    HoldActions,
+    /// Actions go on when this holds the vehicle no more (ACT-18).
+    ResumeActions(Holds),
+    /// An action of an instantActions message is looked at (IACT-07).
+    TakeInstant,
+    /// An instant action is taken that fits its kind (ACT-10).
+    Fit(&'a ActionKind),
+    /// An instant action that cannot be performed is refused (IACT-06).
+    RefuseInstant(&'a Action),
+    /// An instant action begins at once (IACT-05).
+    BeginInstant(&'a Action),
+    /// An instant action is RUNNING for a moment.
+    TakeTime(&'a Action),
+    /// It finds that it is outside its corridor on an edge, and whether that is to the left (CORR-06).
+    Watch(&'a Edge, bool),
+    /// The path over an edge is reported (STATE-14).
+    ReportPath,
+    /// States are sent.
+    Report,
+    /// An order is kept in another mode (MODE-05).
+    KeepOrder(Mode),
+    /// It is moved by hand (MODE-06).
+    MoveByHand,
+    /// A map is enabled on the vehicle (MAP-26).
+    EnableByHand,
+    /// The hash of a file is compared with the announced one (MAP-34).
+    CheckHash,
+    /// A FATAL error keeps the vehicle from running (ERR-04).
+    StopForDefect,
+}
+
+/// What keeps the vehicle from driving.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Hindrance {
+    /// The mode (MODE-02).
+    Mode,
+    /// A pause, the emergency stop and the like (ACT-12).
+    Hold,
+    /// The order was cancelled, or is to be (ORD-CANCEL-02).
+    Cancellation,
+    /// An action (BLOCK-03, BLOCK-04).
+    Action,
+}
+
+/// Why an error is listed.
+#[derive(Clone, Copy)]
+pub(crate) enum Cause<'a> {
+    /// An order was refused, by a rule; the message.
+    Refusal(Rule, &'a Value),
+    /// A cancelOrder found no order.
+    NothingToCancel,
+    /// An action has failed.
+    Failure(Option<&'a Action>),
+    /// An instantActions message or an action in it cannot be read (IACT-03).
+    Unreadable(&'a str),
+    /// The vehicle is outside its corridor (CORR-07).
+    Outside,
+    /// The emergency stop is pressed.
+    EmergencyStop,
+    /// A part of the vehicle is not in order.
+    Defect,
 }
 
 /// What has a length in time.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Span {
+#[derive(Clone, Copy)]
+pub(crate) enum Span<'a> {
     /// From one state to the next (STATE-02).
     BetweenStates,
+    /// From one state to the next, as the factsheet says (FACT-14).
+    StatedBetweenStates,
     /// From one visualization to the next (VIS-02).
     BetweenVisualizations,
+    /// From the begin of an action to its end.
+    Action(&'a Action),
 }
 
 /// Something has happened, or is about to.
@@ -72,6 +210,74 @@ pub(crate) enum Event {
     Leaving,
     /// OFFLINE was said.
     Left,
+    /// An edge is entered; its actions come next.
+    EdgeEntered(u32),
+    /// It is on an edge.
+    OnEdge,
+    /// A leg has ended before the node.
+    LegEnded,
+    /// An edge was left.
+    EdgeLeft(u32),
+    /// A node is traversed; it is not the last one yet.
+    NodeReached(u32),
+    /// It is the last one; its actions come next.
+    NodeNoted(u32),
+    /// They were triggered.
+    NodePassed(u32),
+    /// The actions of a node or an edge are triggered next.
+    Triggering(Origin),
+    /// The vehicle is held, and its actions with it.
+    Held,
+    /// It is held no more; its actions go on next.
+    Resuming,
+    /// A new order was taken over.
+    Begun,
+    /// The nodes and edges of the horizon are gone; their actions go next.
+    HorizonDropped,
+    /// An update was taken over.
+    Updated,
+    /// An order came that was received before.
+    SeenAgain,
+    /// A cancellation has begun.
+    CancelBegun,
+    /// A cancellation ends next.
+    CancelEnding,
+    /// A cancellation has ended.
+    Cancelled,
+    /// The order was given up.
+    GivenUp,
+    /// A download has begun.
+    DownloadRunning,
+    /// A file is there; the map is stored next.
+    Downloaded,
+    /// instantActions were read.
+    InstantsRead,
+    /// An instant action cannot be read.
+    InstantUnreadable,
+    /// An instant action begins.
+    InstantBegun,
+    /// It finds itself outside its corridor.
+    Strayed,
+    /// The mode changes next, to this one.
+    ModeChanging(Mode),
+    /// The order was given up because of the mode.
+    GivenUpForMode(Mode),
+    /// The mode has changed, from this one.
+    ModeChanged(Mode),
+    /// It was driven by hand.
+    DrivenByHand,
+    /// It is switched off and on.
+    PowerCycled,
+    /// The emergency stop is released next.
+    Releasing,
+    /// The protective field is free next.
+    FieldFreed,
+    /// A state was sent.
+    StateSent,
+    /// Time has passed.
+    Woken,
+    /// All consequences were drawn.
+    Settled,
 }
 
 /// A message that goes out.

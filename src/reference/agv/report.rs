@@ -13,29 +13,25 @@ use serde_json::{Map, Value};
 use crate::clock::Moment;
 
 use super::Agv;
-use super::faults::FaultName as F;
-use super::points::{Event, Part, Span};
-use super::tolerances::ToleranceName as T;
+use super::points::{Event, Part, Permission, Span};
 
 /// What has been reported.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Report {
     /// An order message arrived (STATE-03).
     pub(crate) order_received: bool,
-    /// It was an update, and it was taken over (`update-without-state` only).
-    pub(crate) update_received: bool,
     /// A state was asked for (ACT-26).
     pub(crate) requested: bool,
     /// The state that is sent now is sent because it is time.
     pub(crate) periodic: bool,
-    /// No state before the next periodic one (`state-request-unanswered`).
+    /// No state before the next periodic one.
     pub(crate) silenced: bool,
     /// The last state, without its header, and when it was sent.
     pub(crate) last: Option<(Moment, Map<String, Value>)>,
     /// A state is due and only waits for the minimum interval.
     pub(crate) delayed: bool,
     pub(crate) next_visualization: Option<Moment>,
-    /// No state before this (`silent-after-reconnect` only).
+    /// No state before this.
     pub(crate) silent_until: Option<Moment>,
 }
 
@@ -49,39 +45,42 @@ impl Report {
 /// Members that change without being an event.
 const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
 
-/// Faults that keep events from the state.
-const KEPT_EVENTS: [F; 10] = [
-    F::StatesByClock,
-    F::OrderWithoutState,
-    F::UpdateWithoutState,
-    F::LoadWithoutState,
-    F::ErrorWithoutState,
-    F::ModeWithoutState,
-    F::MapsWithoutState,
-    F::NodeWithoutState,
-    F::DrivingWithoutState,
-    F::ActionsWithoutState,
-];
-
-/// The longest interval the standard allows, with some room.
-const LONGEST: Duration = Duration::from_secs(28);
-
 /// What differs between two states.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Changes {
-    order: bool,
-    load: bool,
-    error: bool,
-    node: bool,
-    mode: bool,
-    driving: bool,
-    actions: bool,
-    maps: bool,
-    other: bool,
+pub(crate) struct Changes {
+    /// An order came (STATE-03).
+    pub(crate) order: bool,
+    /// loads (STATE-04).
+    pub(crate) load: bool,
+    /// errors (STATE-05).
+    pub(crate) error: bool,
+    /// The last node (STATE-06).
+    pub(crate) node: bool,
+    /// operatingMode (STATE-07).
+    pub(crate) mode: bool,
+    /// driving (STATE-08).
+    pub(crate) driving: bool,
+    /// actionStates (STATE-09).
+    pub(crate) actions: bool,
+    /// maps (STATE-10).
+    pub(crate) maps: bool,
+    /// Anything else.
+    pub(crate) other: bool,
+}
+
+/// Whether a change is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Telling {
+    /// In a state of its own.
+    Now,
+    /// Never by itself.
+    Never,
+    /// Not yet.
+    Later,
 }
 
 impl Changes {
-    fn between(old: &Map<String, Value>, new: &Map<String, Value>) -> Self {
+    pub(crate) fn between(old: &Map<String, Value>, new: &Map<String, Value>) -> Self {
         let mut changes = Self::default();
         let keys = new.keys().chain(old.keys().filter(|key| !new.contains_key(*key)));
         for key in keys.filter(|key| !SILENT.contains(&key.as_str()) && old.get(*key) != new.get(*key)) {
@@ -107,7 +106,7 @@ impl Changes {
         changes
     }
 
-    fn any(self) -> bool {
+    pub(crate) fn any(self) -> bool {
         self != Self::default()
     }
 }
@@ -117,31 +116,24 @@ impl Agv {
     pub(crate) fn start_reporting(&mut self) {
         self.report.last = None;
         self.report.requested = true;
-        let late = self.takes(T::R2FirstStateLate);
-        self.report.silent_until = late.then(|| self.moment() + Duration::from_millis(1_200));
+        self.report.silent_until = None;
         self.happens(Event::Reporting);
         self.report.next_visualization = self.visualization_interval().map(|_| self.moment());
     }
 
     /// The shortest time between two states.
-    fn min_state_interval(&self) -> Duration {
-        let told = self.persona.state_interval;
-        told.unwrap_or_default().max(self.config.min_state_interval)
+    pub(crate) fn min_state_interval(&self) -> Duration {
+        self.told_state_interval().max(self.config.min_state_interval)
     }
 
     fn state_interval(&self) -> Duration {
         self.lasts(Span::BetweenStates, self.stated_interval())
-            .max(self.persona.state_interval.unwrap_or_default())
+            .max(self.told_state_interval())
     }
 
-    /// The interval the factsheet promises. A faulty vehicle that keeps events to itself has a long one, so that
-    /// its periodic states do not make up for them.
+    /// The interval the factsheet promises (FACT-14).
     pub(crate) fn stated_interval(&self) -> Duration {
-        if KEPT_EVENTS.iter().any(|fault| self.faults.has(*fault)) {
-            LONGEST
-        } else {
-            self.config.state_interval
-        }
+        self.lasts(Span::StatedBetweenStates, self.config.state_interval)
     }
 
     fn visualization_interval(&self) -> Option<Duration> {
@@ -157,7 +149,7 @@ impl Agv {
         if self.report.silent_until.is_some() {
             return self.report.silent_until;
         }
-        if self.silent_in_manual() {
+        if !self.allows(Permission::Report, true) {
             return self.report.next_visualization;
         }
         let last = self.report.last.as_ref().map(|(sent, _)| *sent)?;
@@ -169,31 +161,11 @@ impl Agv {
         Some((last + state).min(self.report.next_visualization.unwrap_or(last + state)))
     }
 
-    /// `r1-silent-in-manual`: it has reported the mode, and says no more.
-    fn silent_in_manual(&self) -> bool {
-        let told = self
-            .report
-            .last
-            .as_ref()
-            .and_then(|(_, last)| last.get("operatingMode"));
-        self.mode == super::Mode::Manual
-            && self.faults.has(F::R1SilentInManual)
-            && told.is_some_and(|told| told == "MANUAL")
-    }
-
-    /// As short as an event can be that has to be in a state.
-    pub(crate) fn brief(&self) -> Duration {
-        super::cancel::MOMENT.max(self.min_state_interval() * 2)
-    }
-
     /// Publishes what is due.
     pub(crate) fn flush(&mut self) {
         if !self.connection.online {
             self.report.order_received = false;
             self.report.requested = false;
-            if self.faults.has(F::R4ReconnectReplaysBufferedStates) {
-                self.buffer_state();
-            }
             return;
         }
         self.flush_state();
@@ -207,21 +179,9 @@ impl Agv {
         }
     }
 
-    /// `r4-reconnect-replays-buffered-states`: keeps what it would have sent, with the time of now.
-    fn buffer_state(&mut self) {
-        let body = self.state_picture();
-        let buffered = &mut self.fourth.buffered;
-        let changed = buffered
-            .last()
-            .is_none_or(|(_, last)| Changes::between(last, &body).any());
-        if self.connection.was_online() && changed && buffered.len() < super::fourth::BUFFER {
-            buffered.push((format!("{:.2}", self.now.utc), body));
-        }
-    }
-
     fn flush_state(&mut self) {
         let moment = self.moment();
-        if self.report.silent_until.is_some_and(|until| until > moment) || self.silent_in_manual() {
+        if self.report.silent_until.is_some_and(|until| until > moment) || !self.allows(Permission::Report, true) {
             return;
         }
         let body = self.state_picture();
@@ -237,7 +197,7 @@ impl Agv {
         self.report.delayed = false;
         if periodic {
             self.send_state(body, true);
-        } else if (changes.any() || requested) && !self.suppressed(changes, requested, &body) {
+        } else if (changes.any() || requested) && self.is_told(changes, requested, &body) {
             if too_soon {
                 self.report.delayed = true;
             } else {
@@ -246,56 +206,26 @@ impl Agv {
         }
     }
 
-    /// Whether a faulty vehicle keeps an event to itself. What it swallows is never told on its own.
-    fn suppressed(&mut self, changes: Changes, requested: bool, body: &Map<String, Value>) -> bool {
-        if std::mem::take(&mut self.report.update_received) && self.faults.has(F::UpdateWithoutState) {
-            self.report.order_received = false;
-            if let Some((_, last)) = &mut self.report.last {
-                last.clone_from(body);
-            }
-            return true;
-        }
-        let event = |change: bool, fault: F| change && self.faults.has(fault);
-        let held = self.report.silenced
-            || (self.faults.has(F::StatesByClock) && !requested)
-            || event(changes.order, F::OrderWithoutState)
-            || event(changes.load, F::LoadWithoutState)
-            || event(changes.error, F::ErrorWithoutState)
-            || event(changes.mode, F::ModeWithoutState)
-            || event(changes.maps, F::MapsWithoutState);
-        let left = self.book.left.0.as_ref();
-        let plain = left.is_some_and(|stop| stop.node.actions.is_empty());
-        let passes = changes.node && plain && !changes.driving && !changes.actions;
-        let swallowed = !changes.order
-            && (event(changes.node, F::NodeWithoutState)
-                || event(passes, F::R4NoStateOnPlainNodes)
-                || event(changes.driving, F::DrivingWithoutState)
-                || event(changes.actions && !changes.node, F::ActionsWithoutState));
-        if swallowed
-            && !held
+    /// Whether a change is told in a state. One that never is counts as told.
+    fn is_told(&mut self, changes: Changes, requested: bool, body: &Map<String, Value>) -> bool {
+        let telling = match self.report.silenced {
+            true => Telling::Later,
+            false => self.tells(changes, requested),
+        };
+        if telling == Telling::Never
             && let Some((_, last)) = &mut self.report.last
         {
             last.clone_from(body);
         }
-        held || swallowed
+        telling == Telling::Now
     }
 
     fn send_state(&mut self, body: Map<String, Value>, periodic: bool) {
-        let mut kept = body.clone();
-        if self.faults.has(F::R4ResultDescriptionOnlyInFirstState) {
-            self.note_results(&mut kept);
-        }
+        let kept = body.clone();
         self.report.periodic = periodic;
-        let times = match () {
-            () if self.faults.has(F::StateBursts) => 5,
-            () if self.takes(T::EveryStateTwice) => 2,
-            () => 1,
-        };
         if !self.swallows_state() {
             let body = self.shown_state(body);
-            for _ in 0..times {
-                self.publish("state", body.clone());
-            }
+            self.publish("state", body);
         }
         let next_visualization = self.report.next_visualization;
         self.report = Report {
@@ -304,12 +234,7 @@ impl Agv {
             ..Report::default()
         };
         self.states_sent += 1;
-        if self.takes(T::R2OnlineAgain) && self.states_sent.is_multiple_of(10) {
-            self.publish_connection("ONLINE");
-        }
-        if self.takes(T::FactsheetAgain) && self.states_sent.is_multiple_of(10) {
-            self.publish_factsheet();
-        }
+        self.happens(Event::StateSent);
     }
 
     fn publish_visualization(&mut self) {

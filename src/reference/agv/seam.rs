@@ -3,14 +3,27 @@
 //! The vehicle asks here at its points of decision and says here what happens (`points` has the words for both). Every
 //! default is the conformant behaviour; with nothing switched on there is nobody to be asked.
 
+use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::Agv;
+use super::actions::{Action, Origin, Status};
+use super::book::Stop;
+use super::deeds::Outcome;
+use super::errors::ActiveError;
+use super::order_message::{Corridor, Edge, Order};
+use super::rejection::{Refusal, Rule};
+use super::report::{Changes, Telling};
+use super::{Agv, AgvConfig};
+use crate::clock::Moment;
+use crate::nurbs::Path;
 use crate::reference::ConnectOptions;
 
-pub(crate) use super::points::{Event, Head, Outgoing, Part, Permission, Span};
+pub(crate) use super::objections::{Adoption, Lack, Objection, Relation};
+pub(crate) use super::points::{Cause, Event, Head, Hindrance, Outgoing, Part, Permission, Span};
+pub(crate) use super::way::{Course, Leg};
 
 /// One that is switched on.
 pub(crate) type Hook = Box<dyn Deviation>;
@@ -18,6 +31,9 @@ pub(crate) type Hook = Box<dyn Deviation>;
 /// Where a vehicle can be made to deviate. Every default is the conformant behaviour.
 #[expect(unused_variables, reason = "the defaults leave everything as it is")]
 pub(crate) trait Deviation: Send {
+    /// The vehicle is made.
+    fn configures(&self, config: &mut AgvConfig) {}
+
     /// The connection is to be made.
     fn joins(&mut self, agv: &Agv, options: &mut ConnectOptions) {}
 
@@ -43,8 +59,84 @@ pub(crate) trait Deviation: Send {
     }
 
     /// How long something lasts.
-    fn lasts(&self, agv: &Agv, what: Span, usual: Duration) -> Duration {
+    fn lasts(&self, agv: &Agv, what: Span<'_>, usual: Duration) -> Duration {
         usual
+    }
+
+    /// A message of a topic name came in; false to overlook it.
+    fn hears(&mut self, agv: &mut Agv, name: &str, payload: &[u8]) -> bool {
+        true
+    }
+
+    /// The actions of an instantActions message are read.
+    fn reads_instants(&mut self, agv: &mut Agv, actions: &mut Vec<&Value>) {}
+
+    /// Whether something that changed is told in a state.
+    fn tells(&mut self, agv: &mut Agv, changes: Changes, requested: bool) -> Telling {
+        Telling::Now
+    }
+
+    /// The way over an edge with a trajectory; `None` for a straight one.
+    fn bends(&self, agv: &Agv, edge: &Edge, path: Path) -> Option<Path> {
+        Some(path)
+    }
+
+    /// The corridor of an edge, as the vehicle understands it.
+    fn keeps_to(&self, agv: &Agv, corridor: &mut Corridor) {}
+
+    /// An order is read; it may be taken for something else.
+    fn reads(&self, agv: &Agv, message: &mut Value) {}
+
+    /// Whether it has another objection against an order.
+    fn objects(&self, agv: &Agv, order: &Order, relation: Relation) -> Option<Refusal> {
+        None
+    }
+
+    /// An order is taken over, and may be changed; false when nothing is left to be done.
+    fn adopts(&mut self, agv: &mut Agv, adoption: &mut Adoption<'_>) -> bool {
+        true
+    }
+
+    /// Which way it drives to a node.
+    fn steers(&self, agv: &Agv, course: &mut Course<'_>) {}
+
+    /// A leg is planned.
+    fn plans(&self, agv: &Agv, leg: &mut Leg<'_>) {}
+
+    /// The orientation it takes on a node before that counts as traversed.
+    fn faces(&self, agv: &Agv, stop: &Stop, wanted: Option<f64>) -> Option<f64> {
+        wanted
+    }
+
+    /// The actions of a node or an edge are queued, cut where nothing may run in parallel.
+    fn queues(&self, agv: &Agv, origin: Origin, phases: &mut VecDeque<Vec<String>>) {}
+
+    /// How an action ends because its order is cancelled; `None` if it does not.
+    fn breaks(&self, agv: &Agv, action: &Action, usual: Option<Status>) -> Option<Status> {
+        usual
+    }
+
+    /// An order is refused, and nothing was said about it yet.
+    fn refuses(&mut self, agv: &mut Agv, message: &Value, rule: Rule) {}
+
+    /// An error is to be listed; false to keep it to itself.
+    fn raises(&mut self, agv: &mut Agv, cause: Cause<'_>, error: &mut ActiveError) -> bool {
+        true
+    }
+
+    /// An action is to show its effect: what comes of it where it is done otherwise.
+    fn does(&mut self, agv: &mut Agv, action: &Action) -> Option<Outcome> {
+        None
+    }
+
+    /// What comes of an action that was done as usual.
+    fn ends(&mut self, agv: &mut Agv, action: &Action, outcome: Outcome) -> Outcome {
+        outcome
+    }
+
+    /// When it wants to be told that time has passed.
+    fn due(&self) -> Option<Moment> {
+        None
     }
 
     /// Something has happened, or is about to.
@@ -120,9 +212,134 @@ impl Agv {
         all.fold(usual, |usual, one| one.allows(self, what, usual))
     }
 
-    pub(crate) fn lasts(&self, what: Span, usual: Duration) -> Duration {
+    pub(crate) fn hears(&mut self, name: &str, payload: &[u8]) -> bool {
+        let mut kept = true;
+        self.each(|one, agv| kept = kept && one.hears(agv, name, payload));
+        kept
+    }
+
+    pub(crate) fn reads_instants(&mut self, actions: &mut Vec<&Value>) {
+        self.each(|one, agv| one.reads_instants(agv, actions));
+    }
+
+    pub(crate) fn tells(&mut self, changes: Changes, requested: bool) -> Telling {
+        let mut telling = Telling::Now;
+        self.each(|one, agv| telling = telling.max(one.tells(agv, changes, requested)));
+        telling
+    }
+
+    pub(crate) fn bends(&self, edge: &Edge, path: Path) -> Option<Path> {
+        let mut all = self.seam.all();
+        all.try_fold(path, |path, one| one.bends(self, edge, path))
+    }
+
+    pub(crate) fn keeps_to(&self, corridor: &mut Corridor) {
+        self.seam.all().for_each(|one| one.keeps_to(self, corridor));
+    }
+
+    /// Refuses an order because of something, unless that is overlooked.
+    pub(crate) fn object(&self, what: Objection<'_>, refusal: Refusal) -> Result<(), Refusal> {
+        match self.allows(Permission::Overlook(what), false) {
+            true => Ok(()),
+            false => Err(refusal),
+        }
+    }
+
+    pub(crate) fn objects(&self, order: &Order, relation: Relation) -> Result<(), Refusal> {
+        let mut all = self.seam.all();
+        all.find_map(|one| one.objects(self, order, relation))
+            .map_or(Ok(()), Err)
+    }
+
+    pub(crate) fn adopts(&mut self, mut adoption: Adoption<'_>) -> bool {
+        let mut open = true;
+        self.each(|one, agv| open = open && one.adopts(agv, &mut adoption));
+        open
+    }
+
+    pub(crate) fn steers(&self, course: &mut Course<'_>) {
+        self.seam.all().for_each(|one| one.steers(self, course));
+    }
+
+    pub(crate) fn plans(&self, leg: &mut Leg<'_>) {
+        self.seam.all().for_each(|one| one.plans(self, leg));
+    }
+
+    pub(crate) fn faces(&self, stop: &Stop, wanted: Option<f64>) -> Option<f64> {
+        let all = self.seam.all();
+        all.fold(wanted, |wanted, one| one.faces(self, stop, wanted))
+    }
+
+    pub(crate) fn queues(&self, origin: Origin, phases: &mut VecDeque<Vec<String>>) {
+        self.seam.all().for_each(|one| one.queues(self, origin, phases));
+    }
+
+    pub(crate) fn breaks(&self, action: &Action, usual: Option<Status>) -> Option<Status> {
+        let all = self.seam.all();
+        all.fold(usual, |usual, one| one.breaks(self, action, usual))
+    }
+
+    pub(crate) fn lasts(&self, what: Span<'_>, usual: Duration) -> Duration {
         let all = self.seam.all();
         all.fold(usual, |usual, one| one.lasts(self, what, usual))
+    }
+
+    /// An order as it is read.
+    pub(crate) fn read<'a>(&self, message: &'a Value) -> Cow<'a, Value> {
+        if self.seam.0.is_empty() {
+            return Cow::Borrowed(message);
+        }
+        let mut read = message.clone();
+        self.seam.all().for_each(|one| one.reads(self, &mut read));
+        Cow::Owned(read)
+    }
+
+    pub(crate) fn refusing(&mut self, message: &Value, rule: Rule) {
+        self.each(|one, agv| one.refuses(agv, message, rule));
+    }
+
+    /// Lists an error, if it is to be listed.
+    pub(crate) fn raise(&mut self, cause: Cause<'_>, mut error: ActiveError) {
+        let mut said = true;
+        self.each(|one, agv| said = said && one.raises(agv, cause, &mut error));
+        if said {
+            self.errors.raise(error);
+        }
+    }
+
+    /// Lists the error of an order that is refused.
+    pub(crate) fn raise_refusal(&mut self, rule: Rule, message: &Value, error: ActiveError) {
+        self.raise(Cause::Refusal(rule, message), error);
+    }
+
+    /// Lists the error of a cancelOrder that finds no order.
+    pub(crate) fn raise_nothing_to_cancel(&mut self, error: ActiveError) {
+        self.raise(Cause::NothingToCancel, error);
+    }
+
+    /// Lists the error of an action that has failed.
+    pub(crate) fn raise_failure(&mut self, action: Option<&Action>, error: ActiveError) {
+        self.raise(Cause::Failure(action), error);
+    }
+
+    pub(crate) fn does(&mut self, action: &Action) -> Option<Outcome> {
+        let mut outcome = None;
+        self.each(|one, agv| {
+            if outcome.is_none() {
+                outcome = one.does(agv, action);
+            }
+        });
+        outcome
+    }
+
+    pub(crate) fn turned_out(&mut self, action: &Action, outcome: Outcome) -> Outcome {
+        let mut outcome = Some(outcome);
+        self.each(|one, agv| outcome = outcome.take().map(|outcome| one.ends(agv, action, outcome)));
+        outcome.unwrap_or(Outcome::Open)
+    }
+
+    pub(crate) fn due(&self) -> Option<Moment> {
+        self.seam.all().filter_map(Deviation::due).min()
     }
 
     pub(crate) fn happens(&mut self, event: Event) {

@@ -83,7 +83,7 @@ impl Bench {
 
     pub(crate) fn with(master: MasterControl, agv: AgvConfig) -> Self {
         let mut bench = Self::alone(master);
-        bench.agvs.push(Agv::new(agv, &[]).unwrap());
+        bench.agvs.push(Agv::new(agv));
         bench.agv_gets(0, Input::Connected);
         bench.wait(0.1);
         bench

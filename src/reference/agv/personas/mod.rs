@@ -1,7 +1,7 @@
 //! Personas: how a mock vehicle deviates when a test of a master control tells it to.
 //!
-//! A [`Persona`] holds what was told; the deviations themselves stand at the point of decision, as faults and
-//! tolerances do. All of them end together, with `well-behaved` or `reset`.
+//! A [`Persona`] holds what was told. The vehicle asks for it at its points of decision, in words of its own (such as
+//! `is_told_to_stand`). All of it ends together, with `well-behaved` or `reset`.
 
 mod declared;
 mod orders;
@@ -9,11 +9,14 @@ mod speech;
 
 use std::time::Duration;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::clock::Moment;
 use crate::reference::Output;
 
+use super::actions::{Action, Status};
+use super::deeds::Problem;
+use super::errors::{ActiveError, Life};
 use super::{Agv, AgvConfig};
 
 pub(super) use orders::Rejection;
@@ -134,8 +137,114 @@ impl Told<'_> {
 }
 
 impl Agv {
+    /// Whether it was told to stand where it is.
+    pub(super) fn is_told_to_stand(&self) -> bool {
+        self.persona.halted || self.persona.lost
+    }
+
+    /// Stands from now on if it was told to do so before the node ahead.
+    pub(super) fn stand_as_told(&mut self) {
+        let ahead = self.book.nodes.front();
+        if ahead.is_some_and(|stop| self.stops_before(&stop.node.id)) {
+            (self.persona.halted, self.persona.stop_before) = (true, None);
+        }
+    }
+
+    /// Whether it was told that it does not know where it is.
+    pub(super) fn is_told_to_be_lost(&self) -> bool {
+        self.persona.lost
+    }
+
+    /// It knows where it is.
+    pub(super) fn find_position(&mut self) {
+        self.persona.lost = false;
+    }
+
+    /// Whether it was told to ask for a longer base.
+    pub(super) fn is_told_to_want_base(&self) -> bool {
+        self.persona.wants_base
+    }
+
+    /// The batteryCharge it was told.
+    pub(super) fn told_charge(&self) -> Option<f64> {
+        self.persona.charge
+    }
+
+    /// The least time between two states it was told.
+    pub(super) fn told_state_interval(&self) -> Duration {
+        self.persona.state_interval.unwrap_or_default()
+    }
+
+    /// How long it was told to let messages lie.
+    pub(super) fn told_delay(&self) -> Option<Duration> {
+        self.persona.answers_after
+    }
+
+    /// The version it was told to name.
+    pub(super) fn told_version(&self) -> Option<&String> {
+        self.persona.version.as_ref()
+    }
+
+    /// When something it was told runs out.
+    pub(super) fn told_until(&self) -> Option<Moment> {
+        self.persona.next_end()
+    }
+
+    /// Forgets what has run out.
+    pub(super) fn forget_what_was_told_until(&mut self, now: Moment) {
+        self.persona.expire(now);
+    }
+
+    /// A cancelOrder begins, and lasts as long as it was told.
+    pub(super) fn hold_cancel_as_told(&mut self) {
+        let now = self.moment();
+        self.persona.cancel_begins(now);
+    }
+
+    /// Whether the cancelOrder under way must not end yet.
+    pub(super) fn holds_cancel_as_told(&self) -> bool {
+        self.persona.holds_cancel()
+    }
+
+    /// Fails an action it was told to fail; whether it was one.
+    pub(super) fn fails_as_told(&mut self, action: &Action) -> bool {
+        let told = self.persona.failure_of(&action.request.action_type, action.of_order());
+        self.fail_with(action, told)
+    }
+
+    /// Fails a download it was told to refuse; whether it was.
+    pub(super) fn refuses_map_as_told(&mut self, action: &Action) -> bool {
+        self.fail_with(action, self.persona.map_refusal.clone())
+    }
+
+    fn fail_with(&mut self, action: &Action, error_type: Option<String>) -> bool {
+        let Some(error_type) = error_type else { return false };
+        let problem = Problem::unable(action, "the action did not succeed");
+        if let Some(action) = self.actions.get_mut(&action.request.id) {
+            action.end(Status::Failed);
+        }
+        self.errors.raise(ActiveError {
+            error_type,
+            fatal: false,
+            references: problem.references,
+            description: problem.reason,
+            life: Life::Until(self.moment() + self.config.error_duration),
+        });
+        true
+    }
+
+    /// Gives a last will the date it was told.
+    pub(super) fn date_back_as_told(&self, message: &mut serde_json::Map<String, Value>) {
+        if self.persona.stale_will {
+            let utc = self.now.utc;
+            let long_ago = utc.checked_sub(jiff::SignedDuration::from_hours(24)).unwrap_or(utc);
+            message.insert("headerId".into(), json!(0));
+            message.insert("timestamp".into(), json!(format!("{long_ago:.2}")));
+        }
+    }
+
     /// A word about how to behave; whether it is one. A state tells what it changed.
-    pub(super) fn persona_command(&mut self, name: &str, arguments: &Value) -> bool {
+    pub(super) fn told_how_to_behave(&mut self, name: &str, arguments: &Value) -> bool {
         let told = Told(arguments);
         let persona = &mut self.persona;
         match name {
@@ -231,12 +340,10 @@ impl Agv {
         if let Some(node) = node.filter(|node| config.node(node).is_some()) {
             node.clone_into(&mut config.start_node);
         }
-        let Ok(mut fresh) = Self::new(config, &[]) else {
-            return;
-        };
+        let mut fresh = Self::new(config);
         self.downloads.clear();
         std::mem::swap(&mut fresh.config.start_node, &mut self.config.start_node);
-        fresh.faults = self.faults;
+        std::mem::swap(&mut fresh.seam, &mut self.seam);
         fresh.now = self.now;
         fresh.states_sent = self.states_sent;
         fresh.logs = self.logs;

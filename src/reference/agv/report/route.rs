@@ -4,34 +4,14 @@ use serde_json::{Value, json};
 
 use crate::reference::agv::Agv;
 use crate::reference::agv::book::Stop;
-use crate::reference::agv::faults::FaultName as F;
 use crate::reference::agv::order_message::Edge;
 use crate::reference::agv::points::Part;
-use crate::reference::agv::tolerances::ToleranceName as T;
 
 impl Agv {
-    /// `manual-drives-unseen`: drives a way it does not show.
-    pub(crate) fn hides_route(&self) -> bool {
-        !self.mode.takes_orders() && self.faults.has(F::ManualDrivesUnseen)
-    }
-
+    /// nodeStates: what is still to be traversed, horizon included (STATE-12).
     pub(crate) fn node_states(&self) -> Value {
-        if self.hides_route() {
-            return json!([]);
-        }
         let ahead = self.book.nodes.iter();
-        let shown = ahead.filter(|stop| !self.sixth.is_hidden(stop.node.sequence_id));
-        let relisted = self.fourth.relisted.iter().filter(|_| !self.book.cancelled);
-        let mut listed: Vec<&Stop> = relisted.chain(shown).collect();
-        if let Some((_, joint)) = self
-            .fourth
-            .joints
-            .filter(|_| self.faults.has(F::R4UpdatePutsNewNodesInFront))
-        {
-            // A stable sort: both parts keep their sequence.
-            listed.sort_by_key(|stop| stop.node.sequence_id <= joint);
-        }
-        listed.into_iter().filter_map(|stop| self.node_state(stop)).collect()
+        ahead.filter_map(|stop| self.node_state(stop)).collect()
     }
 
     /// The node traversed last, as if it were still ahead.
@@ -40,7 +20,7 @@ impl Agv {
         left.filter_map(|stop| self.node_state(stop)).collect()
     }
 
-    fn node_state(&self, stop: &Stop) -> Option<Value> {
+    pub(crate) fn node_state(&self, stop: &Stop) -> Option<Value> {
         let node = &stop.node;
         let mut picture = json!({
             "nodeId": node.id,
@@ -49,16 +29,12 @@ impl Agv {
         });
         if let Some(position) = node.sent_position.as_ref().filter(|_| !self.config.line_guided()) {
             picture["nodePosition"] = position.clone();
-        } else if self.takes(T::R2NodePositionsFromLayout) && !self.config.line_guided() {
-            picture["nodePosition"] = json!({ "x": stop.place.x, "y": stop.place.y, "mapId": stop.place.map_id });
         }
         self.said(Part::Node(stop), picture)
     }
 
+    /// edgeStates: the same of edges.
     pub(crate) fn edge_states(&self) -> Value {
-        if self.hides_route() {
-            return json!([]);
-        }
         let ahead = self.book.edges.iter();
         ahead.filter_map(|edge| self.edge_state(edge)).collect()
     }

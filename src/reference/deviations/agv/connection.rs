@@ -81,7 +81,10 @@ records! {
     fault "r2-node-actions-repeated-after-reconnect" ["ASTATE-06", "MQTT-03"] "After a reconnect in the middle of an order the vehicle sets the finished actions of the node it stands at or left last back to WAITING and performs them again."
         => when(Event::Connected, |agv| if agv.connection.sessions > 1 && agv.is_busy() { agv.repeat_actions(agv.book.last_sequence) });
     fault "r6-reconnect-loses-downloaded-maps" ["MAP-31", "MAP-15"] "It reports only its factory maps after a reconnect; downloaded maps are gone without deleteMap."
-        => when(Event::Connected, |agv| if agv.connection.sessions > 1 { agv.maps.keep_only(&agv.config.maps) });
+        => when(Event::Connected, |agv| if agv.connection.sessions > 1 {
+            let factory = agv.config.maps.iter().map(|map| (&map.map_id, &map.map_version)).collect::<Vec<_>>();
+            agv.maps.all.retain(|map| factory.contains(&(&map.map_id, &map.map_version)));
+        });
     fault "never-reconnects" ["MQTT-10", "STATE-02"] "Does not connect again after a broken link."
         => when(Event::ConnectionLost, |agv| agv.connection.shut_down = true);
     fault "order-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-02"] "Throws its order away when the link breaks."

@@ -39,8 +39,6 @@ records! {
         }));
     fault "own-limit-exceeded" ["FACT-11"] "States room for one action in its states and sends more."
         => factsheet(|_, m| one_action_state(m));
-    fault "r1-action-states-limit-exceeded" ["FACT-11"] "Its factsheet allows one action state, and its states hold more."
-        => factsheet(|_, m| one_action_state(m));
     fault "r1-array-limits-nested" ["FACT-05", "JSON-10"] "Its factsheet gives the array limits of orders as nested objects and not under names with a dot."
         => factsheet(|agv, m| {
             let nodes = agv.config.max_nodes;
@@ -70,8 +68,6 @@ records! {
     fault "start-pause-on-nodes" ["ACT-09"] "Declares startPause as an action for nodes."
         => factsheet(|_, m| offer(m, "startPause", "NODE"));
     fault "pick-as-instant-action" ["ACT-09"] "Declares pick as an instant action."
-        => factsheet(|_, m| offer(m, "pick", "INSTANT"));
-    fault "r1-pick-listed-instant" ["ACT-09", "FACT-07"] "Its factsheet offers pick also as an instant action."
         => factsheet(|_, m| offer(m, "pick", "INSTANT"));
     fault "positioning-as-instant-action" ["ACT-09"] "Declares finePositioning as an instant action." because "The ruling of ACT-09 leaves a warning."
         => factsheet(|_, m| offer(m, "finePositioning", "INSTANT"));

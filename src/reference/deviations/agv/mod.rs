@@ -14,26 +14,43 @@
 )]
 
 mod actions;
+mod cancellation;
+mod checks;
 mod connection;
+mod driving;
 mod errors;
 mod factsheet;
 mod header;
 mod hooks;
+mod instants;
+mod manner;
+mod maps;
+mod memory;
+mod modes;
 mod motion;
+mod nature;
+mod orders;
+mod pause;
+mod poses;
+mod reading;
+mod refusals;
 mod route;
+mod running;
 mod sending;
 mod state;
+mod stations;
+mod telling;
 #[cfg(test)]
 mod tests;
+mod updates;
 mod visualization;
 
 use std::sync::LazyLock;
 
 use super::record::{Kind, Record};
 use crate::reference::Fault;
-use crate::reference::agv::faults as switches;
 use crate::reference::agv::seam::Deviation;
-use crate::reference::agv::{Agv, AgvConfig, UnknownFault};
+use crate::reference::agv::{Agv, AgvConfig};
 
 /// All records.
 fn records() -> impl Iterator<Item = &'static Record<dyn Deviation>> {
@@ -46,8 +63,25 @@ fn records() -> impl Iterator<Item = &'static Record<dyn Deviation>> {
         motion::RECORDS,
         actions::RECORDS,
         errors::RECORDS,
+        reading::RECORDS,
+        refusals::RECORDS,
+        stations::RECORDS,
+        maps::RECORDS,
         visualization::RECORDS,
         factsheet::RECORDS,
+        orders::RECORDS,
+        checks::RECORDS,
+        updates::RECORDS,
+        cancellation::RECORDS,
+        driving::RECORDS,
+        running::RECORDS,
+        pause::RECORDS,
+        instants::RECORDS,
+        poses::RECORDS,
+        modes::RECORDS,
+        telling::RECORDS,
+        nature::RECORDS,
+        manner::RECORDS,
     ];
     topics.into_iter().flatten()
 }
@@ -71,30 +105,85 @@ fn faults(blind: bool) -> impl Iterator<Item = Fault> {
 }
 
 /// Its faults and lapses.
-pub static FAULTS: LazyLock<Vec<Fault>> =
-    LazyLock::new(|| faults(false).chain(switches::FAULTS.iter().copied()).collect());
+pub static FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| faults(false).collect());
 
 /// Its faults of blind rounds, which the suites need not find yet.
-pub static BLIND_FAULTS: LazyLock<Vec<Fault>> =
-    LazyLock::new(|| faults(true).chain(switches::BLIND_FAULTS.iter().copied()).collect());
+pub static BLIND_FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| faults(true).collect());
+
+/// One switchable liberty of a reference device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Tolerance {
+    /// Name, in kebab-case, such as `every-state-twice`.
+    pub name: &'static str,
+    /// The requirements that leave it this liberty.
+    pub under: &'static [&'static str],
+    /// What it does, in one sentence about the vehicle.
+    pub does: &'static str,
+}
+
+fn liberties(blind: bool) -> impl Iterator<Item = Tolerance> {
+    let some = records().filter(move |record| record.is_liberty() && is_blind(record.name) == blind);
+    some.map(|record| Tolerance {
+        name: record.name,
+        under: record.requirements,
+        does: record.does,
+    })
+}
+
+/// What it may do otherwise without breaking anything: with each, and with all that go together, no test may fail.
+pub static TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| liberties(false).collect());
+
+/// Liberties of blind rounds that are not all read rightly yet.
+pub static BLIND_TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| liberties(true).collect());
+
+/// A name that is not in [`TOLERANCES`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the reference AGV has no tolerance `{0}`")]
+pub struct UnknownTolerance(pub String);
+
+impl AgvConfig {
+    /// Lets the vehicle take a liberty.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    pub fn tolerate(&mut self, name: &str) -> Result<(), UnknownTolerance> {
+        let record = find(name).filter(|record| record.is_liberty());
+        let record = record.ok_or_else(|| UnknownTolerance(name.to_owned()))?;
+        if !self.switched_on.contains(&record.name) {
+            (record.make)().configures(self);
+            self.switched_on.push(record.name);
+        }
+        Ok(())
+    }
+}
 
 /// Why a fault ends in less than a failure.
 #[must_use]
 pub fn lapse(name: &str) -> Option<&'static str> {
     match find(name).map(|record| record.kind) {
         Some(Kind::Lapse(why)) => Some(why),
-        _ => crate::reference::agv::lapse(name),
+        _ => None,
     }
 }
 
-/// A reference AGV with these faults, by name; without any it keeps to the standard.
+/// A fault that is not in [`FAULTS`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the reference AGV has no fault `{0}`")]
+pub struct UnknownFault(pub String);
+
+/// A reference AGV with these faults, by name, and the liberties of its configuration; without any it keeps to the
+/// standard.
 ///
 /// # Errors
-/// When there is none of a name.
+/// When there is no fault of a name.
 pub fn built(config: AgvConfig, names: &[&str]) -> Result<Agv, UnknownFault> {
-    let (moved, others): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| find(name).is_some());
-    let mut agv = Agv::new(config, &others)?;
-    for record in moved.into_iter().filter_map(find) {
+    let record = |name: &str| find(name).filter(|record| record.is_fault());
+    if let Some(unknown) = names.iter().find(|name| record(name).is_none()) {
+        return Err(UnknownFault((*unknown).to_owned()));
+    }
+    let liberties = config.switched_on.clone();
+    let mut agv = Agv::new(config);
+    for record in names.iter().copied().chain(liberties).filter_map(find) {
         agv.switch_on((record.make)());
     }
     Ok(agv)

@@ -1,11 +1,12 @@
 //! Deviations of the way ahead, as a state lists it: nodeStates and edgeStates (section 6.10).
 
-use super::hooks::{Object, edge, is_done, node, route, state};
+use super::hooks::{Hooks, Object, edge, holding, is_done, node, route, state};
 use crate::reference::agv::Agv;
-use crate::reference::agv::seam::Deviation;
+use crate::reference::agv::seam::{Deviation, Event, Part};
 use crate::reference::deviations::record::Record;
 use crate::reference::deviations::words::Words;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 
 records! {
     fault "r1-route-omitted-when-idle" ["STATE-13", "STATE-MSG-01"] "It leaves nodeStates and edgeStates out when nothing is to be traversed."
@@ -68,19 +69,9 @@ records! {
             true
         });
     fault "r2-released-not-updated" ["STATE-MSG-13"] "Nodes and edges that were in the horizon once are still listed with released false after an update has released them."
-        => route(|agv, sequence_id, m| {
-            if agv.book.planned.contains(&sequence_id) {
-                m.set("released", false);
-            }
-            true
-        });
+        => once_planned(true);
     fault "r4-released-flag-stale-after-update" ["STATE-MSG-13", "ORD-FLOW-09"] "It keeps released false for edges that an update has moved from the horizon into the base."
-        => edge(|agv, edge, m| {
-            if agv.book.planned.contains(&edge.sequence_id) {
-                m.set("released", false);
-            }
-            true
-        });
+        => once_planned(false);
     fault "r1-far-edges-unreleased" ["STATE-MSG-13"] "Of its released edges it reports only the next one as released."
         => edge(|agv, edge, m| {
             if !is_next(agv, edge.sequence_id) {
@@ -160,4 +151,31 @@ fn cut(state: &mut Object, list: &str, most: usize) {
             listed.truncate(most);
         }
     });
+}
+
+/// Still calls planned what was in the horizon once: edges, and nodes too.
+fn once_planned(nodes_too: bool) -> Box<Hooks<(bool, BTreeSet<u32>)>> {
+    holding((nodes_too, BTreeSet::new()))
+        .happens(|(_, planned), agv, event| {
+            if event == Event::Begun {
+                planned.clear();
+            }
+            if matches!(event, Event::Begun | Event::Updated) {
+                let nodes = agv.book.nodes.iter().filter(|stop| !stop.node.released);
+                planned.extend(nodes.map(|stop| stop.node.sequence_id));
+                let edges = agv.book.edges.iter().filter(|edge| !edge.released);
+                planned.extend(edges.map(|edge| edge.sequence_id));
+            }
+        })
+        .says(|(nodes_too, planned), _, part, m| {
+            let sequence_id = match part {
+                Part::Node(stop) if *nodes_too => stop.node.sequence_id,
+                Part::Edge(edge) => edge.sequence_id,
+                _ => return true,
+            };
+            if planned.contains(&sequence_id) {
+                m.set("released", false);
+            }
+            true
+        })
 }

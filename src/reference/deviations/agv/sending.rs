@@ -75,8 +75,8 @@ records! {
     fault "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says." because "The interval of the factsheet is no limit of the text; below 30 s a warning is all."
         => plain().lasts(|_, what, usual| match what {
             Span::BetweenStates => usual * 2 + Duration::from_secs(2),
-            Span::BetweenVisualizations => usual,
+            _ => usual,
         });
     fault "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate." because "It breaks a recommendation only."
-        => plain().lasts(|_, what, usual| if what == Span::BetweenVisualizations { usual * 3 } else { usual });
+        => plain().lasts(|_, what, usual| if matches!(what, Span::BetweenVisualizations) { usual * 3 } else { usual });
 }

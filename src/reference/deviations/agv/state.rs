@@ -1,9 +1,9 @@
 //! Deviations of what a state says about the order, the vehicle and its load (section 6.10).
 
-use super::hooks::{is_done, state, text};
+use super::hooks::{is_done, keep, state, text};
 use crate::reference::agv::Mode;
 use crate::reference::agv::actions::Origin;
-use crate::reference::agv::seam::Deviation;
+use crate::reference::agv::seam::{Deviation, Event, Part};
 use crate::reference::deviations::record::Record;
 use crate::reference::deviations::words::Words;
 use serde_json::{Value, json};
@@ -60,7 +60,17 @@ records! {
     fault "r2-last-sequence-minus-one" ["JSON-09", "STATE-MSG-04"] "Before its first order the vehicle reports lastNodeSequenceId -1."
         => state(|agv, m| if !agv.book.has_order() { m.set("lastNodeSequenceId", -1) });
     fault "distance-not-reset" ["STATE-MSG-18"] "Counts the distance since its last node from the beginning of its order." because "It breaks a recommendation only."
-        => state(|agv, m| if let Some((x, y)) = agv.book.begun_at { m.set("distanceSinceLastNode", agv.motion.pose(agv.moment()).distance(x, y)) });
+        => keep::<Option<(f64, f64)>>()
+            .happens(|begun, agv, event| if event == Event::Begun {
+                let pose = agv.motion.pose(agv.moment());
+                *begun = Some((pose.x, pose.y));
+            })
+            .says(|begun, agv, part, m| {
+                if let (Part::State, Some((x, y))) = (part, *begun) {
+                    m.set("distanceSinceLastNode", agv.motion.pose(agv.moment()).distance(x, y));
+                }
+                true
+            });
     fault "distance-negative" ["STATE-MSG-18"] "Reports a negative distance since the last node." because "It breaks a recommendation only."
         => state(|_, m| m.set("distanceSinceLastNode", -1.0));
 
@@ -97,13 +107,24 @@ records! {
     fault "pause-flag-missing" ["ACT-13"] "Does not report that it is paused."
         => state(|_, m| m.unset("paused"));
     fault "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button."
-        => state(|agv, m| if !agv.holds.pause || agv.pause_hidden_until.is_some() { m.set("paused", agv.holds.emergency) });
+        => state(|agv, m| if !agv.holds.pause { m.set("paused", agv.holds.emergency) });
     fault "r1-pause-unreported-when-idle" ["ACT-13"] "Paused without an order, it reports the startPause FINISHED but paused as false."
         => state(|agv, m| if is_done(agv) { m.set("paused", agv.holds.button || agv.holds.emergency) });
     fault "new-base-request-always" ["STATE-16"] "Asks for a new base all the time." because "It breaks a recommendation only."
         => state(|_, m| m.set("newBaseRequest", true));
     fault "new-base-request-stays" ["STATE-16"] "Asks for a new base until its next order, once it has done so." because "It breaks a recommendation only."
-        => state(|agv, m| if agv.book.asked { m.set("newBaseRequest", true) });
+        => keep::<bool>()
+            .happens(|asked, agv, event| match event {
+                Event::Begun | Event::PowerCycled => *asked = false,
+                Event::Settled => *asked |= agv.book.base_runs_low(),
+                _ => {}
+            })
+            .says(|asked, _, part, m| {
+                if *asked && matches!(part, Part::State) {
+                    m.set("newBaseRequest", true);
+                }
+                true
+            });
 
     fault "r2-position-omitted-in-manual" ["MODE-06", "STATE-MSG-05"] "In MANUAL the states carry no agvPosition."
         => state(|agv, m| if agv.mode == Mode::Manual { m.unset("agvPosition") });

@@ -43,8 +43,6 @@ records! {
         });
     fault "instant-actions-limit-ignored" ["FACT-12"] "Sends more instant actions at once than the vehicle takes."
         => plain().measures(|(), _, _, what, usual| if let Measure::Instants = what { usize::MAX } else { usual });
-    fault "r1-instant-limit-ignored" ["FACT-12"] "It puts all instant actions that wait into one message, whatever the limit of the vehicle."
-        => plain().measures(|(), _, _, what, usual| if let Measure::Instants = what { usize::MAX } else { usual });
     liberty "r1-instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own."
         => plain().measures(|(), _, _, what, usual| if let Measure::Instants = what { 1 } else { usual });
     liberty "r5-pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message."

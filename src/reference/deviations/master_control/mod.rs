@@ -45,7 +45,7 @@ use serde_json::Value;
 
 use super::record::{Kind, Record};
 use crate::reference::Fault;
-use crate::reference::agv::Tolerance;
+use crate::reference::deviations::agv::Tolerance;
 use crate::reference::master_control::seam::Deviation;
 use crate::reference::master_control::vehicle::Vehicle;
 use crate::reference::master_control::{MasterControl, MasterControlConfig, Site};

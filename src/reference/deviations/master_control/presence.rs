@@ -218,11 +218,6 @@ records! {
         => on_return(|_, vehicle| vehicle.cancel = None);
     fault "update-ids-restart-on-return" ["ORD-UPD-04"] "Counts orderUpdateId from 1 again when the vehicle comes back with its order."
         => on_return(|_, vehicle| restart_update_ids(vehicle));
-    fault "r2-update-ids-restart-with-vehicle" ["ORD-UPD-04"]
-        "It counts the orderUpdateIds of a running order from 0 again when the vehicle comes ONLINE after its connection broke."
-        => plain().happens(|(), _, vehicle, event| if let Event::Online(Presence::Away) = event {
-            restart_update_ids(vehicle);
-        });
     fault "r1-vehicle-return-stops-updates" ["MQTT-10", "ORD-UPD-02", "STATE-17"]
         "Once the connection of a vehicle was away during an order and is back, it does not extend the base of that order any more."
         => keep::<bool>().happens(|stale, _, vehicle, event| match event {

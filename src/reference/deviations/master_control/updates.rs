@@ -81,8 +81,6 @@ records! {
         }));
     fault "loop-numbered-by-node" ["ORD-UPD-11"] "Gives a node that the way passes twice the sequenceId of the first time."
         => numbered_by_node();
-    fault "r6-loop-node-keeps-first-sequence-id" ["ORD-UPD-11"] "It gives a node that the route visits twice the sequenceId of its first visit."
-        => numbered_by_node();
     fault "r6-edge-into-last-base-node-unreleased" ["ORD-09"] "It leaves the edge into the last base node of an update unreleased, although the node is released."
         => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
             if worded.is_update() && index + 2 == worded.window.released {
