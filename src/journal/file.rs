@@ -14,6 +14,7 @@ use super::{Journal, Record};
 pub struct JournalWriter {
     file: File,
     line: Vec<u8>,
+    written: u64,
 }
 
 impl JournalWriter {
@@ -25,6 +26,7 @@ impl JournalWriter {
         Ok(Self {
             file: File::options().write(true).create_new(true).open(path)?,
             line: Vec::new(),
+            written: 0,
         })
     }
 
@@ -36,7 +38,14 @@ impl JournalWriter {
         self.line.clear();
         serde_json::to_writer(&mut self.line, record)?;
         self.line.push(b'\n');
+        self.written += self.line.len() as u64;
         self.file.write_all(&self.line)
+    }
+
+    /// How many bytes were written.
+    #[must_use]
+    pub fn written(&self) -> u64 {
+        self.written
     }
 
     /// Waits until the records are on the disk.

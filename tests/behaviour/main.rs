@@ -21,3 +21,4 @@ mod scripted;
 mod selecting;
 mod simulating;
 mod tool;
+mod watching;

@@ -13,18 +13,20 @@ mod simulate;
 #[cfg(test)]
 mod tests;
 mod vehicle;
+mod watch;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use audit::Audit;
-pub use discover::{Discover, Init, ListenArgs};
+pub use discover::{BrokerArgs, Discover, Init, ListenArgs};
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub use run::{Certify, Qualify, Run, Shard};
 pub use selection::SelectionArgs;
 pub use shell::{Completions, Man};
 pub use simulate::{ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, VehicleArg};
+pub use watch::Watch;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -63,6 +65,8 @@ pub enum Command {
     Explain(Explain),
     /// Judge recorded traffic by the monitors: every vehicle and its master control
     Audit(Audit),
+    /// Judge live traffic by the monitors, as a subscriber on a broker; nothing is sent
+    Watch(Watch),
     /// Check files: messages, suites, profiles, layouts or results, told apart by their content
     Validate(Validate),
     /// Be a device on a broker: a reference AGV or a reference master control
