@@ -73,4 +73,5 @@ pub mod suite;
 pub mod tap;
 pub mod ui;
 pub mod verdict;
+pub mod watch;
 pub mod yaml;

@@ -10,13 +10,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Modules by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer.
-const LAYERS: [(&str, u8); 31] = [
+const LAYERS: [(&str, u8); 32] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
     ("run", 5),
     ("qualify", 5),
     ("audit", 5),
+    ("watch", 5),
     ("simulate", 5),
     ("report", 5),
     ("engine", 4),

@@ -129,6 +129,14 @@ impl Continuity {
         name != "connection" && before.is_some() && id == before.map(next)
     }
 
+    /// Nothing was seen for a while: no message that comes follows another one.
+    pub fn interrupted(&mut self) {
+        self.holes += 1;
+        self.last.clear();
+        self.command = None;
+        self.forget();
+    }
+
     /// What was sent before does not count any more.
     pub fn forget(&mut self) {
         self.sent = Sent::default();

@@ -8,6 +8,7 @@
 mod arrival;
 mod arrived;
 mod continuity;
+mod news;
 mod own_run;
 pub mod page;
 pub mod result;
@@ -22,6 +23,7 @@ use crate::capture::{Message, Place};
 use crate::judge::Rules;
 use crate::suite::model::Monitor;
 
+pub use news::{Address, Found};
 pub use own_run::{OwnRunError, own_run};
 use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
 use topics::Topics;
@@ -82,6 +84,8 @@ struct Scene<'a> {
     rules: &'a Rules,
     options: &'a Options,
     places: &'a Whence,
+    /// Whether each finding is told at once.
+    live: bool,
 }
 
 /// See the module.
@@ -94,6 +98,8 @@ pub struct Audit<'r> {
     elsewhere: u64,
     beyond: u64,
     places: Whence,
+    live: bool,
+    news: Vec<Found>,
     first: Option<jiff::Timestamp>,
     last: Option<jiff::Timestamp>,
 }
@@ -123,13 +129,49 @@ impl<'r> Audit<'r> {
             elsewhere: 0,
             beyond: 0,
             places: Whence::default(),
+            live: false,
+            news: Vec::new(),
             first: None,
             last: None,
         })
     }
 
+    /// From now on what is found is told at once, see [`Audit::news`].
+    #[must_use]
+    pub fn live(mut self) -> Self {
+        self.live = true;
+        self
+    }
+
+    /// What was found since this was asked last; nothing unless it is [`Audit::live`].
+    pub fn news(&mut self) -> Vec<Found> {
+        std::mem::take(&mut self.news)
+    }
+
+    /// How many messages it was shown.
+    #[must_use]
+    pub fn messages(&self) -> u64 {
+        self.messages
+    }
+
+    /// Whose topic this is; `None` for one of no vehicle, or of one that is not wanted.
+    #[must_use]
+    pub fn address(&self, topic: &str) -> Option<Address> {
+        let named = self.topics.read(topic)?;
+        let wanted = self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        wanted.then_some(Address {
+            vehicle: named.key,
+            manufacturer: named.manufacturer,
+            serial_number: named.serial_number,
+            name: named.name,
+        })
+    }
+
     /// Shows it the next message.
     pub fn observe(&mut self, message: Message) {
+        if message.after_gap {
+            self.interrupted();
+        }
         self.messages += 1;
         self.first = self.first.or(message.at);
         self.last = message.at.or(self.last);
@@ -156,8 +198,28 @@ impl<'r> Audit<'r> {
                 rules: self.rules,
                 options: &self.options,
                 places: &self.places,
+                live: self.live,
             };
             vehicle.observe(self.messages, &named.name, message, scene);
+            if self.live {
+                self.news.append(&mut vehicle.news());
+            }
+        }
+    }
+
+    /// Nothing was seen for a while: nobody knows what every vehicle did meanwhile.
+    fn interrupted(&mut self) {
+        let scene = Scene {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            live: self.live,
+        };
+        for vehicle in self.vehicles.values_mut() {
+            vehicle.interrupted(scene);
+            if self.live {
+                self.news.append(&mut vehicle.news());
+            }
         }
     }
 
@@ -168,6 +230,7 @@ impl<'r> Audit<'r> {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
+            live: false,
         };
         let vehicles: Vec<_> = self
             .vehicles

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use super::Scene;
+use super::news::Found;
 use super::result::{FindingResult, Undecided};
 use super::scope::{self, Use};
 use crate::clock::{Moment, Stamp};
@@ -35,6 +36,8 @@ pub(super) struct Side {
     judged: BTreeMap<String, u64>,
     decided: BTreeSet<(String, String)>,
     pub messages: u64,
+    /// What was found since it was taken last, where somebody wants to know at once.
+    pub news: Vec<Found>,
 }
 
 impl Side {
@@ -54,6 +57,7 @@ impl Side {
             judged: BTreeMap::new(),
             decided: BTreeSet::new(),
             messages: 0,
+            news: Vec::new(),
         })
     }
 
@@ -116,6 +120,24 @@ impl Side {
         let Observed { monitor, finding } = observed;
         let key = (monitor.clone(), finding.requirement.clone(), finding.verdict);
         let last = format!("{utc:.3}");
+        let message = finding.first.first().copied().unwrap_or_default();
+        if scene.live {
+            let known = self.kept.get(&key).map_or(0, |known| known.count);
+            self.news.push(Found {
+                manufacturer: self.header.manufacturer.clone(),
+                serial_number: self.header.serial_number.clone(),
+                role: self.role.word().to_owned(),
+                monitor: monitor.clone(),
+                requirement: finding.requirement.clone(),
+                verdict: finding.verdict,
+                count: known + finding.count,
+                before: known,
+                message,
+                at: last.clone(),
+                text: finding.message.clone(),
+                interpretation: finding.interpretation.clone(),
+            });
+        }
         if let Some(known) = self.kept.get_mut(&key) {
             known.count += finding.count;
             known.last = last;
@@ -124,7 +146,6 @@ impl Side {
         if self.kept.len() >= DIFFERENT {
             return;
         }
-        let message = finding.first.first().copied().unwrap_or_default();
         let place = scene.places.of(message);
         let finding = FindingResult {
             monitor,

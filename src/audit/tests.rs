@@ -33,6 +33,7 @@ fn traffic(library: &Library, pack: &Pack, role: Role, tests: &str, faults: &[&s
             qos: Some(0),
             retain: Some(*retain && !sent),
             place: Place::default(),
+            after_gap: false,
         });
     }
     all
@@ -182,6 +183,7 @@ fn a_version_without_rules_is_named_and_not_judged() {
         qos: None,
         retain: Some(false),
         place: Place::default(),
+        after_gap: false,
     };
     let foreign = audited(&library, vec![message(r#"{"version":"9.1.0"}"#)]);
     assert_eq!((foreign.verdict, foreign.vehicles[0].sides.len()), (None, 0));

@@ -9,6 +9,7 @@ use super::Scene;
 use super::arrival::{Known, Sorted};
 use super::arrived::{Arrived, is_at_rest, of_side, timestamp, version};
 use super::continuity::{Continuity, Step};
+use super::news::Found;
 use super::result::VehicleResult;
 use super::side::Side;
 use super::topics::Named;
@@ -55,6 +56,8 @@ pub(super) struct Vehicle {
     stale: u64,
     /// What came out while it spoke another version.
     earlier: Vec<VehicleResult>,
+    /// What was found of those.
+    news: Vec<Found>,
 }
 
 impl Vehicle {
@@ -78,6 +81,7 @@ impl Vehicle {
             twice: 0,
             stale: 0,
             earlier: Vec::new(),
+            news: Vec::new(),
         }
     }
 
@@ -134,6 +138,35 @@ impl Vehicle {
         for arrived in due {
             self.pass(arrived, scene);
         }
+    }
+
+    /// Nothing was seen for a while.
+    pub fn interrupted(&mut self, scene: Scene<'_>) {
+        for arrived in self.held() {
+            self.pass(arrived, scene);
+        }
+        self.sorted.clear();
+        self.continuity.interrupted();
+        let since = self.now;
+        for side in self.sides.iter_mut().flat_map(|sides| &mut sides.all) {
+            side.broken(since);
+        }
+    }
+
+    /// What was found since this was asked last.
+    pub fn news(&mut self) -> Vec<Found> {
+        let mut news = std::mem::take(&mut self.news);
+        for side in self.sides.iter_mut().flat_map(|sides| &mut sides.all) {
+            news.append(&mut side.news);
+        }
+        news
+    }
+
+    /// All that are held back.
+    fn held(&mut self) -> Vec<Arrived> {
+        let mut rest: Vec<Arrived> = self.sorted.values_mut().flat_map(Sorted::all).collect();
+        rest.sort_by_key(|arrived| arrived.number);
+        rest
     }
 
     /// When a message came. Without a time of the recorder, what the message says of itself has to do.
@@ -329,9 +362,7 @@ impl Vehicle {
 
     /// What came out, version by version.
     pub fn finish(mut self, scene: Scene<'_>) -> Vec<VehicleResult> {
-        let mut rest: Vec<Arrived> = self.sorted.values_mut().flat_map(Sorted::all).collect();
-        rest.sort_by_key(|arrived| arrived.number);
-        for arrived in rest {
+        for arrived in self.held() {
             self.pass(arrived, scene);
         }
         let last = self.conclude(scene);
@@ -344,6 +375,7 @@ impl Vehicle {
         if self.sides.is_none() && self.foreign.is_none() {
             self.settle(scene, true);
         }
+        self.news = self.news();
         let foreign = self.foreign.take();
         self.clocks.clear();
         let (protocol, sides) = match self.sides.take() {

@@ -153,6 +153,7 @@ impl Lines {
             qos: None,
             retain: None,
             place,
+            after_gap: false,
         })))
     }
 
@@ -189,6 +190,7 @@ impl Lines {
             qos: number("qos").filter(|qos| *qos <= 2),
             retain,
             place,
+            after_gap: false,
         }))
     }
 

@@ -4,13 +4,15 @@
 //! so that a recording without times is read to its end before the next one.
 
 use super::{CaptureError, Counted, Item, Lines, Message};
-use crate::journal::event::Event;
+use crate::journal::event::{Event, Record, Source as RecordSource};
 
 /// A recording with its name.
 struct Source {
     name: String,
     lines: Lines,
     next: Option<Message>,
+    /// Whether the recorder was cut off since the last message.
+    gap: bool,
 }
 
 /// See the module.
@@ -30,6 +32,7 @@ impl Merged {
                 name,
                 lines,
                 next: None,
+                gap: false,
             };
             source.advance()?;
             sources.push(source);
@@ -72,6 +75,7 @@ impl Source {
                 Some(Item::Message(message)) => break Some(message),
                 Some(Item::Record(record)) => {
                     let place = self.lines.place();
+                    self.gap |= is_cut_off(&record);
                     if let Event::Message {
                         topic,
                         qos,
@@ -87,6 +91,7 @@ impl Source {
                             qos: Some(qos),
                             retain: Some(retain),
                             place,
+                            after_gap: std::mem::take(&mut self.gap),
                         });
                     }
                 }
@@ -94,6 +99,11 @@ impl Source {
         };
         Ok(())
     }
+}
+
+/// Whether the recorder itself lost its connection here.
+fn is_cut_off(record: &Record) -> bool {
+    record.source == RecordSource::Link && matches!(record.event, Event::Closed { .. })
 }
 
 #[cfg(test)]

@@ -40,6 +40,8 @@ pub struct Message {
     pub retain: Option<bool>,
     /// Where it stands.
     pub place: Place,
+    /// Whether the recorder says that it saw nothing for a while before this message.
+    pub after_gap: bool,
 }
 
 /// What a line holds.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use super::args::{Discover, Format, Init, ListenArgs};
+use super::args::{BrokerArgs, Discover, Format, Init, ListenArgs};
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::bench::endpoint::{Credentials, Endpoint};
@@ -66,8 +66,8 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
         _ => return Err(choose("several devices were heard", &meant)),
     };
     let wishes = Wishes {
-        broker: arguments.listen.broker.clone(),
-        username: arguments.listen.username.clone(),
+        broker: arguments.listen.at.broker.clone(),
+        username: arguments.listen.at.username.clone(),
         lif: arguments.lif.clone(),
         vehicle_type: arguments.vehicle_type.clone(),
     };
@@ -109,18 +109,20 @@ fn export(folder: &Path) -> Result<Exit, Problem> {
     ))
 }
 
-fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
+/// Where the broker is, and how it lets in.
+pub(super) fn endpoint(arguments: &BrokerArgs) -> Result<Endpoint, Problem> {
     let credentials = arguments.username.clone().map(|username| Credentials {
         username,
         password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
-    let endpoint = Endpoint::parse(&arguments.broker, arguments.tls_ca.as_deref(), credentials).map_err(|error| {
+    Endpoint::parse(&arguments.broker, arguments.tls_ca.as_deref(), credentials).map_err(|error| {
         Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
-    })?;
-    let filters = match arguments.topic.as_slice() {
-        [] => vec!["#".to_owned()],
-        filters => filters.to_vec(),
-    };
+    })
+}
+
+fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
+    let endpoint = endpoint(&arguments.at)?;
+    let filters = arguments.at.filters();
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -128,7 +130,7 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
         .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     eprintln!(
         "listening on {} for {} s; Ctrl-C ends it earlier",
-        arguments.broker, arguments.seconds
+        arguments.at.broker, arguments.seconds
     );
     let heard = runtime.block_on(async {
         let interrupt = super::run::interrupts()?;
@@ -139,7 +141,7 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
     heard?.map_err(|why| {
         Problem::Environment(format!(
             "cannot listen on {} to {}: {why}",
-            arguments.broker,
+            arguments.at.broker,
             filters.join(", ")
         ))
     })
@@ -148,7 +150,7 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
 fn nobody(arguments: &ListenArgs) -> Problem {
     Problem::NothingToDo(format!(
         "no device was heard on {} in {} s; a broker with access rules may need --username, or --topic with what is allowed",
-        arguments.broker, arguments.seconds
+        arguments.at.broker, arguments.seconds
     ))
 }
 

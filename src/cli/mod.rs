@@ -21,6 +21,7 @@ mod shell;
 mod signals;
 mod simulate;
 mod validate;
+mod watch;
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -52,6 +53,7 @@ pub fn main() -> ExitCode {
         Command::List(arguments) => list::list(arguments),
         Command::Explain(arguments) => list::explain(arguments),
         Command::Audit(arguments) => audit::audit(arguments),
+        Command::Watch(arguments) => watch::watch(arguments),
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments),

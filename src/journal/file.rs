@@ -22,6 +22,7 @@ pub struct JournalWriter {
     line: Vec<u8>,
     /// The hash of the line that was written last.
     last: Option<String>,
+    written: u64,
 }
 
 impl JournalWriter {
@@ -34,6 +35,7 @@ impl JournalWriter {
             file: File::options().write(true).create_new(true).open(path)?,
             line: Vec::new(),
             last: None,
+            written: 0,
         })
     }
 
@@ -49,9 +51,16 @@ impl JournalWriter {
         };
         serde_json::to_writer(&mut self.line, &chained)?;
         self.line.push(b'\n');
+        self.written += self.line.len() as u64;
         self.file.write_all(&self.line)?;
         self.last = Some(hash(&self.line));
         Ok(())
+    }
+
+    /// How many bytes were written.
+    #[must_use]
+    pub fn written(&self) -> u64 {
+        self.written
     }
 
     /// Waits until the records are on the disk.

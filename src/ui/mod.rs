@@ -7,8 +7,10 @@ mod listing;
 mod output;
 mod progress;
 mod terminal;
+mod watching;
 
 pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, Quiet, RunSummary, RunTitle, TestLine};
 pub use terminal::{Terminal, TerminalOptions};
+pub use watching::{LineOptions, Lines};

@@ -23,3 +23,4 @@ mod scripted;
 mod selecting;
 mod simulating;
 mod tool;
+mod watching;

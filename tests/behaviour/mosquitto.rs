@@ -1,6 +1,7 @@
 //! A broker that is not ours.
 
 use std::net::{TcpListener, TcpStream};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -8,7 +9,7 @@ use std::time::Duration;
 pub struct Mosquitto {
     process: Child,
     pub port: u16,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Mosquitto {
@@ -20,15 +21,7 @@ impl Mosquitto {
             let folder = tempfile::tempdir().unwrap();
             let file = folder.path().join("mosquitto.conf");
             std::fs::write(&file, format!("listener {port} 127.0.0.1\nallow_anonymous true\n")).unwrap();
-            let path = std::env::var("PATH").unwrap_or_default() + ":/usr/sbin:/usr/local/sbin";
-            let started = Command::new("mosquitto")
-                .env("PATH", path)
-                .arg("-c")
-                .arg(&file)
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn();
-            let Ok(process) = started else {
+            let Ok(process) = spawn(&file) else {
                 assert!(
                     std::env::var_os("CI").is_none(),
                     "mosquitto is not installed, and CI must have it"
@@ -36,22 +29,35 @@ impl Mosquitto {
                 eprintln!("skipped: mosquitto is not installed");
                 return None;
             };
-            let mut this = Self {
-                process,
-                port,
-                _folder: folder,
-            };
-            for _ in 0..200 {
-                std::thread::sleep(Duration::from_millis(20));
-                if this.process.try_wait().unwrap().is_some() {
-                    break;
-                }
-                if TcpStream::connect(("127.0.0.1", port)).is_ok() {
-                    return Some(this);
-                }
+            let mut this = Self { process, port, folder };
+            if this.is_up() {
+                return Some(this);
             }
         }
         panic!("mosquitto does not start");
+    }
+
+    /// Whether it takes connections before long.
+    fn is_up(&mut self) -> bool {
+        for _ in 0..200 {
+            std::thread::sleep(Duration::from_millis(20));
+            if self.process.try_wait().unwrap().is_some() {
+                return false;
+            }
+            if TcpStream::connect(("127.0.0.1", self.port)).is_ok() {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Ends it without a warning, and starts it again on the same port once `meanwhile` is done.
+    pub fn restart(&mut self, meanwhile: impl FnOnce()) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+        meanwhile();
+        self.process = spawn(&self.folder.path().join("mosquitto.conf")).unwrap();
+        assert!(self.is_up(), "mosquitto does not start again");
     }
 
     pub fn url(&self) -> String {
@@ -70,6 +76,17 @@ impl Drop for Mosquitto {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+fn spawn(file: &Path) -> std::io::Result<Child> {
+    let path = std::env::var("PATH").unwrap_or_default() + ":/usr/sbin:/usr/local/sbin";
+    Command::new("mosquitto")
+        .env("PATH", path)
+        .arg("-c")
+        .arg(file)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
 }
 
 /// A port where nobody listens.

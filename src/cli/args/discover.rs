@@ -13,9 +13,9 @@ Examples:
 
 It only listens: nothing is published. States come at least every 30 s, and retained messages at once.";
 
-/// How to listen on a broker.
+/// Which broker is listened on.
 #[derive(Clone, Debug, Args)]
-pub struct ListenArgs {
+pub struct BrokerArgs {
     /// The broker: mqtt://host:port or mqtts://host:port
     #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
     pub broker: String,
@@ -28,6 +28,25 @@ pub struct ListenArgs {
     /// Topic filter to subscribe to; may be repeated [default: everything]
     #[arg(long, value_name = "FILTER")]
     pub topic: Vec<String>,
+}
+
+impl BrokerArgs {
+    /// What is subscribed to.
+    #[must_use]
+    pub fn filters(&self) -> Vec<String> {
+        match self.topic.as_slice() {
+            [] => vec!["#".to_owned()],
+            filters => filters.to_vec(),
+        }
+    }
+}
+
+/// How to listen on a broker.
+#[derive(Clone, Debug, Args)]
+pub struct ListenArgs {
+    /// Where.
+    #[command(flatten)]
+    pub at: BrokerArgs,
     /// How long to listen, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 35, value_parser = clap::value_parser!(u64).range(1..=3_600))]
     pub seconds: u64,

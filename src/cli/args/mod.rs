@@ -13,6 +13,7 @@ mod simulate;
 #[cfg(test)]
 mod tests;
 mod vehicle;
+mod watch;
 
 use std::path::PathBuf;
 
@@ -22,12 +23,13 @@ use crate::report::junit::Inconclusive;
 use crate::run::Own;
 
 pub use audit::Audit;
-pub use discover::{Discover, Init, ListenArgs};
+pub use discover::{BrokerArgs, Discover, Init, ListenArgs};
 pub use inspect::{Explain, List, Listing, Rendering, Report, Validate};
 pub use run::{CertificateArgs, Certify, Qualify, Run, Shard};
 pub use selection::SelectionArgs;
 pub use shell::{Completions, Man};
 pub use simulate::{ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, VehicleArg};
+pub use watch::Watch;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -66,6 +68,8 @@ pub enum Command {
     Explain(Explain),
     /// Judge recorded traffic by the monitors: every vehicle and its master control
     Audit(Audit),
+    /// Judge live traffic by the monitors, as a subscriber on a broker; nothing is sent
+    Watch(Watch),
     /// Check files: messages, suites, profiles, layouts or results, told apart by their content
     Validate(Validate),
     /// Simulate a device on a broker: a reference AGV or a reference master control

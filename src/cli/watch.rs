@@ -1,0 +1,78 @@
+//! `watch`: judge live traffic.
+
+use std::time::Duration;
+
+use super::args::{Format, Watch as Arguments};
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::audit::{Options, page};
+use crate::diagnostic::Diagnostic;
+use crate::run::Library;
+use crate::ui::{LineOptions, Lines};
+use crate::watch::Rotation;
+use crate::watch::session::{Settings, WatchError, run};
+
+/// `watch`.
+pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
+    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let rotation = Rotation {
+        size: arguments.rotate_size,
+        every: arguments.rotate_every,
+        keep: arguments.keep,
+    };
+    let settings = Settings {
+        endpoint: super::discover::endpoint(&arguments.at)?,
+        filters: arguments.at.filters(),
+        options: Options {
+            topic_template: arguments.topic_template.clone(),
+            vehicles: arguments.vehicle.clone(),
+            only: arguments.only.clone(),
+        },
+        record: arguments.record.clone().map(|path| (path, rotation)),
+        metrics: arguments.metrics.clone(),
+        fail_fast: arguments.fail_fast,
+        time: arguments.time,
+        tick: Duration::from_millis(500),
+    };
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
+    let json = arguments.format == Format::Json;
+    let mut lines = Lines::of_process(LineOptions {
+        every: arguments.every,
+        json,
+        summary: arguments.summary,
+        color: super::color() == crate::report::text::Color::Always,
+    });
+    let watched = runtime.block_on(async {
+        let interrupt = super::run::interrupts();
+        run(&library.rules, settings, &mut lines, interrupt).await
+    });
+    runtime.shutdown_background();
+    let result = watched.map_err(|error| problem(arguments, &error))?;
+    if json {
+        let mut value = serde_json::to_value(&result).map_err(|error| Problem::Environment(error.to_string()))?;
+        value["kind"] = "result".into();
+        super::print(&format!("{value}\n"))?;
+    } else {
+        super::print(&page::page(&result))?;
+    }
+    Ok(match result.verdict {
+        None if !result.vehicles.is_empty() => Exit::Undecided,
+        verdict => Exit::of(verdict),
+    })
+}
+
+fn problem(arguments: &Arguments, error: &WatchError) -> Problem {
+    match error {
+        WatchError::Audit(error) => Diagnostic::whole("watch", error.to_string()).into(),
+        WatchError::NeverConnected(why) => Problem::Environment(format!(
+            "cannot listen on {} to {}: {why}",
+            arguments.at.broker,
+            arguments.at.filters().join(", ")
+        )),
+        WatchError::Link(_) | WatchError::Record(_) => Problem::Environment(error.to_string()),
+    }
+}

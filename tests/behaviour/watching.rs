@@ -1,0 +1,144 @@
+//! `watch`: live traffic is judged, recorded and counted, whatever becomes of the broker.
+
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+
+use serde_json::Value;
+
+use crate::bench::{Bench, MANUFACTURER, SERIAL};
+use crate::mosquitto::Mosquitto;
+use crate::tool::{Running, run, run_in, tool};
+
+/// A vehicle that says something five times a second.
+fn talkative(bench: &Bench, broker: &str, faults: &[&str]) -> Running {
+    let mut arguments = vec!["simulate", "agv", "--broker", broker, "--state-interval", "0.2"];
+    arguments.extend(["--manufacturer", MANUFACTURER, "--serial", SERIAL]);
+    arguments.extend(faults.iter().flat_map(|fault| ["--fault", fault]));
+    Running::start(&mut tool(bench.path(), &arguments))
+}
+
+fn scraped(address: &str) -> String {
+    let mut stream = TcpStream::connect(address).unwrap();
+    write!(
+        stream,
+        "GET /metrics HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n"
+    )
+    .unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    text
+}
+
+/// Monitor, requirement and count of all findings of the vehicle, and the number of holes.
+fn found(result: &Value) -> (Vec<(String, String, u64)>, u64) {
+    let vehicle = &result["vehicles"][0];
+    let sides = vehicle["sides"].as_array().unwrap().iter();
+    let findings = sides.flat_map(|side| side["findings"].as_array().unwrap());
+    let text = |finding: &Value, member: &str| finding[member].as_str().unwrap().to_owned();
+    let found = findings.map(|finding| {
+        let count = finding["count"].as_u64().unwrap();
+        (text(finding, "monitor"), text(finding, "requirement"), count)
+    });
+    (found.collect(), vehicle["holes"].as_u64().unwrap())
+}
+
+#[test]
+fn a_watch_outlives_its_broker_and_its_journal_is_judged_as_it_was() {
+    let Some(mut mosquitto) = Mosquitto::start() else {
+        return;
+    };
+    let bench = Bench::new();
+    let broker = mosquitto.url();
+    let arguments = [
+        "watch",
+        "--broker",
+        &broker,
+        "--record",
+        "site.jsonl",
+        "--format",
+        "json",
+    ];
+    let more = ["--metrics", "127.0.0.1:0", "--rotate-size", "4K", "--every"];
+    let mut watch = Running::start(&mut tool(bench.path(), &[&arguments[..], &more[..]].concat()));
+    let metrics = watch.line("metrics are served at http://").replace("/metrics", "");
+    watch.line("watching");
+    let mut agv = talkative(&bench, &broker, &["timestamp-local"]);
+    watch.until("a finding", |watch| watch.stdout().contains("\"HDR-03\"").then_some(()));
+    let page = scraped(&metrics);
+    assert!(page.contains("application/openmetrics-text"), "{page}");
+    let counted = format!("vda5050_findings_total{{manufacturer=\"{MANUFACTURER}\",serial_number=\"{SERIAL}\"");
+    assert!(
+        page.contains(&counted) && page.contains("vda5050_broker_connected 1\n"),
+        "{page}"
+    );
+    assert!(page.ends_with("# EOF\n"), "{page}");
+    mosquitto.restart(|| {
+        watch.until("the loss", |watch| {
+            watch.stderr().contains("the connection is lost").then_some(())
+        });
+    });
+    watch.until("the return", |watch| {
+        watch.stderr().contains("connected again").then_some(())
+    });
+    let page = scraped(&metrics);
+    assert!(page.contains("vda5050_broker_connection_lost_total 1\n"), "{page}");
+    let before = watch.stdout().len();
+    agv.kill();
+    let mut other = talkative(&bench, &broker, &["timestamp-local"]);
+    watch.until("more findings", |watch| (watch.stdout().len() > before).then_some(()));
+    other.kill();
+    watch.interrupt();
+    let ended = watch.end().code(1);
+    let result: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!(result["kind"], "result");
+    let (findings, holes) = found(&result);
+    assert!(findings.iter().any(|(_, requirement, _)| requirement == "HDR-03") && holes > 0);
+    let mut parts: Vec<String> = std::fs::read_dir(bench.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .filter(|name| name.starts_with("site") && name.ends_with(".jsonl"))
+        .collect();
+    parts.sort();
+    assert!(parts.len() > 1, "{parts:?}");
+    let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+    let audited = run_in(bench.path(), &[&["audit", "--format", "json"], &parts[..]].concat()).code(1);
+    assert_eq!(
+        found(&serde_json::from_str(&audited.stdout).unwrap()),
+        (findings, holes)
+    );
+}
+
+#[test]
+fn a_faultless_vehicle_is_accused_of_nothing_and_the_first_violation_of_another_ends_the_watch() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    let broker = mosquitto.url();
+    let mut agv = talkative(&bench, &broker, &[]);
+    agv.line("1 reference AGV(s) on ");
+    let all = bench.run(&["watch", "--broker", &broker, "--for", "2s", "--summary", "1s"]);
+    let all = all
+        .code(0)
+        .prints("0 violations, 0 warnings")
+        .prints("PASS  the vehicle");
+    assert!(all.stderr.contains("1 vehicle heard by now"), "{}", all.stderr);
+    agv.kill();
+    let mut agv = talkative(&bench, &broker, &["timestamp-local"]);
+    agv.line("1 reference AGV(s) on ");
+    let found = bench.run(&["watch", "--broker", &broker, "--fail-fast"]).code(1);
+    let lines: Vec<&str> = found.stdout.lines().collect();
+    assert!(
+        lines[0].contains(" FAIL ACME 0001, vehicle: HDR-03"),
+        "{}",
+        found.stdout
+    );
+    assert!(lines[1].contains("/state {\"headerId\":"), "{}", found.stdout);
+}
+
+#[test]
+fn without_a_broker_or_with_nonsense_it_does_not_begin() {
+    run(&["watch", "--broker", "mqtt://127.0.0.1:1"])
+        .code(5)
+        .says("cannot listen on");
+    run(&["watch", "--only", "no/such"]).code(2).says("no/such");
+    run(&["watch", "--rotate-size", "1M"]).code(2).says("--record");
+}
