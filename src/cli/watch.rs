@@ -47,7 +47,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
         color: super::color() == crate::report::text::Color::Always,
     });
     let watched = runtime.block_on(async {
-        let interrupt = super::run::interrupts();
+        let interrupt = super::run::interrupts().map_err(WatchFailed::Signals)?;
         run(&library.rules, settings, &mut lines, interrupt).await
     });
     runtime.shutdown_background();
