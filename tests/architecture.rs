@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Modules by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer.
-const LAYERS: [(&str, u8); 31] = [
+const LAYERS: [(&str, u8); 32] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -19,6 +19,7 @@ const LAYERS: [(&str, u8); 31] = [
     ("audit", 5),
     ("simulate", 5),
     ("report", 5),
+    ("explore", 5),
     ("engine", 4),
     ("judge", 4),
     ("reference", 4),

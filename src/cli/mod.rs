@@ -5,6 +5,7 @@ mod audit;
 mod device;
 mod discover;
 pub mod exit;
+mod explore;
 mod list;
 mod plan;
 mod problem;
@@ -48,6 +49,7 @@ pub fn main() -> ExitCode {
         Command::List(arguments) => list::list(arguments),
         Command::Explain(arguments) => list::explain(arguments),
         Command::Audit(arguments) => audit::audit(arguments),
+        Command::Explore(arguments) => explore::explore(arguments),
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments),

@@ -25,7 +25,8 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     if arguments.verify {
         return verify(folder);
     }
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let mut library = Library::load(arguments.suites.suites.as_deref())?;
+    library.add(&own_tests(folder)?)?;
     let Recording { journal, torn } = file::read(&folder.join("journal.jsonl")).map_err(|error| {
         Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
     })?;
@@ -61,6 +62,30 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
         }
     };
     Ok(Exit::of(result.verdict))
+}
+
+/// The tests that lie in a bundle because no suite has them: conversations of an exploration.
+fn own_tests(folder: &Path) -> Result<Vec<(String, String)>, Problem> {
+    let folder = folder.join("tests");
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let unreadable = |error: std::io::Error| Problem::Environment(format!("{}: {error}", folder.display()));
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        let Some(name) = path.file_name().and_then(|name| name.to_str()).filter(|name| name.ends_with(".yaml")) else {
+            continue;
+        };
+        let text = std::fs::read_to_string(&path).map_err(unreadable)?;
+        let role = if text.lines().any(|line| line.trim_end() == "device: master-control") {
+            "master-control"
+        } else {
+            "agv"
+        };
+        all.push((format!("suites/{role}/explore/{name}"), text));
+    }
+    Ok(all)
 }
 
 fn rejudge(folder: &Path, result: &crate::result::RunResult) -> Result<Exit, Problem> {

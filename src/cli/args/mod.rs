@@ -5,6 +5,7 @@
 
 mod audit;
 mod discover;
+mod explore;
 mod inspect;
 mod run;
 mod selection;
@@ -20,6 +21,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use audit::Audit;
 pub use discover::{Discover, Init, ListenArgs};
+pub use explore::Explore;
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub use run::{Certify, Qualify, Run, Shard};
 pub use selection::SelectionArgs;
@@ -63,6 +65,8 @@ pub enum Command {
     Explain(Explain),
     /// Judge recorded traffic by the monitors: every vehicle and its master control
     Audit(Audit),
+    /// Hold long random conversations with a device, and shrink those that fail to the shortest
+    Explore(Explore),
     /// Check files: messages, suites, profiles, layouts or results, told apart by their content
     Validate(Validate),
     /// Be a device on a broker: a reference AGV or a reference master control
