@@ -9,6 +9,7 @@ mod bench;
 mod broken;
 mod discovering;
 mod exit_codes;
+mod exploring;
 mod hostile;
 mod inspecting;
 mod interrupted;
