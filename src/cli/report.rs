@@ -74,7 +74,11 @@ fn own_tests(folder: &Path) -> Result<Vec<(String, String)>, Problem> {
     let mut all = Vec::new();
     for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        let Some(name) = path.file_name().and_then(|name| name.to_str()).filter(|name| name.ends_with(".yaml")) else {
+        let Some(name) = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .filter(|name| name.ends_with(".yaml"))
+        else {
             continue;
         };
         let text = std::fs::read_to_string(&path).map_err(unreadable)?;

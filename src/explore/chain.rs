@@ -29,7 +29,11 @@ impl ConversationFile {
     /// A conversation that was written before; `None` when the text does not begin with the id of a test.
     #[must_use]
     pub fn read(text: String) -> Option<Self> {
-        let id = text.lines().find_map(|line| line.strip_prefix("test:"))?.trim().to_owned();
+        let id = text
+            .lines()
+            .find_map(|line| line.strip_prefix("test:"))?
+            .trim()
+            .to_owned();
         Some(Self::new(id, text, 0, Vec::new()))
     }
 

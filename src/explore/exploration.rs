@@ -137,7 +137,11 @@ impl Exploration {
         }
         let mut shown = Vec::new();
         for (number, finding) in found.into_iter().enumerate() {
-            note(&format!("shrinking {} ({} stimuli)", finding.requirement, finding.chain.stimuli().len()));
+            note(&format!(
+                "shrinking {} ({} stimuli)",
+                finding.requirement,
+                finding.chain.stimuli().len()
+            ));
             shown.push(self.shrunk(&grammar, finding, number + 1, stage)?);
         }
         if !shown.is_empty() && !stage.interrupted() {
@@ -161,7 +165,11 @@ impl Exploration {
         let names = self.grammar.stimuli.keys();
         let chains = names.filter_map(|name| Some((name, Chain::shortest_to(&self.grammar, name)?)));
         let probes = chains.map(|(name, chain)| {
-            let file = chain.file(&self.grammar, &format!("explore/probe-{name}"), "Every stimulus is tried once.");
+            let file = chain.file(
+                &self.grammar,
+                &format!("explore/probe-{name}"),
+                "Every stimulus is tried once.",
+            );
             (chain, file)
         });
         probes.collect()
@@ -185,7 +193,9 @@ impl Exploration {
             let conversations = [(chain.clone(), file.clone())];
             let result = stage.carry_out(&[file], Purpose::Trial)?;
             let again = findings(&result, &conversations);
-            Ok(again.iter().any(|one| one.requirement == finding.requirement && one.source == finding.source))
+            Ok(again
+                .iter()
+                .any(|one| one.requirement == finding.requirement && one.source == finding.source))
         };
         let chain = shrink(grammar, &finding.chain, self.trials, |chain| shows(chain, stage))?;
         let mut times = 0;

@@ -57,7 +57,10 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
         let Some((chain, file)) = conversations.iter().find(|(_, file)| file.id == test.id) else {
             continue;
         };
-        let bad = test.decisions.iter().filter(|one| matches!(one.verdict(), Verdict::Fail | Verdict::Warning));
+        let bad = test
+            .decisions
+            .iter()
+            .filter(|one| matches!(one.verdict(), Verdict::Fail | Verdict::Warning));
         let placed = bad.filter_map(|one| Some((file.stimulus_at(line(&one.place)?)?, one)));
         let Some((at, first)) = placed.min_by_key(|(at, one)| (*at, line(&one.place))) else {
             continue;
@@ -71,7 +74,10 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
         );
     }
     for monitor in &result.monitors {
-        let bad = monitor.findings.iter().filter(|one| matches!(one.verdict, Verdict::Fail | Verdict::Warning));
+        let bad = monitor
+            .findings
+            .iter()
+            .filter(|one| matches!(one.verdict, Verdict::Fail | Verdict::Warning));
         for finding in bad {
             let seq = finding.first.first().copied().unwrap_or_default();
             let during = |range: Option<(u64, u64)>| range.is_some_and(|(first, last)| (first..=last).contains(&seq));
@@ -82,7 +88,10 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
             }) else {
                 continue;
             };
-            let step = test.steps.iter().rfind(|step| step.journal.is_some_and(|(first, _)| first <= seq));
+            let step = test
+                .steps
+                .iter()
+                .rfind(|step| step.journal.is_some_and(|(first, _)| first <= seq));
             let at = step.and_then(|step| file.stimulus_at(line(&step.place)?));
             let cut = at.map_or_else(|| chain.clone(), |at| chain.until(at));
             note(

@@ -161,8 +161,11 @@ impl Grammar {
             let all: Vec<String> = all.iter().map(ToString::to_string).collect();
             unreadable(all.join("; "))
         })?;
-        let grammar: Self = serde_json::from_value(yaml::value(&tree)).map_err(|error| unreadable(error.to_string()))?;
-        grammar.complaint().map_or(Ok(grammar.clone()), |why| Err(unreadable(why)))
+        let grammar: Self =
+            serde_json::from_value(yaml::value(&tree)).map_err(|error| unreadable(error.to_string()))?;
+        grammar
+            .complaint()
+            .map_or(Ok(grammar.clone()), |why| Err(unreadable(why)))
     }
 
     /// The first thing that is named and is not there.
@@ -175,14 +178,22 @@ impl Grammar {
         }
         self.stimuli.iter().find_map(|(name, stimulus)| {
             let then = stimulus.then.situation.iter();
-            let lost = stimulus.situations.iter().chain(then).find(|one| !self.situations.contains_key(*one));
+            let lost = stimulus
+                .situations
+                .iter()
+                .chain(then)
+                .find(|one| !self.situations.contains_key(*one));
             if let Some(lost) = lost {
-                return Some(format!("the stimulus `{name}` names the situation `{lost}`, which there is not"));
+                return Some(format!(
+                    "the stimulus `{name}` names the situation `{lost}`, which there is not"
+                ));
             }
             let answers = stimulus.answer.iter().chain(&stimulus.again);
             let lost = answers.into_iter().find(|one| !self.answers.contains_key(*one));
             if let Some(lost) = lost {
-                return Some(format!("the stimulus `{name}` names the answer `{lost}`, which there is not"));
+                return Some(format!(
+                    "the stimulus `{name}` names the answer `{lost}`, which there is not"
+                ));
             }
             let spec = stimulus.spec.as_deref().unwrap_or(&self.spec);
             spec.parse::<VersionRange>()
@@ -195,7 +206,10 @@ impl Grammar {
     #[must_use]
     pub fn only(mut self, pack: &Pack, keeps: impl Fn(&str, &Stimulus) -> bool) -> Self {
         self.stimuli.retain(|name, stimulus| {
-            let spec = stimulus.spec.as_deref().and_then(|spec| spec.parse::<VersionRange>().ok());
+            let spec = stimulus
+                .spec
+                .as_deref()
+                .and_then(|spec| spec.parse::<VersionRange>().ok());
             spec.is_none_or(|spec| spec.contains(pack.version)) && keeps(name, stimulus)
         });
         self

@@ -1,4 +1,9 @@
-#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, reason = "a test may fail by panicking")]
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may fail by panicking"
+)]
 
 use std::convert::Infallible;
 
@@ -8,11 +13,16 @@ use crate::run::{Library, VirtualRun, run_silently};
 
 fn grammar(library: &Library, version: &str) -> Grammar {
     let pack = library.rules.packs.get(version).expect("a version");
-    Grammar::load(&library.assets, Role::Agv).expect("the grammar of the suites").only(pack, |_, _| true)
+    Grammar::load(&library.assets, Role::Agv)
+        .expect("the grammar of the suites")
+        .only(pack, |_, _| true)
 }
 
 fn places(files: &[ConversationFile]) -> Vec<(String, String)> {
-    files.iter().map(|file| (format!("suites/agv/{}.yaml", file.id), file.text.clone())).collect()
+    files
+        .iter()
+        .map(|file| (format!("suites/agv/{}.yaml", file.id), file.text.clone()))
+        .collect()
 }
 
 fn exploration(grammar: Grammar, seed: u64, conversations: usize) -> Exploration {
@@ -30,10 +40,16 @@ fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
     for version in ["2.0.0", "2.1.0"] {
         let mut library = Library::load(None).expect("the built-in suites");
         let grammar = grammar(&library, version);
-        let reach = |name: &String| Chain::shortest_to(&grammar, name).unwrap_or_else(|| panic!("nothing leads to {name}"));
-        let probes = grammar.stimuli.keys().map(|name| reach(name).file(&grammar, &format!("explore/{name}"), "Why."));
+        let reach =
+            |name: &String| Chain::shortest_to(&grammar, name).unwrap_or_else(|| panic!("nothing leads to {name}"));
+        let probes = grammar
+            .stimuli
+            .keys()
+            .map(|name| reach(name).file(&grammar, &format!("explore/{name}"), "Why."));
         let files: Vec<ConversationFile> = probes.collect();
-        let tests = library.add(&places(&files)).unwrap_or_else(|all| panic!("{}", all[0].render(false)));
+        let tests = library
+            .add(&places(&files))
+            .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
         assert_eq!(tests.len(), grammar.stimuli.len());
     }
 }
@@ -46,7 +62,9 @@ fn the_same_seed_draws_the_same_conversations_and_they_are_tests_without_a_compl
     assert_eq!(drawn(1), drawn(1));
     assert_ne!(drawn(1), drawn(2));
     let files: Vec<ConversationFile> = drawn(3).into_iter().map(|(_, file)| file).collect();
-    library.add(&places(&files)).unwrap_or_else(|all| panic!("{}", all[0].render(false)));
+    library
+        .add(&places(&files))
+        .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
 }
 
 #[test]
@@ -74,7 +92,12 @@ fn found(faults: &[&str], seed: u64, conversations: usize) -> Vec<super::Finding
     run.complete = false;
     run.faults = faults.iter().map(|&fault| fault.to_owned()).collect();
     let finished = run_silently(&library, &pack, run).expect("a run");
-    let undecided = finished.result.tests.iter().filter(|test| test.journal.is_none()).count();
+    let undecided = finished
+        .result
+        .tests
+        .iter()
+        .filter(|test| test.journal.is_none())
+        .count();
     assert_eq!(undecided, 0, "every conversation begins");
     findings(&finished.result, &drawn)
 }
@@ -91,7 +114,11 @@ fn a_faultless_vehicle_is_accused_of_nothing() {
 fn a_fault_is_found_where_it_shows() {
     let all = found(&["outdated-update-taken-over"], 1, 20);
     let source = Source::Stimulus("outdated".to_owned());
-    assert!(all.iter().any(|one| one.requirement == "ORD-REJ-10" && one.source == source), "{all:#?}");
+    assert!(
+        all.iter()
+            .any(|one| one.requirement == "ORD-REJ-10" && one.source == source),
+        "{all:#?}"
+    );
 }
 
 #[test]
@@ -100,8 +127,19 @@ fn shrinking_keeps_what_a_failure_needs_and_nothing_else() {
     let grammar = grammar(&library, "2.1.0");
     let names = |all: &[&str]| all.iter().map(|&name| name.to_owned()).collect::<Vec<String>>();
     let long = names(&[
-        "ask-state", "order-open", "ask-unknown", "release-one", "release-one", "cancel", "order-next", "download", "ask-state",
-        "order-open", "link-lost", "release-one", "outdated",
+        "ask-state",
+        "order-open",
+        "ask-unknown",
+        "release-one",
+        "release-one",
+        "cancel",
+        "order-next",
+        "download",
+        "ask-state",
+        "order-open",
+        "link-lost",
+        "release-one",
+        "outdated",
     ]);
     let chain = Chain::of(&grammar, &long).expect("the grammar allows it");
     let fails = |chain: &Chain| -> Result<bool, Infallible> {

@@ -33,7 +33,9 @@ pub(super) fn file(chain: &Chain, grammar: &Grammar, id: &str, why: &str) -> Con
     let mut body = String::new();
     let mut lengths = Vec::new();
     for name in chain.stimuli() {
-        let Some(stimulus) = grammar.stimuli.get(name) else { continue };
+        let Some(stimulus) = grammar.stimuli.get(name) else {
+            continue;
+        };
         needs.extend(stimulus.needs.iter().map(String::as_str));
         specs.extend(stimulus.spec.as_deref());
         let sent = filled(&stimulus.sends, grammar, &model, stimulus);
@@ -59,13 +61,27 @@ pub(super) fn file(chain: &Chain, grammar: &Grammar, id: &str, why: &str) -> Con
     if moves {
         text.push_str("moves: true\n");
     }
-    let why: String = why.chars().map(|one| if one.is_control() { ' ' } else { one }).collect();
-    let _ = writeln!(text, "why: \"{}\"\n\ngiven:\n{GIVEN}\nsteps:", why.replace(['"', '\\'], "'"));
+    let why: String = why
+        .chars()
+        .map(|one| if one.is_control() { ' ' } else { one })
+        .collect();
+    let _ = writeln!(
+        text,
+        "why: \"{}\"\n\ngiven:\n{GIVEN}\nsteps:",
+        why.replace(['"', '\\'], "'")
+    );
     let first = lines(&text) + 1;
-    let ends = lengths.iter().map(|length| first - 1 + u32::try_from(*length).unwrap_or(u32::MAX - first)).collect();
+    let ends = lengths
+        .iter()
+        .map(|length| first - 1 + u32::try_from(*length).unwrap_or(u32::MAX - first))
+        .collect();
     text.push_str(&body);
     text.push_str("\nfinally:\n");
-    for ending in grammar.endings.iter().filter(|ending| ending.with.is_subset(&model.facts)) {
+    for ending in grammar
+        .endings
+        .iter()
+        .filter(|ending| ending.with.is_subset(&model.facts))
+    {
         indented(&ending.steps, &mut text);
     }
     ConversationFile::new(id.to_owned(), text, first, ends)
@@ -86,7 +102,8 @@ fn answer<'a>(grammar: &'a Grammar, model: &Model, stimulus: &'a Stimulus) -> &'
     let beside = stimulus.sole.as_ref().is_some_and(|fact| model.facts.contains(fact));
     let name = if beside { stimulus.again.as_ref() } else { None };
     let name = name.or(stimulus.answer.as_ref());
-    name.and_then(|name| grammar.answers.get(name)).map_or("", String::as_str)
+    name.and_then(|name| grammar.answers.get(name))
+        .map_or("", String::as_str)
 }
 
 /// Fills in what the stimulus gives, and then what the conversation has come to.
@@ -106,7 +123,10 @@ fn replaced(text: &str, open: &str, value: impl Fn(&str) -> Option<String>) -> S
         let (before, from) = rest.split_at(at);
         out.push_str(before);
         let inner = &from[open.len()..];
-        match inner.split_once('}').and_then(|(name, after)| Some((value(name)?, after))) {
+        match inner
+            .split_once('}')
+            .and_then(|(name, after)| Some((value(name)?, after)))
+        {
             Some((value, after)) => {
                 out.push_str(&value);
                 rest = after;

@@ -18,7 +18,10 @@ fn conversation() -> String {
 /// The reports of a folder, by the order in which they were made.
 fn reports(folder: &Path) -> Vec<PathBuf> {
     let device = folder.join("reports/vda5050-tck-reference-agv");
-    let mut all: Vec<PathBuf> = fs::read_dir(device).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut all: Vec<PathBuf> = fs::read_dir(device)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     all.sort();
     all
 }
@@ -31,13 +34,20 @@ fn what_may_be_said_is_shown() {
 #[test]
 fn conversations_with_a_faultless_vehicle_find_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let ended = run_in(folder.path(), &["explore", "--virtual", "--conversations", "4", "--format", "json"]).code(0);
+    let ended = run_in(
+        folder.path(),
+        &["explore", "--virtual", "--conversations", "4", "--format", "json"],
+    )
+    .code(0);
     let explored: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(explored["conversations"], 4);
     assert_eq!(explored["undecided"], 0);
     assert_eq!(explored["findings"].as_array().unwrap().len(), 0);
     let report = explored["report"].as_str().unwrap();
-    prints(&run_in(folder.path(), &["report", report, "--rejudge"]).code(0), "byte for byte");
+    prints(
+        &run_in(folder.path(), &["report", report, "--rejudge"]).code(0),
+        "byte for byte",
+    );
 }
 
 #[test]
@@ -71,8 +81,16 @@ fn a_conversation_is_carried_out_over_sockets() {
 
 #[test]
 fn mistakes_of_the_user_are_named() {
-    run(&["explore", "--virtual", "--focus", "outdatd"]).code(2).says("outdated");
-    run(&["explore", "--virtual", "--fault", "no-such-fault"]).code(2).says("no-such-fault");
-    run(&["explore", "--virtual", "--replay", "missing.yaml"]).code(2).says("missing.yaml");
-    run(&["explore", "--role", "master-control"]).code(2).says("master-control");
+    run(&["explore", "--virtual", "--focus", "outdatd"])
+        .code(2)
+        .says("outdated");
+    run(&["explore", "--virtual", "--fault", "no-such-fault"])
+        .code(2)
+        .says("no-such-fault");
+    run(&["explore", "--virtual", "--replay", "missing.yaml"])
+        .code(2)
+        .says("missing.yaml");
+    run(&["explore", "--role", "master-control"])
+        .code(2)
+        .says("master-control");
 }

@@ -51,10 +51,20 @@ pub struct Explore {
     #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with = "profile")]
     pub in_virtual_time: bool,
     /// Give the built-in device a defect; may be repeated (see `list faults`)
-    #[arg(long, value_name = "NAME", help_heading = "Built-in device", conflicts_with = "profile")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = "Built-in device",
+        conflicts_with = "profile"
+    )]
     pub fault: Vec<String>,
     /// Let the built-in device take a liberty; may be repeated (see `list tolerances`)
-    #[arg(long, value_name = "NAME", help_heading = "Built-in device", conflicts_with = "profile")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = "Built-in device",
+        conflicts_with = "profile"
+    )]
     pub tolerance: Vec<String>,
     /// Measure how many of its faults are found: every one, or every NUMBERth
     #[arg(long, value_name = "NUMBER", help_heading = "Built-in device", num_args = 0..=1, default_missing_value = "1", requires = "in_virtual_time", conflicts_with = "fault")]

@@ -36,7 +36,9 @@ pub(super) fn every_fault(
 ) -> Result<Exit, Problem> {
     let mut library = Library::load(None)?;
     let drawn = exploration.drawn(&exploration.grammar, &mut Coverage::default());
-    let places = drawn.iter().map(|(_, file)| (format!("suites/agv/{}.yaml", file.id), file.text.clone()));
+    let places = drawn
+        .iter()
+        .map(|(_, file)| (format!("suites/agv/{}.yaml", file.id), file.text.clone()));
     let tests = library.add(&places.collect::<Vec<_>>())?;
     let faults: Vec<&'static Fault> = BuiltIn::every_fault(role).step_by(every).collect();
     let next = AtomicUsize::new(0);
@@ -47,7 +49,9 @@ pub(super) fn every_fault(
             scope.spawn(|| {
                 while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let found = one(role, &library, pack, &tests, &drawn, fault);
-                    all.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(found);
+                    all.lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner)
+                        .push(found);
                 }
             });
         }
@@ -87,7 +91,9 @@ fn shown(all: &[Found], stimuli: usize, seed: u64, format: Format) -> String {
     let found = all.iter().filter(|one| one.found).count();
     let named = all.iter().filter(|one| one.named).count();
     if format == Format::Json {
-        let faults = all.iter().map(|one| json!({ "fault": one.fault.name, "found": one.found, "named": one.named }));
+        let faults = all
+            .iter()
+            .map(|one| json!({ "fault": one.fault.name, "found": one.found, "named": one.named }));
         let value = json!({
             "format": "vda5050-tck.exploration-measured/1",
             "seed": seed,

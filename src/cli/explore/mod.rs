@@ -77,7 +77,11 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
 fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
     for pattern in focus {
         let mut any = false;
-        for (_, stimulus) in grammar.stimuli.iter_mut().filter(|(name, _)| super::select::matches(pattern, name)) {
+        for (_, stimulus) in grammar
+            .stimuli
+            .iter_mut()
+            .filter(|(name, _)| super::select::matches(pattern, name))
+        {
             stimulus.weight = stimulus.weight.saturating_mul(FOCUS);
             any = true;
         }
@@ -108,8 +112,11 @@ fn read(path: &Path) -> Result<ConversationFile, Problem> {
             .hint("give a conversation that `explore` has written")
     })?;
     ConversationFile::read(text).ok_or_else(|| {
-        Diagnostic::whole("conversation", format!("{} does not begin with `test:`", path.display()))
-            .hint("give a conversation that `explore` has written")
-            .into()
+        Diagnostic::whole(
+            "conversation",
+            format!("{} does not begin with `test:`", path.display()),
+        )
+        .hint("give a conversation that `explore` has written")
+        .into()
     })
 }

@@ -17,7 +17,10 @@ pub(super) fn stimuli(grammar: &Grammar) -> String {
     let mut text = String::new();
     for (situation, title) in &grammar.situations {
         let _ = writeln!(text, "{situation}: {title}");
-        let here = grammar.stimuli.iter().filter(|(_, one)| one.situations.contains(situation));
+        let here = grammar
+            .stimuli
+            .iter()
+            .filter(|(_, one)| one.situations.contains(situation));
         for (name, stimulus) in here {
             let _ = writeln!(text, "  {name:<24} {}", stimulus.title);
         }
@@ -37,7 +40,10 @@ pub(super) fn explored(
     let findings = explored.findings.iter();
     if format == Format::Json {
         let all: Vec<_> = findings.map(|shown| finding(shown, folder)).collect();
-        let left_out = explored.left_out.iter().map(|(name, why)| json!({ "stimulus": name, "why": why }));
+        let left_out = explored
+            .left_out
+            .iter()
+            .map(|(name, why)| json!({ "stimulus": name, "why": why }));
         let value = json!({
             "format": "vda5050-tck.exploration/1",
             "seed": exploration.seed,
@@ -57,15 +63,25 @@ pub(super) fn explored(
     let mut text = String::new();
     for shown in findings {
         let one = &shown.finding;
-        let asks = catalogue.get(&one.requirement).map_or("", |requirement| requirement.text.as_str());
-        let word = if one.verdict == Verdict::Fail { "FAIL" } else { "WARNING" };
+        let asks = catalogue
+            .get(&one.requirement)
+            .map_or("", |requirement| requirement.text.as_str());
+        let word = if one.verdict == Verdict::Fail {
+            "FAIL"
+        } else {
+            "WARNING"
+        };
         let _ = writeln!(text, "{word} {}  {asks}", one.requirement);
         let _ = writeln!(text, "  seen     {}", one.message);
         let by = match &one.source {
             Source::Stimulus(name) => format!("what must be heard after {name}"),
             Source::Monitor(name) => format!("the monitor {name}"),
         };
-        let times = if one.count == 1 { "conversation" } else { "conversations" };
+        let times = if one.count == 1 {
+            "conversation"
+        } else {
+            "conversations"
+        };
         let _ = writeln!(text, "  by       {by}, in {} {times}", one.count);
         let _ = writeln!(text, "  shortest {}", one.chain.stimuli().join(", "));
         if shown.shows.0 < shown.shows.1 {
@@ -91,7 +107,11 @@ pub(super) fn explored(
     );
     if explored.undecided.0 > 0 {
         let why = explored.undecided.1.as_deref().unwrap_or("no reason was given");
-        let _ = writeln!(text, "{} of them could not be carried to their end: {why}", explored.undecided.0);
+        let _ = writeln!(
+            text,
+            "{} of them could not be carried to their end: {why}",
+            explored.undecided.0
+        );
     }
     if explored.interrupted {
         text.push_str("It was interrupted; what was found until then stands above.\n");
@@ -100,13 +120,27 @@ pub(super) fn explored(
         let _ = writeln!(text, "report: {}", folder.join("report.html").display());
     }
     let count = explored.findings.len();
-    let _ = writeln!(text, "{}", if count == 0 { "no finding".to_owned() } else { format!("findings: {count}") });
+    let _ = writeln!(
+        text,
+        "{}",
+        if count == 0 {
+            "no finding".to_owned()
+        } else {
+            format!("findings: {count}")
+        }
+    );
     Ok(text)
 }
 
 fn path(shown: &Shown, folder: Option<&Path>) -> Option<String> {
     let name = shown.file.id.rsplit('/').next()?;
-    Some(folder?.join("findings").join(format!("{name}.yaml")).display().to_string())
+    Some(
+        folder?
+            .join("findings")
+            .join(format!("{name}.yaml"))
+            .display()
+            .to_string(),
+    )
 }
 
 fn finding(shown: &Shown, folder: Option<&Path>) -> serde_json::Value {
@@ -131,13 +165,21 @@ fn finding(shown: &Shown, folder: Option<&Path>) -> serde_json::Value {
 pub(super) fn replayed(result: &RunResult) -> String {
     let mut text = String::new();
     for test in &result.tests {
-        let verdict = test.verdict.map_or_else(|| "not applicable".to_owned(), |verdict| verdict.to_string());
+        let verdict = test
+            .verdict
+            .map_or_else(|| "not applicable".to_owned(), |verdict| verdict.to_string());
         let _ = writeln!(text, "{}: {verdict}", test.id);
         if let Some(why) = test.not_applicable.as_ref().or(test.reason.as_ref()) {
             let _ = writeln!(text, "  {why}");
         }
         for decision in test.findings() {
-            let _ = writeln!(text, "  {} {}: {}", decision.requirement, decision.verdict(), decision.message);
+            let _ = writeln!(
+                text,
+                "  {} {}: {}",
+                decision.requirement,
+                decision.verdict(),
+                decision.message
+            );
         }
     }
     text

@@ -54,7 +54,9 @@ impl Device {
             return Ok(Self::Profile {
                 effective: effective.clone(),
                 surroundings: surroundings.clone(),
-                folder: profile.and_then(Path::parent).map_or_else(PathBuf::new, Path::to_path_buf),
+                folder: profile
+                    .and_then(Path::parent)
+                    .map_or_else(PathBuf::new, Path::to_path_buf),
                 still: arguments.device.no_motion,
             });
         }
@@ -240,7 +242,8 @@ impl Stage for OnStage {
 /// Writes a conversation below a folder, by its id.
 fn write(folder: &Path, file: &ConversationFile) -> Result<(), Problem> {
     let name = file.id.rsplit('/').next().unwrap_or(&file.id);
-    let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(folder.join(format!("{name}.yaml")), &file.text));
+    let written =
+        std::fs::create_dir_all(folder).and_then(|()| std::fs::write(folder.join(format!("{name}.yaml")), &file.text));
     written.map_err(environment)
 }
 
