@@ -55,6 +55,7 @@ pub mod clock;
 pub mod course;
 pub mod diagnostic;
 pub mod engine;
+pub mod explore;
 pub mod journal;
 pub mod judge;
 pub mod link;

@@ -20,6 +20,7 @@ const LAYERS: [(&str, u8); 32] = [
     ("watch", 5),
     ("simulate", 5),
     ("report", 5),
+    ("explore", 5),
     ("engine", 4),
     ("judge", 4),
     ("reference", 4),

@@ -6,6 +6,7 @@ mod certify;
 mod device;
 mod discover;
 pub mod exit;
+mod explore;
 mod list;
 mod papers;
 mod pipeline;
@@ -54,6 +55,7 @@ pub fn main() -> ExitCode {
         Command::Explain(arguments) => list::explain(arguments),
         Command::Audit(arguments) => audit::audit(arguments),
         Command::Watch(arguments) => watch::watch(arguments),
+        Command::Explore(arguments) => explore::explore(arguments),
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments),

@@ -37,7 +37,8 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     if arguments.attestation {
         return super::papers::attestation(folder);
     }
-    let library = Library::load(arguments.suites.own())?;
+    let mut library = Library::load(arguments.suites.own())?;
+    library.add(&own_tests(folder)?)?;
     let Recording { journal, torn } = file::read(&folder.join(JOURNAL)).map_err(|error| {
         Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
     })?;
@@ -80,6 +81,34 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
         }
     };
     Ok(Exit::of(result.verdict))
+}
+
+/// The tests that lie in a bundle because no suite has them: conversations of an exploration.
+fn own_tests(folder: &Path) -> Result<Vec<(String, String)>, Problem> {
+    let folder = folder.join("tests");
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let unreadable = |error: std::io::Error| Problem::Environment(format!("{}: {error}", folder.display()));
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        let Some(name) = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .filter(|_| path.extension().is_some_and(|extension| extension == "yaml"))
+        else {
+            continue;
+        };
+        let text = std::fs::read_to_string(&path).map_err(unreadable)?;
+        let role = if text.lines().any(|line| line.trim_end() == "device: master-control") {
+            "master-control"
+        } else {
+            "agv"
+        };
+        all.push((format!("suites/{role}/explore/{name}"), text));
+    }
+    Ok(all)
 }
 
 /// Refuses to write over a bundle that was changed: it would come out intact. What is missing is made again; a run that was

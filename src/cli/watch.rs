@@ -47,11 +47,11 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
         color: super::color() == crate::report::text::Color::Always,
     });
     let watched = runtime.block_on(async {
-        let interrupt = super::run::interrupts().map_err(WatchFailed::Signals)?;
-        run(&library.rules, settings, &mut lines, interrupt).await
+        let interrupt = super::run::interrupts()?;
+        Ok::<_, Problem>(run(&library.rules, settings, &mut lines, interrupt).await)
     });
     runtime.shutdown_background();
-    let result = watched.map_err(|error| problem(arguments, &error))?;
+    let result = watched?.map_err(|error| problem(arguments, &error))?;
     if json {
         let mut value = serde_json::to_value(&result).map_err(|error| Problem::Environment(error.to_string()))?;
         value["kind"] = "result".into();

@@ -82,6 +82,31 @@ impl Library {
             .collect()
     }
 
+    /// Adds tests, given by path (`suites/agv/…`) and text, and gives them back in the order of their ids.
+    ///
+    /// # Errors
+    /// Every mistake in them, and ids that are there already.
+    pub fn add(&mut self, files: &[(String, String)]) -> Result<Vec<Arc<Test>>, Vec<Diagnostic>> {
+        let rules = &self.rules;
+        let tests = Suites::load_tests(
+            files.iter().map(|(path, text)| (path.as_str(), text.as_str())),
+            &self.assets,
+            &rules.packs,
+            &rules.catalogue,
+            &check_infos(),
+            &hook_facts(),
+        )?;
+        let suites = rules.suites.with(&tests).map_err(|taken| {
+            let complaint = |id: String| {
+                Diagnostic::whole("duplicate-test", format!("there is a test `{id}` already"))
+                    .hint("give one of the two another name; in reports it is all they are known by")
+            };
+            taken.into_iter().map(complaint).collect::<Vec<_>>()
+        })?;
+        self.rules.suites = Arc::new(suites);
+        Ok(tests)
+    }
+
     /// Checks the text of one test, state or monitor, and says what it is.
     ///
     /// # Errors

@@ -53,7 +53,7 @@ pub(super) fn load<'a>(
             stray(path, &mut problems);
             continue;
         };
-        if folder == "requirements" || hidden_or_note(rest) {
+        if matches!(folder, "requirements" | "explore") || hidden_or_note(rest) {
             continue;
         }
         let source = Source::new(path, text);

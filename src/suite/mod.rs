@@ -97,6 +97,44 @@ impl Suites {
         load::load(files(assets), &vocabulary, checks)
     }
 
+    /// Loads tests given by path (`suites/agv/…`) and text. The states they use are those of `assets`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with them.
+    pub fn load_tests<'a>(
+        tests: impl Iterator<Item = (&'a str, &'a str)>,
+        assets: &'a Assets,
+        packs: &Packs,
+        catalogue: &Catalogue,
+        checks: &[CheckInfo],
+        hooks: &[HookFacts],
+    ) -> Result<Vec<Arc<Test>>, Vec<Diagnostic>> {
+        let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
+        let states = assets.under("suites/states/");
+        let states = states.map(|file| (file.path.as_str(), file.text.as_str()));
+        load::load(states.chain(tests), &vocabulary, checks).map(|suites| suites.tests)
+    }
+
+    /// The same with more tests.
+    ///
+    /// # Errors
+    /// The ids that are there already.
+    pub fn with(&self, tests: &[Arc<Test>]) -> Result<Self, Vec<String>> {
+        let taken = |test: &&Arc<Test>| self.tests.iter().any(|own| own.id == test.id);
+        let taken: Vec<String> = tests.iter().filter(taken).map(|test| test.id.clone()).collect();
+        if !taken.is_empty() {
+            return Err(taken);
+        }
+        let mut all = [self.tests.as_slice(), tests].concat();
+        all.sort_by(|left, right| left.id.cmp(&right.id));
+        Ok(Self {
+            tests: all,
+            monitors: self.monitors.clone(),
+            exceptions: self.exceptions.clone(),
+            deciding: OnceLock::new(),
+        })
+    }
+
     /// Loads the text of one test, state or monitor, told apart by content, wherever it lies. The states it uses
     /// are those of `assets`.
     ///

@@ -10,6 +10,7 @@ mod broken;
 mod bystanders;
 mod discovering;
 mod exit_codes;
+mod exploring;
 mod hostile;
 mod inspecting;
 mod interrupted;

@@ -5,6 +5,7 @@
 
 mod audit;
 mod discover;
+mod explore;
 mod inspect;
 mod run;
 mod selection;
@@ -24,6 +25,7 @@ use crate::run::Own;
 
 pub use audit::Audit;
 pub use discover::{BrokerArgs, Discover, Init, ListenArgs};
+pub use explore::Explore;
 pub use inspect::{Explain, List, Listing, Rendering, Report, Validate};
 pub use run::{CertificateArgs, Certify, Qualify, Run, Shard};
 pub use selection::SelectionArgs;
@@ -70,6 +72,8 @@ pub enum Command {
     Audit(Audit),
     /// Judge live traffic by the monitors, as a subscriber on a broker; nothing is sent
     Watch(Watch),
+    /// Hold long random conversations with a device, and shrink those that fail to the shortest
+    Explore(Explore),
     /// Check files: messages, suites, profiles, layouts or results, told apart by their content
     Validate(Validate),
     /// Simulate a device on a broker: a reference AGV or a reference master control

@@ -1,0 +1,72 @@
+//! `explore`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{DeviceArgs, OutputArgs};
+
+const EXPLORE_HELP: &str = "\
+Examples:
+  vda5050-tck explore --virtual                              conversations with the built-in AGV
+  vda5050-tck explore --virtual --fault r4-drops-message-right-after-another   see a finding shrink
+  vda5050-tck explore --profile device.toml --conversations 20   # not in CI: needs a device
+  vda5050-tck explore --virtual --replay fixtures/conversations/outdated.yaml   carry out a conversation again
+
+The shortest conversation of every finding is written as a test beside the report.
+The same seed draws the same conversations.";
+
+/// `explore`.
+#[derive(Clone, Debug, Default, Args)]
+#[command(after_help = EXPLORE_HELP)]
+pub struct Explore {
+    /// The device and the bench.
+    #[command(flatten)]
+    pub device: DeviceArgs,
+    /// Where results go.
+    #[command(flatten)]
+    pub output: OutputArgs,
+    /// Begin the random choice here; another number draws other conversations
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// Draw so many conversations
+    #[arg(long, value_name = "NUMBER", default_value_t = 40)]
+    pub conversations: usize,
+    /// Say at most so much in one of them
+    #[arg(long, value_name = "NUMBER", default_value_t = 12)]
+    pub length: usize,
+    /// Only stimuli whose name matches one of these, and those that lead to them; may be repeated
+    #[arg(long, value_name = "STIMULUS")]
+    pub focus: Vec<String>,
+    /// Try at most so many shorter conversations for each finding
+    #[arg(long, value_name = "NUMBER", default_value_t = 60)]
+    pub shrink_budget: usize,
+    /// Carry out the conversations of these files again, and no others
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["focus", "every_fault"])]
+    pub replay: Vec<PathBuf>,
+    /// Show what may be said in which situation, and end
+    #[arg(long)]
+    pub stimuli: bool,
+    /// In virtual time, against the built-in device
+    #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with = "profile")]
+    pub in_virtual_time: bool,
+    /// Give the built-in device a defect; may be repeated (see `list faults`)
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = "Built-in device",
+        conflicts_with = "profile"
+    )]
+    pub fault: Vec<String>,
+    /// Let the built-in device take a liberty; may be repeated (see `list tolerances`)
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = "Built-in device",
+        conflicts_with = "profile"
+    )]
+    pub tolerance: Vec<String>,
+    /// Measure how many of its faults are found: every one, or one in NUMBER
+    #[arg(long, value_name = "NUMBER", help_heading = "Built-in device", num_args = 0..=1, default_missing_value = "1", requires = "in_virtual_time", conflicts_with = "fault")]
+    pub every_fault: Option<usize>,
+}

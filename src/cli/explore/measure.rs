@@ -1,0 +1,121 @@
+//! How many faults of a built-in device an exploration finds by itself.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use serde_json::json;
+
+use crate::cli::args::Format;
+use crate::cli::exit::Exit;
+use crate::cli::problem::Problem;
+use crate::explore::{Chain, ConversationFile, Coverage, Exploration, findings};
+use crate::pack::{Pack, Role};
+use crate::reference::Fault;
+use crate::run::{Library, VirtualRun, run_silently};
+use crate::simulate::BuiltIn;
+use crate::suite::model::Test;
+
+/// What became of one fault.
+struct Measured {
+    fault: &'static Fault,
+    /// Any requirement was found broken.
+    found: bool,
+    /// One of those the fault is about.
+    named: bool,
+}
+
+/// Explores the built-in device with every fault, or every so manyth, and says which of them are found.
+pub(super) fn every_fault(
+    role: Role,
+    pack: &Arc<Pack>,
+    exploration: &Exploration,
+    every: usize,
+    format: Format,
+) -> Result<Exit, Problem> {
+    let mut library = Library::load(None)?;
+    let drawn = exploration.drawn(&exploration.grammar, &mut Coverage::default());
+    let places = drawn
+        .iter()
+        .map(|(_, file)| (format!("suites/agv/{}.yaml", file.id), file.text.clone()));
+    let tests = library.add(&places.collect::<Vec<_>>())?;
+    let faults: Vec<&'static Fault> = BuiltIn::every_fault(role).step_by(every).collect();
+    let next = AtomicUsize::new(0);
+    let all: Mutex<Vec<Result<Measured, Problem>>> = Mutex::new(Vec::new());
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let found = one(role, &library, pack, &tests, &drawn, fault);
+                    all.lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner)
+                        .push(found);
+                }
+            });
+        }
+    });
+    let all = all.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut all: Vec<Measured> = all.into_iter().collect::<Result<_, _>>()?;
+    all.sort_by_key(|one| one.fault.name);
+    let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
+    super::super::print(&shown(&all, stimuli, exploration.seed, format))?;
+    Ok(Exit::Conforms)
+}
+
+fn one(
+    role: Role,
+    library: &Library,
+    pack: &Pack,
+    tests: &[Arc<Test>],
+    drawn: &[(Chain, ConversationFile)],
+    fault: &'static Fault,
+) -> Result<Measured, Problem> {
+    let mut run = VirtualRun::of_role(role, library, pack);
+    run.faults = vec![fault.name.to_owned()];
+    run.tests = tests.to_vec();
+    run.complete = false;
+    run.draw = None;
+    let finished = run_silently(library, pack, run).map_err(|error| Problem::Environment(error.to_string()))?;
+    let found = findings(&finished.result, drawn);
+    let broken: BTreeSet<&str> = found.iter().map(|one| one.requirement.as_str()).collect();
+    Ok(Measured {
+        fault,
+        found: !broken.is_empty(),
+        named: fault.breaks.iter().any(|id| broken.contains(id)),
+    })
+}
+
+fn shown(all: &[Measured], stimuli: usize, seed: u64, format: Format) -> String {
+    let found = all.iter().filter(|one| one.found).count();
+    let named = all.iter().filter(|one| one.named).count();
+    if format == Format::Json {
+        let faults = all
+            .iter()
+            .map(|one| json!({ "fault": one.fault.name, "found": one.found, "named": one.named }));
+        let value = json!({
+            "format": "vda5050-tck.exploration-measured/1",
+            "seed": seed,
+            "stimuli": stimuli,
+            "faults": all.len(),
+            "found": found,
+            "named": named,
+            "each": faults.collect::<Vec<_>>(),
+        });
+        return format!("{value}\n");
+    }
+    let mut text = String::new();
+    for one in all.iter().filter(|one| !one.found) {
+        let _ = writeln!(text, "not found: {}  {}", one.fault.name, one.fault.wrong);
+    }
+    let share = |part: usize| 100 * part / all.len().max(1);
+    let _ = writeln!(
+        text,
+        "{stimuli} stimuli, seed {seed}: {found} of {} faults found ({} %), {named} by a requirement they break ({} %)",
+        all.len(),
+        share(found),
+        share(named),
+    );
+    text
+}

@@ -1,0 +1,122 @@
+//! `explore`: conversations nobody wrote down, and the shortest of them that fail.
+
+mod measure;
+mod show;
+mod stage;
+
+use std::path::Path;
+
+use super::args::Explore;
+use super::device::{check_faults, pack_of};
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::diagnostic::Diagnostic;
+use crate::explore::{ConversationFile, Exploration, Grammar, Purpose, Stage as _};
+use crate::profile::{self, Surroundings};
+use crate::run::Library;
+use crate::verdict::Verdict;
+use stage::{Device, OnStage};
+
+/// How much more often a stimulus is drawn on which the exploration is focused.
+const FOCUS: u32 = 20;
+
+/// `explore`.
+pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
+    let surroundings = Surroundings::of_process();
+    let effective = profile::load(
+        arguments.device.profile.as_deref(),
+        &arguments.device.settings(),
+        &surroundings,
+    )?;
+    let library = Library::load(None)?;
+    let pack = pack_of(&library, &effective)?;
+    let role = effective.profile.device.role;
+    check_faults(role, &arguments.fault)?;
+    let grammar = Grammar::load(&library.assets, role)
+        .map_err(|error| Diagnostic::whole("explore", error.to_string()))?
+        .only(&pack, |_, _| true);
+    let grammar = focused(grammar, &arguments.focus)?;
+    if arguments.stimuli {
+        super::print(&show::stimuli(&grammar))?;
+        return Ok(Exit::Conforms);
+    }
+    let exploration = Exploration {
+        grammar,
+        seed: arguments.seed,
+        conversations: arguments.conversations,
+        length: arguments.length,
+        trials: arguments.shrink_budget,
+    };
+    if let Some(every) = arguments.every_fault {
+        return measure::every_fault(role, &pack, &exploration, every.max(1), arguments.output.format);
+    }
+    let device = Device::of(arguments, &effective, &pack, &surroundings)?;
+    let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?;
+    if !arguments.replay.is_empty() {
+        return replay(&arguments.replay, &mut stage);
+    }
+    let explored = exploration.carry_out(&mut stage, &mut |text| eprintln!("{text}"))?;
+    let folder = stage.keep(&explored)?;
+    super::print(&show::explored(
+        &explored,
+        &exploration,
+        stage.catalogue(),
+        folder.as_deref(),
+        arguments.output.format,
+    )?)?;
+    let fails = explored.findings.iter().any(|one| one.finding.verdict == Verdict::Fail);
+    Ok(match (fails, explored.interrupted) {
+        (_, true) => Exit::Interrupted,
+        (true, _) => Exit::DoesNotConform,
+        (false, _) if explored.conversations == explored.undecided.0 => Exit::Undecided,
+        (false, _) => Exit::Conforms,
+    })
+}
+
+/// The same grammar, in which some stimuli are drawn more often.
+fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
+    for pattern in focus {
+        let mut any = false;
+        for (_, stimulus) in grammar
+            .stimuli
+            .iter_mut()
+            .filter(|(name, _)| super::select::matches(pattern, name))
+        {
+            stimulus.weight = stimulus.weight.saturating_mul(FOCUS);
+            any = true;
+        }
+        if !any {
+            let names = grammar.stimuli.keys().map(String::as_str);
+            let hint = match crate::diagnostic::closest(pattern, names) {
+                Some(close) => format!("did you mean `{close}`?"),
+                None => "`vda5050-tck explore --stimuli` shows them all".to_owned(),
+            };
+            let title = format!("no stimulus matches `{pattern}`");
+            return Err(Diagnostic::whole("unknown-stimulus", title).hint(hint).into());
+        }
+    }
+    Ok(grammar)
+}
+
+/// Carries out conversations that stand in files.
+fn replay(paths: &[std::path::PathBuf], stage: &mut OnStage) -> Result<Exit, Problem> {
+    let files: Result<Vec<_>, Problem> = paths.iter().map(|path| read(path)).collect();
+    let result = stage.carry_out(&files?, Purpose::Evidence)?;
+    super::print(&show::replayed(&result))?;
+    Ok(Exit::of(result.verdict))
+}
+
+fn read(path: &Path) -> Result<ConversationFile, Problem> {
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        Diagnostic::whole("unreadable", format!("cannot read {}: {error}", path.display()))
+            .hint("give a conversation that `explore` has written")
+    })?;
+    ConversationFile::read(text).ok_or_else(|| {
+        Diagnostic::whole(
+            "conversation",
+            format!("{} does not begin with `test:`", path.display()),
+        )
+        .hint("give a conversation that `explore` has written")
+        .into()
+    })
+}

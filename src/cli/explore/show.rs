@@ -1,0 +1,186 @@
+//! What an exploration found, for people and for programs.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde_json::json;
+
+use crate::cli::args::Format;
+use crate::cli::problem::Problem;
+use crate::explore::{Exploration, Explored, Grammar, Shown, Source};
+use crate::pack::Catalogue;
+use crate::result::RunResult;
+use crate::verdict::Verdict;
+
+/// What may be said in which situation.
+pub(super) fn stimuli(grammar: &Grammar) -> String {
+    let mut text = String::new();
+    for (situation, title) in &grammar.situations {
+        let _ = writeln!(text, "{situation}: {title}");
+        let here = grammar
+            .stimuli
+            .iter()
+            .filter(|(_, one)| one.situations.contains(situation));
+        for (name, stimulus) in here {
+            let _ = writeln!(text, "  {name:<24} {}", stimulus.title);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The outcome.
+pub(super) fn explored(
+    explored: &Explored,
+    exploration: &Exploration,
+    catalogue: &Catalogue,
+    folder: Option<&Path>,
+    format: Format,
+) -> Result<String, Problem> {
+    let findings = explored.findings.iter();
+    if format == Format::Json {
+        let all: Vec<_> = findings.map(|shown| finding(shown, folder)).collect();
+        let left_out = explored
+            .left_out
+            .iter()
+            .map(|(name, why)| json!({ "stimulus": name, "why": why }));
+        let value = json!({
+            "format": "vda5050-tck.exploration/1",
+            "seed": exploration.seed,
+            "conversations": explored.conversations,
+            "stimuli": explored.stimuli,
+            "undecided": explored.undecided.0,
+            "pairs": { "tried": explored.pairs.0, "of": explored.pairs.1 },
+            "coverage": explored.coverage.table(),
+            "leftOut": left_out.collect::<Vec<_>>(),
+            "interrupted": explored.interrupted,
+            "report": folder.map(|folder| folder.display().to_string()),
+            "findings": all,
+        });
+        let text = serde_json::to_string_pretty(&value).map_err(|error| Problem::Environment(error.to_string()))?;
+        return Ok(format!("{text}\n"));
+    }
+    let mut text = String::new();
+    for shown in findings {
+        let one = &shown.finding;
+        let asks = catalogue
+            .get(&one.requirement)
+            .map_or("", |requirement| requirement.text.as_str());
+        let word = if one.verdict == Verdict::Fail {
+            "FAIL"
+        } else {
+            "WARNING"
+        };
+        let _ = writeln!(text, "{word} {}  {asks}", one.requirement);
+        let _ = writeln!(text, "  seen     {}", one.message);
+        let by = match &one.source {
+            Source::Stimulus(name) => format!("what must be heard after {name}"),
+            Source::Monitor(name) => format!("the monitor {name}"),
+        };
+        let times = if one.count == 1 {
+            "conversation"
+        } else {
+            "conversations"
+        };
+        let _ = writeln!(text, "  by       {by}, in {} {times}", one.count);
+        let _ = writeln!(text, "  shortest {}", one.chain.stimuli().join(", "));
+        if shown.shows.0 < shown.shows.1 {
+            let _ = writeln!(text, "  shows    in {} of {} attempts", shown.shows.0, shown.shows.1);
+        }
+        if let Some(path) = path(shown, folder) {
+            let _ = writeln!(text, "  again    vda5050-tck explore --replay {path}");
+        }
+        text.push('\n');
+    }
+    if !explored.left_out.is_empty() {
+        let _ = writeln!(text, "{} stimuli do not apply to the device:", explored.left_out.len());
+        for (name, why) in &explored.left_out {
+            let _ = writeln!(text, "  {name:<24} {why}");
+        }
+        text.push('\n');
+    }
+    let (tried, of) = explored.pairs;
+    let _ = writeln!(
+        text,
+        "{} conversations of {} stimuli, seed {}; {tried} of {of} pairs of situation and stimulus tried",
+        explored.conversations, explored.stimuli, exploration.seed
+    );
+    if explored.undecided.0 > 0 {
+        let why = explored.undecided.1.as_deref().unwrap_or("no reason was given");
+        let _ = writeln!(
+            text,
+            "{} of them could not be carried to their end: {why}",
+            explored.undecided.0
+        );
+    }
+    if explored.interrupted {
+        text.push_str("It was interrupted; what was found until then stands above.\n");
+    }
+    if let Some(folder) = folder {
+        let _ = writeln!(text, "report: {}", folder.join("report.html").display());
+    }
+    let count = explored.findings.len();
+    let _ = writeln!(
+        text,
+        "{}",
+        if count == 0 {
+            "no finding".to_owned()
+        } else {
+            format!("findings: {count}")
+        }
+    );
+    Ok(text)
+}
+
+fn path(shown: &Shown, folder: Option<&Path>) -> Option<String> {
+    let name = shown.file.id.rsplit('/').next()?;
+    Some(
+        folder?
+            .join("findings")
+            .join(format!("{name}.yaml"))
+            .display()
+            .to_string(),
+    )
+}
+
+fn finding(shown: &Shown, folder: Option<&Path>) -> serde_json::Value {
+    let one = &shown.finding;
+    let (kind, name) = match &one.source {
+        Source::Stimulus(name) => ("stimulus", name),
+        Source::Monitor(name) => ("monitor", name),
+    };
+    json!({
+        "requirement": one.requirement,
+        "verdict": one.verdict,
+        kind: name,
+        "message": one.message,
+        "conversations": one.count,
+        "shortest": one.chain.stimuli(),
+        "shows": { "times": shown.shows.0, "of": shown.shows.1 },
+        "file": path(shown, folder),
+    })
+}
+
+/// What became of conversations that were carried out again.
+pub(super) fn replayed(result: &RunResult) -> String {
+    let mut text = String::new();
+    for test in &result.tests {
+        let verdict = test
+            .verdict
+            .map_or_else(|| "not applicable".to_owned(), |verdict| verdict.to_string());
+        let _ = writeln!(text, "{}: {verdict}", test.id);
+        if let Some(why) = test.not_applicable.as_ref().or(test.reason.as_ref()) {
+            let _ = writeln!(text, "  {why}");
+        }
+        for decision in test.findings() {
+            let _ = writeln!(
+                text,
+                "  {} {}: {}",
+                decision.requirement,
+                decision.verdict(),
+                decision.message
+            );
+        }
+    }
+    text
+}

@@ -1,0 +1,251 @@
+//! Where conversations are carried out: on the device of a profile, or on a built-in one.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+
+use crate::cli::args::Explore;
+use crate::cli::device::tolerate;
+use crate::cli::problem::Problem;
+use crate::cli::run::interrupts;
+use crate::clock::WallClock;
+use crate::explore::{ConversationFile, Explored, Purpose, Stage};
+use crate::journal::file::JournalWriter;
+use crate::judge::RunJudge;
+use crate::pack::{Catalogue, Pack, Participant, Role};
+use crate::profile::{Effective, Surroundings};
+use crate::result::RunResult;
+use crate::run::{
+    Bundle, Finished, Library, Place, Request, Silent, SocketRun, VirtualRun, run_virtually, sources, write_all,
+};
+use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
+use crate::suite::model::Test;
+
+/// What is explored.
+pub(super) enum Device {
+    /// A built-in device in virtual time.
+    Virtual { device: BuiltIn, faults: Vec<String> },
+    /// A built-in device over sockets.
+    BuiltIn { device: BuiltIn, faults: Vec<String> },
+    /// The device of a profile.
+    Profile {
+        effective: Effective,
+        surroundings: Surroundings,
+        folder: PathBuf,
+        still: bool,
+    },
+}
+
+impl Device {
+    pub(super) fn of(
+        arguments: &Explore,
+        effective: &Effective,
+        pack: &Pack,
+        surroundings: &Surroundings,
+    ) -> Result<Self, Problem> {
+        let device = &effective.profile.device;
+        let foreign =
+            arguments.device.profile.is_some() || device.manufacturer.is_some() || device.serial_number.is_some();
+        if foreign {
+            let profile = arguments.device.profile.as_deref();
+            return Ok(Self::Profile {
+                effective: effective.clone(),
+                surroundings: surroundings.clone(),
+                folder: profile
+                    .and_then(Path::parent)
+                    .map_or_else(PathBuf::new, Path::to_path_buf),
+                still: arguments.device.no_motion,
+            });
+        }
+        let mut device: BuiltIn = match device.role {
+            Role::Agv => ReferenceAgv::new(pack).into(),
+            Role::MasterControl => ReferenceMasterControl::with_vehicles(USUAL_FLEET, pack).into(),
+        };
+        tolerate(&mut device, &arguments.tolerance)?;
+        let faults = arguments.fault.clone();
+        Ok(if arguments.in_virtual_time {
+            Self::Virtual { device, faults }
+        } else {
+            Self::BuiltIn { device, faults }
+        })
+    }
+}
+
+/// The stage of the command line: conversations and evidence leave a report, probes and trials none.
+pub(super) struct OnStage {
+    library: Library,
+    pack: Arc<Pack>,
+    device: Device,
+    reports: PathBuf,
+    runtime: Runtime,
+    interrupt: watch::Receiver<bool>,
+    rounds: u32,
+    kept: Option<PathBuf>,
+}
+
+impl OnStage {
+    pub(super) fn new(library: Library, pack: Arc<Pack>, device: Device, reports: &Path) -> Result<Self, Problem> {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()
+            .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
+        let interrupt = runtime.block_on(async { interrupts() })?;
+        Ok(Self {
+            library,
+            pack,
+            device,
+            reports: reports.to_owned(),
+            runtime,
+            interrupt,
+            rounds: 0,
+            kept: None,
+        })
+    }
+
+    pub(super) fn catalogue(&self) -> &Catalogue {
+        &self.library.rules.catalogue
+    }
+
+    /// Writes the conversations of the findings beside the last report, and says where.
+    pub(super) fn keep(&self, explored: &Explored) -> Result<Option<PathBuf>, Problem> {
+        let Some(folder) = &self.kept else { return Ok(None) };
+        for shown in &explored.findings {
+            write(&folder.join("findings"), &shown.file)?;
+        }
+        Ok(Some(folder.clone()))
+    }
+
+    fn request(tests: Vec<Arc<Test>>, run: &str) -> Request {
+        Request {
+            tests,
+            complete: false,
+            draw: None,
+            run: run.to_owned(),
+            command: std::env::args().collect(),
+            fail_fast: false,
+        }
+    }
+
+    fn finished(&self, tests: Vec<Arc<Test>>, run: &str, writer: Option<JournalWriter>) -> Result<Finished, Problem> {
+        let request = Self::request(tests, run);
+        let interrupt = self.interrupt.clone();
+        let (library, pack) = (&self.library, &self.pack);
+        match &self.device {
+            Device::Virtual { device, faults } => {
+                let asked = VirtualRun {
+                    device: device.clone(),
+                    faults: faults.clone(),
+                    tests: request.tests,
+                    complete: false,
+                    draw: None,
+                    begun: WallClock::start().now().utc,
+                    run: request.run,
+                    command: request.command,
+                    ..VirtualRun::of_role(device.role(), library, pack)
+                };
+                let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
+                let run = run_virtually(library, pack, asked, writer, interrupt, &mut nobody, &mut nowhere);
+                self.runtime.block_on(run).map_err(environment)
+            }
+            Device::BuiltIn { device, faults } => {
+                let run = SocketRun::built_in(device.clone(), faults, library, pack);
+                self.over_sockets(run, request, writer)
+            }
+            Device::Profile {
+                effective,
+                surroundings,
+                folder,
+                still,
+            } => {
+                let place = Place {
+                    folder: folder.clone(),
+                    attended: console::user_attended(),
+                    vehicles: None,
+                };
+                let mut run = SocketRun::of_profile(effective, library, pack, surroundings, place)?;
+                if *still {
+                    run.device.stand_still("motion was ruled out by --no-motion");
+                }
+                self.over_sockets(run, request, writer)
+            }
+        }
+    }
+
+    fn over_sockets(
+        &self,
+        mut run: SocketRun,
+        request: Request,
+        writer: Option<JournalWriter>,
+    ) -> Result<Finished, Problem> {
+        run.request = request;
+        let (library, pack) = (&self.library, &self.pack);
+        let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
+        let run = run.carry_out(library, pack, writer, self.interrupt.clone(), &mut nobody, &mut nowhere);
+        self.runtime.block_on(run).map_err(environment)
+    }
+
+    fn subject(&self) -> Participant {
+        match &self.device {
+            Device::Virtual { device, .. } | Device::BuiltIn { device, .. } => device.subject().clone(),
+            Device::Profile { effective, .. } => {
+                let device = &effective.profile.device;
+                Participant {
+                    role: device.role,
+                    manufacturer: device.manufacturer.clone().unwrap_or_default(),
+                    serial_number: device.serial_number.clone().unwrap_or_default(),
+                    topic_template: device.topic_template.clone(),
+                }
+            }
+        }
+    }
+}
+
+impl Stage for OnStage {
+    type Error = Problem;
+
+    fn carry_out(&mut self, files: &[ConversationFile], purpose: Purpose) -> Result<RunResult, Problem> {
+        let place = |file: &ConversationFile| (format!("suites/agv/{}.yaml", file.id), file.text.clone());
+        let places: Vec<(String, String)> = files.iter().map(place).collect();
+        let tests = self.library.add(&places)?;
+        // Tests are added in the order of their ids; they are carried out as they were given.
+        let mut tests: Vec<Arc<Test>> = tests;
+        tests.sort_by_key(|test| files.iter().position(|file| file.id == test.id));
+        self.rounds += 1;
+        let run = format!("explore-{}", self.rounds);
+        if matches!(purpose, Purpose::Probe | Purpose::Trial) {
+            return Ok(self.finished(tests, &run, None)?.result);
+        }
+        let subject = self.subject();
+        let utc = WallClock::start().now().utc;
+        let bundle = Bundle::create(&self.reports, &subject.manufacturer, &subject.serial_number, utc, &run);
+        let bundle = bundle.map_err(environment)?;
+        for file in files {
+            write(&bundle.folder().join("tests"), file)?;
+        }
+        let writer = bundle.journal().map_err(environment)?;
+        let finished = self.finished(tests, &run, Some(writer))?;
+        let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
+        write_all(&bundle, &finished.result, &quoted, finished.recorder.journal()).map_err(environment)?;
+        self.kept = Some(bundle.folder().to_owned());
+        Ok(finished.result)
+    }
+
+    fn interrupted(&self) -> bool {
+        *self.interrupt.borrow()
+    }
+}
+
+/// Writes a conversation below a folder, by its id.
+fn write(folder: &Path, file: &ConversationFile) -> Result<(), Problem> {
+    let name = file.id.rsplit('/').next().unwrap_or(&file.id);
+    let written =
+        std::fs::create_dir_all(folder).and_then(|()| std::fs::write(folder.join(format!("{name}.yaml")), &file.text));
+    written.map_err(environment)
+}
+
+fn environment(error: impl std::fmt::Display) -> Problem {
+    Problem::Environment(error.to_string())
+}

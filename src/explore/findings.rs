@@ -1,0 +1,116 @@
+//! What a run of conversations found: one finding for each requirement and place, and the conversations that show it.
+
+use std::collections::BTreeMap;
+
+use super::chain::{Chain, ConversationFile};
+use crate::result::RunResult;
+use crate::verdict::Verdict;
+
+/// What saw it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Source {
+    /// What was to be heard after a stimulus.
+    Stimulus(String),
+    /// A monitor.
+    Monitor(String),
+}
+
+/// A requirement that is broken in one way.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// The requirement.
+    pub requirement: String,
+    /// How bad.
+    pub verdict: Verdict,
+    /// What saw it.
+    pub source: Source,
+    /// One line about its first occurrence.
+    pub message: String,
+    /// The conversation of its first occurrence, cut behind the stimulus that showed it.
+    pub chain: Chain,
+    /// In how many conversations it was seen.
+    pub count: usize,
+}
+
+/// The findings of a run of these conversations, the worst first. Of each conversation the first failure counts, because
+/// what comes behind may follow from it; of each monitor every requirement.
+#[must_use]
+pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)]) -> Vec<Finding> {
+    let mut all: BTreeMap<(String, Source), Finding> = BTreeMap::new();
+    let mut note = |requirement: &str, verdict, source: Source, message: &str, chain: Chain| {
+        let key = (requirement.to_owned(), source.clone());
+        let found = all.entry(key).or_insert_with(|| Finding {
+            requirement: requirement.to_owned(),
+            verdict,
+            source,
+            message: message.to_owned(),
+            chain: chain.clone(),
+            count: 0,
+        });
+        found.count += 1;
+        if chain.stimuli().len() < found.chain.stimuli().len() {
+            found.chain = chain;
+            message.clone_into(&mut found.message);
+        }
+    };
+    for test in &result.tests {
+        let Some((chain, file)) = conversations.iter().find(|(_, file)| file.id == test.id) else {
+            continue;
+        };
+        let bad = test
+            .decisions
+            .iter()
+            .filter(|one| matches!(one.verdict(), Verdict::Fail | Verdict::Warning));
+        let placed = bad.filter_map(|one| Some((file.stimulus_at(line(&one.place)?)?, one)));
+        let Some((at, first)) = placed.min_by_key(|(at, one)| (*at, line(&one.place))) else {
+            continue;
+        };
+        note(
+            &first.requirement,
+            first.verdict(),
+            Source::Stimulus(chain.stimuli()[at].clone()),
+            &first.message,
+            chain.until(at),
+        );
+    }
+    for monitor in &result.monitors {
+        let bad = monitor
+            .findings
+            .iter()
+            .filter(|one| matches!(one.verdict, Verdict::Fail | Verdict::Warning));
+        for finding in bad {
+            let seq = finding.first.first().copied().unwrap_or_default();
+            let during = |range: Option<(u64, u64)>| range.is_some_and(|(first, last)| (first..=last).contains(&seq));
+            let test = result.tests.iter().find(|test| during(test.journal));
+            let Some((test, (chain, file))) = test.and_then(|test| {
+                let conversation = conversations.iter().find(|(_, file)| file.id == test.id)?;
+                Some((test, conversation))
+            }) else {
+                continue;
+            };
+            let step = test
+                .steps
+                .iter()
+                .rfind(|step| step.journal.is_some_and(|(first, _)| first <= seq));
+            let at = step.and_then(|step| file.stimulus_at(line(&step.place)?));
+            let cut = at.map_or_else(|| chain.clone(), |at| chain.until(at));
+            note(
+                &finding.requirement,
+                finding.verdict,
+                Source::Monitor(monitor.id.clone()),
+                &finding.message,
+                cut,
+            );
+        }
+    }
+    let mut all: Vec<Finding> = all.into_values().collect();
+    all.sort_by_key(|finding| (std::cmp::Reverse(finding.verdict), finding.requirement.clone()));
+    all
+}
+
+/// The line of a place such as `explore/3.yaml:14`, or with a column behind it.
+fn line(place: &str) -> Option<u32> {
+    let mut parts = place.rsplit(':');
+    let last: u32 = parts.next()?.parse().ok()?;
+    Some(parts.next().and_then(|before| before.parse().ok()).unwrap_or(last))
+}

@@ -1,0 +1,164 @@
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may fail by panicking"
+)]
+
+use std::convert::Infallible;
+
+use super::{Chain, ConversationFile, Coverage, Exploration, Grammar, Source, findings, shrink};
+use crate::pack::Role;
+use crate::run::{Library, VirtualRun, run_silently};
+
+fn grammar(library: &Library, version: &str) -> Grammar {
+    let pack = library.rules.packs.get(version).expect("a version");
+    Grammar::load(&library.assets, Role::Agv)
+        .expect("the grammar of the suites")
+        .only(pack, |_, _| true)
+}
+
+fn places(files: &[ConversationFile]) -> Vec<(String, String)> {
+    files
+        .iter()
+        .map(|file| (format!("suites/agv/{}.yaml", file.id), file.text.clone()))
+        .collect()
+}
+
+fn exploration(grammar: Grammar, seed: u64, conversations: usize) -> Exploration {
+    Exploration {
+        grammar,
+        seed,
+        conversations,
+        length: 12,
+        trials: 60,
+    }
+}
+
+#[test]
+fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
+    for version in ["2.0.0", "2.1.0"] {
+        let mut library = Library::load(None).expect("the built-in suites");
+        let grammar = grammar(&library, version);
+        let reach =
+            |name: &String| Chain::shortest_to(&grammar, name).unwrap_or_else(|| panic!("nothing leads to {name}"));
+        let probes = grammar
+            .stimuli
+            .keys()
+            .map(|name| reach(name).file(&grammar, &format!("explore/{name}"), "Why."));
+        let files: Vec<ConversationFile> = probes.collect();
+        let tests = library
+            .add(&places(&files))
+            .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
+        assert_eq!(tests.len(), grammar.stimuli.len());
+    }
+}
+
+#[test]
+fn the_same_seed_draws_the_same_conversations_and_they_are_tests_without_a_complaint() {
+    let mut library = Library::load(None).expect("the built-in suites");
+    let grammar = grammar(&library, "2.1.0");
+    let drawn = |seed| exploration(grammar.clone(), seed, 20).drawn(&grammar, &mut Coverage::default());
+    assert_eq!(drawn(1), drawn(1));
+    assert_ne!(drawn(1), drawn(2));
+    let files: Vec<ConversationFile> = drawn(3).into_iter().map(|(_, file)| file).collect();
+    library
+        .add(&places(&files))
+        .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
+}
+
+#[test]
+fn what_was_not_tried_yet_is_drawn_first() {
+    let library = Library::load(None).expect("the built-in suites");
+    let grammar = grammar(&library, "2.1.0");
+    let mut coverage = Coverage::default();
+    let drawn = exploration(grammar.clone(), 1, 60).drawn(&grammar, &mut coverage);
+    let (tried, of) = coverage.pairs(&grammar);
+    let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
+    assert!(tried * 10 >= of * 9, "{tried} of {of} pairs in {stimuli} stimuli");
+}
+
+/// What is found in conversations with the reference AGV.
+fn found(faults: &[&str], seed: u64, conversations: usize) -> Vec<super::Finding> {
+    let mut library = Library::load(None).expect("the built-in suites");
+    let grammar = grammar(&library, "2.1.0");
+    let drawn = exploration(grammar.clone(), seed, conversations).drawn(&grammar, &mut Coverage::default());
+    let files: Vec<ConversationFile> = drawn.iter().map(|(_, file)| file.clone()).collect();
+    let tests = library.add(&places(&files)).expect("tests");
+    let pack = library.rules.packs.latest().clone();
+    let mut run = VirtualRun::of(&library, &pack);
+    run.tests = tests;
+    run.draw = None;
+    run.complete = false;
+    run.faults = faults.iter().map(|&fault| fault.to_owned()).collect();
+    let finished = run_silently(&library, &pack, run).expect("a run");
+    let undecided = finished
+        .result
+        .tests
+        .iter()
+        .filter(|test| test.journal.is_none())
+        .count();
+    assert_eq!(undecided, 0, "every conversation begins");
+    findings(&finished.result, &drawn)
+}
+
+#[test]
+fn a_faultless_vehicle_is_accused_of_nothing() {
+    for seed in 1..=3 {
+        let all = found(&[], seed, 20);
+        assert!(all.is_empty(), "{all:#?}");
+    }
+}
+
+#[test]
+fn a_fault_is_found_where_it_shows() {
+    let all = found(&["outdated-update-taken-over"], 1, 20);
+    let source = Source::Stimulus("outdated".to_owned());
+    assert!(
+        all.iter()
+            .any(|one| one.requirement == "ORD-REJ-10" && one.source == source),
+        "{all:#?}"
+    );
+}
+
+#[test]
+fn shrinking_keeps_what_a_failure_needs_and_nothing_else() {
+    let library = Library::load(None).expect("the built-in suites");
+    let grammar = grammar(&library, "2.1.0");
+    let names = |all: &[&str]| all.iter().map(|&name| name.to_owned()).collect::<Vec<String>>();
+    let long = names(&[
+        "ask-state",
+        "order-open",
+        "ask-unknown",
+        "release-one",
+        "release-one",
+        "cancel",
+        "order-next",
+        "download",
+        "ask-state",
+        "order-open",
+        "link-lost",
+        "release-one",
+        "outdated",
+    ]);
+    let chain = Chain::of(&grammar, &long).expect("the grammar allows it");
+    let fails = |chain: &Chain| -> Result<bool, Infallible> {
+        let lost = chain.stimuli().iter().position(|name| name == "link-lost");
+        let late = chain.stimuli().iter().rposition(|name| name == "outdated");
+        Ok(matches!((lost, late), (Some(lost), Some(late)) if lost < late))
+    };
+    let Ok(short) = shrink::shrink(&grammar, &chain, 200, fails);
+    assert_eq!(short.stimuli().len(), 4, "{short:?}");
+    assert_eq!(short.stimuli().last().map(String::as_str), Some("outdated"));
+}
+
+#[test]
+fn a_grammar_that_names_what_is_not_there_is_refused_with_a_reason() {
+    let text = "explore: agv\nspec: \">=2.0\"\nbegins: rest\nnodes: [a, b]\nsituations: { rest: It rests }\nanswers: {}\n\
+                stimuli: { one: { title: One, in: [lost] } }\nendings: []\n";
+    let error = Grammar::read("suites/explore/agv.yaml", text).expect_err("a situation is missing");
+    assert_eq!(
+        error.to_string(),
+        "suites/explore/agv.yaml: the stimulus `one` names the situation `lost`, which there is not"
+    );
+}

@@ -1,0 +1,96 @@
+//! `explore`: conversations with the built-in vehicle, what they find, and that a finding can be carried out again.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::tool::{Ended, run, run_in};
+
+fn prints(ended: &Ended, text: &str) {
+    assert!(ended.stdout.contains(text), "{}", ended.stdout);
+}
+
+fn conversation() -> String {
+    format!("{}/fixtures/conversations/outdated.yaml", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The reports of a folder, by the order in which they were made.
+fn reports(folder: &Path) -> Vec<PathBuf> {
+    let device = folder.join("reports/vda5050-tck-reference-agv");
+    let mut all: Vec<PathBuf> = fs::read_dir(device)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn what_may_be_said_is_shown() {
+    insta::assert_snapshot!("stimuli", run(&["explore", "--stimuli"]).code(0).stdout);
+}
+
+#[test]
+fn conversations_with_a_faultless_vehicle_find_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let ended = run_in(
+        folder.path(),
+        &["explore", "--virtual", "--conversations", "4", "--format", "json"],
+    )
+    .code(0);
+    let explored: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(explored["conversations"], 4);
+    assert_eq!(explored["undecided"], 0);
+    assert_eq!(explored["findings"].as_array().unwrap().len(), 0);
+    let report = explored["report"].as_str().unwrap();
+    prints(
+        &run_in(folder.path(), &["report", report, "--rejudge"]).code(0),
+        "byte for byte",
+    );
+}
+
+#[test]
+fn a_finding_is_shrunk_to_a_test_that_fails_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let fault = ["--fault", "outdated-update-taken-over"];
+    let explore = ["explore", "--virtual", "--conversations", "6", "--format", "json"];
+    let ended = run_in(folder.path(), &[explore.as_slice(), &fault].concat()).code(1);
+    let explored: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let findings = explored["findings"].as_array().unwrap();
+    let found = findings.iter().find(|one| one["stimulus"] == "outdated").unwrap();
+    assert_eq!(found["requirement"], "ORD-REJ-10");
+    assert_eq!(found["shortest"].as_array().unwrap().len(), 2, "{found}");
+    assert_eq!(found["shows"]["times"], found["shows"]["of"]);
+    let file = found["file"].as_str().unwrap();
+    run_in(folder.path(), &["validate", file]).code(0);
+    let replay = ["explore", "--virtual", "--replay", file];
+    let again = run_in(folder.path(), &[replay.as_slice(), &fault].concat()).code(1);
+    prints(&again, "ORD-REJ-10 fail");
+    run_in(folder.path(), &replay).code(0);
+    let evidence = reports(folder.path()).pop().unwrap();
+    assert!(evidence.join("report.html").is_file());
+}
+
+#[test]
+fn a_conversation_is_carried_out_over_sockets() {
+    let folder = tempfile::tempdir().unwrap();
+    let ended = run_in(folder.path(), &["explore", "--replay", &conversation()]).code(0);
+    prints(&ended, "explore/ord-rej-10-3: pass");
+}
+
+#[test]
+fn mistakes_of_the_user_are_named() {
+    run(&["explore", "--virtual", "--focus", "outdatd"])
+        .code(2)
+        .says("outdated");
+    run(&["explore", "--virtual", "--fault", "no-such-fault"])
+        .code(2)
+        .says("no-such-fault");
+    run(&["explore", "--virtual", "--replay", "missing.yaml"])
+        .code(2)
+        .says("missing.yaml");
+    run(&["explore", "--role", "master-control"])
+        .code(2)
+        .says("master-control");
+}
