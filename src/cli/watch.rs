@@ -14,7 +14,7 @@ use crate::watch::session::{Settings, WatchError, run};
 
 /// `watch`.
 pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.suites.as_deref())?;
+    let library = Library::load(arguments.suites.own())?;
     let rotation = Rotation {
         size: arguments.rotate_size,
         every: arguments.rotate_every,

@@ -105,6 +105,8 @@ impl Command {
             Self::Qualify(arguments) => arguments.format,
             Self::Discover(arguments) => arguments.format,
             Self::Audit(arguments) => arguments.format,
+            Self::Watch(arguments) => arguments.format,
+            Self::Explore(arguments) => arguments.output.format,
             Self::Explain(_) | Self::Simulate(_) | Self::Init(_) | Self::Completions(_) | Self::Man(_) => Format::Text,
         }
     }

@@ -16,6 +16,7 @@ use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::pack::{Catalogue, Pack, Participant, Role};
 use crate::profile::{Effective, Surroundings};
+use crate::report::junit::Inconclusive;
 use crate::result::RunResult;
 use crate::run::{
     Bundle, Finished, Library, Place, Request, Silent, SocketRun, VirtualRun, run_virtually, sources, write_all,
@@ -126,6 +127,7 @@ impl OnStage {
             run: run.to_owned(),
             command: std::env::args().collect(),
             fail_fast: false,
+            certifies: false,
         }
     }
 
@@ -228,7 +230,8 @@ impl Stage for OnStage {
         let writer = bundle.journal().map_err(environment)?;
         let finished = self.finished(tests, &run, Some(writer))?;
         let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
-        write_all(&bundle, &finished.result, &quoted, finished.recorder.journal()).map_err(environment)?;
+        let journal = finished.recorder.journal();
+        write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::default()).map_err(environment)?;
         self.kept = Some(bundle.folder().to_owned());
         Ok(finished.result)
     }
