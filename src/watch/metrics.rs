@@ -51,6 +51,14 @@ fn escaped(text: &str) -> String {
     safe
 }
 
+/// The labels by which a vehicle is known.
+fn named(glance: &Glance) -> [(&'static str, &str); 2] {
+    [
+        ("manufacturer", &glance.manufacturer),
+        ("serial_number", &glance.serial_number),
+    ]
+}
+
 /// The page that a scraper reads.
 pub(super) fn page(watch: &Watch<'_>, contact: Contact) -> String {
     let mut page = Page(String::new());
@@ -79,12 +87,6 @@ pub(super) fn page(watch: &Watch<'_>, contact: Contact) -> String {
     );
     page.sample("vda5050_other_messages_total", &[], watch.elsewhere());
     let vehicles: Vec<&Glance> = watch.glances().collect();
-    fn named<'g>(glance: &'g Glance) -> [(&'static str, &'g str); 2] {
-        [
-            ("manufacturer", &glance.manufacturer),
-            ("serial_number", &glance.serial_number),
-        ]
-    }
     page.family("vda5050_messages", "counter", "Messages by vehicle and topic.");
     for glance in &vehicles {
         for (topic, count) in &glance.messages {

@@ -178,7 +178,9 @@ pub async fn run(
                         after_gap: std::mem::take(&mut after_gap),
                     };
                     let notices = watch.take(now, message);
-                    notices.iter().for_each(|notice| viewer.found(notice));
+                    for notice in &notices {
+                        viewer.found(notice);
+                    }
                     let failed = |notice: &Notice| notice.found.verdict == Verdict::Fail;
                     if settings.fail_fast && notices.iter().any(failed) {
                         break;

@@ -11,7 +11,7 @@ const WATCH_HELP: &str = "\
 Examples:
   vda5050-tck watch --broker mqtt://127.0.0.1:1883               until Ctrl-C
   vda5050-tck watch --record site.jsonl --rotate-every 1d --keep 14
-  vda5050-tck watch --metrics 127.0.0.1:9464 --plain             for a scraper and a log
+  vda5050-tck watch --metrics 127.0.0.1:9464 --summary 15m       for a scraper and a log
   vda5050-tck watch --for 60s --fail-fast                        as a check after a change on site
 
 It only listens: nothing is published. What a subscriber cannot see is not judged.
@@ -30,7 +30,7 @@ pub struct Watch {
     /// End at the first violation
     #[arg(long)]
     pub fail_fast: bool,
-    /// Serve findings, rates and reaction times as OpenMetrics text at http://ADDRESS/metrics
+    /// Serve findings, rates and reaction times at /metrics, as OpenMetrics text
     #[arg(long, value_name = "HOST:PORT")]
     pub metrics: Option<String>,
     /// Write a journal, which `audit` judges alike; a file that is there is renamed
