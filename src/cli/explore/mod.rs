@@ -56,12 +56,15 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         return replay(&arguments.replay, &mut stage);
     }
     let explored = exploration.carry_out(&mut stage, &mut |text| eprintln!("{text}"))?;
-    let folder = stage.keep(&explored)?;
+    let place = show::Place {
+        report: stage.report(),
+        conversations: &stage.conversations(&explored)?,
+    };
     super::print(&show::explored(
         &explored,
         &exploration,
         stage.catalogue(),
-        folder.as_deref(),
+        place,
         arguments.output.format,
     )?)?;
     let fails = explored.findings.iter().any(|one| one.finding.verdict == Verdict::Fail);

@@ -12,6 +12,15 @@ use crate::pack::Catalogue;
 use crate::result::RunResult;
 use crate::verdict::Verdict;
 
+/// Where an exploration has left what it wrote.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    /// The folder of the last report.
+    pub(super) report: Option<&'a Path>,
+    /// The folder of the conversations that show the findings.
+    pub(super) conversations: &'a Path,
+}
+
 /// What may be said in which situation.
 pub(super) fn stimuli(grammar: &Grammar) -> String {
     let mut text = String::new();
@@ -34,12 +43,12 @@ pub(super) fn explored(
     explored: &Explored,
     exploration: &Exploration,
     catalogue: &Catalogue,
-    folder: Option<&Path>,
+    place: Place<'_>,
     format: Format,
 ) -> Result<String, Problem> {
     let findings = explored.findings.iter();
     if format == Format::Json {
-        let all: Vec<_> = findings.map(|shown| finding(shown, folder)).collect();
+        let all: Vec<_> = findings.map(|shown| finding(shown, place)).collect();
         let left_out = explored
             .left_out
             .iter()
@@ -54,7 +63,7 @@ pub(super) fn explored(
             "coverage": explored.coverage.table(),
             "leftOut": left_out.collect::<Vec<_>>(),
             "interrupted": explored.interrupted,
-            "report": folder.map(|folder| folder.display().to_string()),
+            "report": place.report.map(|folder| folder.display().to_string()),
             "findings": all,
         });
         let text = serde_json::to_string_pretty(&value).map_err(|error| Problem::Environment(error.to_string()))?;
@@ -87,9 +96,7 @@ pub(super) fn explored(
         if shown.shows.0 < shown.shows.1 {
             let _ = writeln!(text, "  shows    in {} of {} attempts", shown.shows.0, shown.shows.1);
         }
-        if let Some(path) = path(shown, folder) {
-            let _ = writeln!(text, "  again    vda5050-tck explore --replay {path}");
-        }
+        let _ = writeln!(text, "  again    vda5050-tck explore --replay {}", path(shown, place));
         text.push('\n');
     }
     if !explored.left_out.is_empty() {
@@ -116,7 +123,7 @@ pub(super) fn explored(
     if explored.interrupted {
         text.push_str("It was interrupted; what was found until then stands above.\n");
     }
-    if let Some(folder) = folder {
+    if let Some(folder) = place.report {
         let _ = writeln!(text, "report: {}", folder.join("report.html").display());
     }
     let count = explored.findings.len();
@@ -132,18 +139,13 @@ pub(super) fn explored(
     Ok(text)
 }
 
-fn path(shown: &Shown, folder: Option<&Path>) -> Option<String> {
-    let name = shown.file.id.rsplit('/').next()?;
-    Some(
-        folder?
-            .join("findings")
-            .join(format!("{name}.yaml"))
-            .display()
-            .to_string(),
-    )
+fn path(shown: &Shown, place: Place<'_>) -> String {
+    let id = &shown.file.id;
+    let name = id.rsplit('/').next().unwrap_or(id);
+    place.conversations.join(format!("{name}.yaml")).display().to_string()
 }
 
-fn finding(shown: &Shown, folder: Option<&Path>) -> serde_json::Value {
+fn finding(shown: &Shown, place: Place<'_>) -> serde_json::Value {
     let one = &shown.finding;
     let (kind, name) = match &one.source {
         Source::Stimulus(name) => ("stimulus", name),
@@ -157,7 +159,7 @@ fn finding(shown: &Shown, folder: Option<&Path>) -> serde_json::Value {
         "conversations": one.count,
         "shortest": one.chain.stimuli(),
         "shows": { "times": shown.shows.0, "of": shown.shows.1 },
-        "file": path(shown, folder),
+        "file": path(shown, place),
     })
 }
 

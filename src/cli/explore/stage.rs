@@ -84,6 +84,8 @@ pub(super) struct OnStage {
     interrupt: watch::Receiver<bool>,
     rounds: u32,
     kept: Option<PathBuf>,
+    /// The report whose tests are the conversations of the findings.
+    evidence: Option<PathBuf>,
 }
 
 impl OnStage {
@@ -103,6 +105,7 @@ impl OnStage {
             interrupt,
             rounds: 0,
             kept: None,
+            evidence: None,
         })
     }
 
@@ -110,13 +113,22 @@ impl OnStage {
         &self.library.rules.catalogue
     }
 
-    /// Writes the conversations of the findings beside the last report, and says where.
-    pub(super) fn keep(&self, explored: &Explored) -> Result<Option<PathBuf>, Problem> {
-        let Some(folder) = &self.kept else { return Ok(None) };
-        for shown in &explored.findings {
-            write(&folder.join("findings"), &shown.file)?;
+    /// The report that was written last.
+    pub(super) fn report(&self) -> Option<&Path> {
+        self.kept.as_deref()
+    }
+
+    /// The folder that holds the conversations of the findings: the tests of the last report, or, where the exploration was
+    /// interrupted before they were carried out for it, a folder of their own.
+    pub(super) fn conversations(&self, explored: &Explored) -> Result<PathBuf, Problem> {
+        if let Some(evidence) = &self.evidence {
+            return Ok(evidence.join("tests"));
         }
-        Ok(Some(folder.clone()))
+        let folder = self.reports.join("conversations");
+        for shown in &explored.findings {
+            write(&folder, &shown.file)?;
+        }
+        Ok(folder)
     }
 
     fn request(tests: Vec<Arc<Test>>, run: &str) -> Request {
@@ -233,6 +245,7 @@ impl Stage for OnStage {
         let journal = finished.recorder.journal();
         write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::default()).map_err(environment)?;
         self.kept = Some(bundle.folder().to_owned());
+        self.evidence = (purpose == Purpose::Evidence).then(|| bundle.folder().to_owned());
         Ok(finished.result)
     }
 
