@@ -133,7 +133,7 @@ impl BuiltIn {
     pub fn blind_faults(role: Role) -> &'static [Fault] {
         match role {
             Role::Agv => &vehicles::BLIND_FAULTS,
-            Role::MasterControl => &[],
+            Role::MasterControl => &deviations::BLIND_FAULTS,
         }
     }
 
