@@ -404,9 +404,9 @@ fn versions_are_data() {
 #[test]
 fn incoming_messages_stay_values() {
     // Typed structs would repair what has to be detected: only the journal's own records, the results, the
-    // profile and the packs are deserialized into types.
+    // profile, the packs and the grammars of explore are deserialized into types.
     let allowed = [
-        "journal", "result", "report", "profile", "pack", "course", "verdict", "clock", "bench",
+        "journal", "result", "report", "profile", "pack", "course", "verdict", "clock", "bench", "explore",
     ];
     let mut wrong = Vec::new();
     for (path, text) in sources() {

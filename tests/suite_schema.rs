@@ -23,7 +23,8 @@ fn suites_below(folder: &Path, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries {
         let path = entry.expect("entry").path();
-        if path.is_dir() && !path.ends_with("suites/requirements") && !path.ends_with("suites/qualification") {
+        let of_another_form = ["suites/requirements", "suites/qualification", "suites/explore"];
+        if path.is_dir() && !of_another_form.iter().any(|folder| path.ends_with(folder)) {
             suites_below(&path, found);
         } else if path.extension().is_some_and(|extension| extension == "yaml") {
             found.push(path);

@@ -2,50 +2,11 @@
 
 use super::grammar::Grammar;
 use super::model::Model;
-use super::writing;
+use super::writing::{self, ConversationFile};
 
 /// A conversation, by the names of its stimuli.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Chain(Vec<String>);
-
-/// A conversation as an ordinary test.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ConversationFile {
-    /// The id of the test.
-    pub id: String,
-    /// The text of the file.
-    pub text: String,
-    /// The last line of each stimulus, counted from one.
-    ends: Vec<u32>,
-    /// Where the body begins.
-    first: u32,
-}
-
-impl ConversationFile {
-    pub(super) fn new(id: String, text: String, first: u32, ends: Vec<u32>) -> Self {
-        Self { id, text, ends, first }
-    }
-
-    /// A conversation that was written before; `None` when the text does not begin with the id of a test.
-    #[must_use]
-    pub fn read(text: String) -> Option<Self> {
-        let id = text
-            .lines()
-            .find_map(|line| line.strip_prefix("test:"))?
-            .trim()
-            .to_owned();
-        Some(Self::new(id, text, 0, Vec::new()))
-    }
-
-    /// Which stimulus a line belongs to, counted from zero.
-    #[must_use]
-    pub fn stimulus_at(&self, line: u32) -> Option<usize> {
-        if line < self.first {
-            return None;
-        }
-        self.ends.iter().position(|end| line <= *end)
-    }
-}
 
 impl Chain {
     /// These stimuli, when a grammar allows them in this order.
@@ -101,6 +62,6 @@ impl Chain {
     /// The conversation as a test of this id.
     #[must_use]
     pub fn file(&self, grammar: &Grammar, id: &str, why: &str) -> ConversationFile {
-        writing::file(self, grammar, id, why)
+        writing::file(&self.0, grammar, id, why)
     }
 }

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use super::chain::{Chain, ConversationFile};
+use super::chain::Chain;
 use super::coverage::Coverage;
 use super::draw::{Random, draw};
 use super::findings::{Finding, findings};
 use super::grammar::Grammar;
 use super::shrink::shrink;
+use super::writing::ConversationFile;
 use crate::result::RunResult;
 use crate::verdict::Verdict;
 

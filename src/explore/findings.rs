@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::chain::{Chain, ConversationFile};
+use super::chain::Chain;
+use super::writing::ConversationFile;
 use crate::result::RunResult;
 use crate::verdict::Verdict;
 

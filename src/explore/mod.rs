@@ -16,9 +16,10 @@ pub mod shrink;
 mod tests;
 mod writing;
 
-pub use chain::{Chain, ConversationFile};
+pub use chain::Chain;
 pub use coverage::Coverage;
 pub use exploration::{Exploration, Explored, Purpose, Shown, Stage};
 pub use findings::{Finding, Source, findings};
 pub use grammar::{Grammar, GrammarError, Stimulus};
 pub use model::Model;
+pub use writing::ConversationFile;

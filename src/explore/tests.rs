@@ -8,11 +8,10 @@
 use std::convert::Infallible;
 
 use super::{Chain, ConversationFile, Coverage, Exploration, Grammar, Source, findings, shrink};
-use crate::pack::Role;
+use crate::pack::{Pack, Role};
 use crate::run::{Library, VirtualRun, run_silently};
 
-fn grammar(library: &Library, version: &str) -> Grammar {
-    let pack = library.rules.packs.get(version).expect("a version");
+fn grammar(library: &Library, pack: &Pack) -> Grammar {
     Grammar::load(&library.assets, Role::Agv)
         .expect("the grammar of the suites")
         .only(pack, |_, _| true)
@@ -37,9 +36,10 @@ fn exploration(grammar: Grammar, seed: u64, conversations: usize) -> Exploration
 
 #[test]
 fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
-    for version in ["2.0.0", "2.1.0"] {
+    let packs = Library::load(None).expect("the built-in suites").rules.packs;
+    for pack in packs.all() {
         let mut library = Library::load(None).expect("the built-in suites");
-        let grammar = grammar(&library, version);
+        let grammar = grammar(&library, pack);
         let reach =
             |name: &String| Chain::shortest_to(&grammar, name).unwrap_or_else(|| panic!("nothing leads to {name}"));
         let probes = grammar
@@ -57,7 +57,7 @@ fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
 #[test]
 fn the_same_seed_draws_the_same_conversations_and_they_are_tests_without_a_complaint() {
     let mut library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, "2.1.0");
+    let grammar = grammar(&library, library.rules.packs.latest());
     let drawn = |seed| exploration(grammar.clone(), seed, 20).drawn(&grammar, &mut Coverage::default());
     assert_eq!(drawn(1), drawn(1));
     assert_ne!(drawn(1), drawn(2));
@@ -70,7 +70,7 @@ fn the_same_seed_draws_the_same_conversations_and_they_are_tests_without_a_compl
 #[test]
 fn what_was_not_tried_yet_is_drawn_first() {
     let library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, "2.1.0");
+    let grammar = grammar(&library, library.rules.packs.latest());
     let mut coverage = Coverage::default();
     let drawn = exploration(grammar.clone(), 1, 60).drawn(&grammar, &mut coverage);
     let (tried, of) = coverage.pairs(&grammar);
@@ -81,7 +81,7 @@ fn what_was_not_tried_yet_is_drawn_first() {
 /// What is found in conversations with the reference AGV.
 fn found(faults: &[&str], seed: u64, conversations: usize) -> Vec<super::Finding> {
     let mut library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, "2.1.0");
+    let grammar = grammar(&library, library.rules.packs.latest());
     let drawn = exploration(grammar.clone(), seed, conversations).drawn(&grammar, &mut Coverage::default());
     let files: Vec<ConversationFile> = drawn.iter().map(|(_, file)| file.clone()).collect();
     let tests = library.add(&places(&files)).expect("tests");
@@ -124,7 +124,7 @@ fn a_fault_is_found_where_it_shows() {
 #[test]
 fn shrinking_keeps_what_a_failure_needs_and_nothing_else() {
     let library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, "2.1.0");
+    let grammar = grammar(&library, library.rules.packs.latest());
     let names = |all: &[&str]| all.iter().map(|&name| name.to_owned()).collect::<Vec<String>>();
     let long = names(&[
         "ask-state",

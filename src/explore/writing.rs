@@ -3,9 +3,47 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::chain::{Chain, ConversationFile};
 use super::grammar::{Grammar, Stimulus};
 use super::model::Model;
+
+/// A conversation as an ordinary test.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ConversationFile {
+    /// The id of the test.
+    pub id: String,
+    /// The text of the file.
+    pub text: String,
+    /// The last line of each stimulus, counted from one.
+    ends: Vec<u32>,
+    /// Where the body begins.
+    first: u32,
+}
+
+impl ConversationFile {
+    fn new(id: String, text: String, first: u32, ends: Vec<u32>) -> Self {
+        Self { id, text, ends, first }
+    }
+
+    /// A conversation that was written before; `None` when the text does not begin with the id of a test.
+    #[must_use]
+    pub fn read(text: String) -> Option<Self> {
+        let id = text
+            .lines()
+            .find_map(|line| line.strip_prefix("test:"))?
+            .trim()
+            .to_owned();
+        Some(Self::new(id, text, 0, Vec::new()))
+    }
+
+    /// Which stimulus a line belongs to, counted from zero.
+    #[must_use]
+    pub fn stimulus_at(&self, line: u32) -> Option<usize> {
+        if line < self.first {
+            return None;
+        }
+        self.ends.iter().position(|end| line <= *end)
+    }
+}
 
 /// The preamble: the order 0 of the conversation.
 const GIVEN: &str = "  - use: idle
@@ -25,14 +63,14 @@ const GIVEN: &str = "  - use: idle
 ";
 
 /// The text, and which line belongs to which stimulus.
-pub(super) fn file(chain: &Chain, grammar: &Grammar, id: &str, why: &str) -> ConversationFile {
+pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -> ConversationFile {
     let mut model = Model::begin(grammar);
     let mut needs: BTreeSet<&str> = BTreeSet::new();
     let mut specs: BTreeSet<&str> = BTreeSet::from([grammar.spec.as_str()]);
     let mut moves = false;
     let mut body = String::new();
     let mut lengths = Vec::new();
-    for name in chain.stimuli() {
+    for name in stimuli {
         let Some(stimulus) = grammar.stimuli.get(name) else {
             continue;
         };
@@ -50,7 +88,7 @@ pub(super) fn file(chain: &Chain, grammar: &Grammar, id: &str, why: &str) -> Con
     }
     let mut text = String::new();
     let _ = writeln!(text, "test: {id}");
-    let _ = writeln!(text, "title: \"A conversation: {}\"", chain.stimuli().join(", "));
+    let _ = writeln!(text, "title: \"A conversation: {}\"", stimuli.join(", "));
     let _ = writeln!(text, "device: {}", grammar.side());
     let specs: Vec<&str> = specs.into_iter().collect();
     let _ = writeln!(text, "spec: \"{}\"", specs.join(", "));

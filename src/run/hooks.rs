@@ -258,7 +258,11 @@ mod tests {
         }
     }
 
-    async fn outcomes(script: &str, folder: &std::path::Path, actions: &[HookAction]) -> Vec<HookOutcome> {
+    async fn outcomes(
+        script: &str,
+        folder: &std::path::Path,
+        actions: &[HookAction],
+    ) -> (Vec<HookOutcome>, ProfileHooks) {
         let command = ["sh", "-c", script].map(str::to_owned).to_vec();
         let mut device = DeviceProcess::new(command, folder.to_owned(), None);
         device.start().unwrap();
@@ -270,7 +274,7 @@ mod tests {
             }
             all.push(hooks.carry_out(&hook(action.clone()), &BTreeMap::new()).await);
         }
-        all
+        (all, hooks)
     }
 
     #[tokio::test]
@@ -279,7 +283,8 @@ mod tests {
         let script = "trap 'echo goodbye >> said; exit 0' TERM; echo hello >> said; touch ready; \
                       while true; do sleep 0.05; done";
         let actions = [HookAction::StopDevice, HookAction::StopDevice, HookAction::StartDevice];
-        let all = outcomes(script, folder.path(), &actions).await;
+        // The device ends with its hooks.
+        let (all, _hooks) = outcomes(script, folder.path(), &actions).await;
         assert!(
             all.iter().all(|outcome| matches!(outcome, HookOutcome::Done(_))),
             "{all:?}"

@@ -8,8 +8,13 @@ use crate::bench::{Bench, Profile, QUICK};
 use crate::scripted::Scripted;
 use crate::tool::{Ended, Running};
 
-/// Tests without motion, which take some seconds.
-const TESTS: [&str; 2] = [QUICK, "order-rejection/unreadable*"];
+/// Tests without motion, of which some take seconds: others act while the vehicle is tested.
+const TESTS: [&str; 4] = [
+    QUICK,
+    "order-rejection/unreadable*",
+    "maps/listed-when-ready",
+    "state/running-download-kept",
+];
 
 /// A run against a healthy vehicle, with others who act from its first test on. The client ids that were seen are given to them.
 fn run_beside(others: impl FnOnce(u16, &[String])) -> (Bench, Ended) {

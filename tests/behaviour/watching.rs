@@ -114,7 +114,7 @@ fn a_faultless_vehicle_is_accused_of_nothing_and_the_first_violation_of_another_
     let bench = Bench::new();
     let broker = mosquitto.url();
     let mut agv = talkative(&bench, &broker, &[]);
-    agv.line("1 reference AGV(s) on ");
+    agv.line("1 simulated AGV(s) on ");
     let all = bench.run(&["watch", "--broker", &broker, "--for", "2s", "--summary", "1s"]);
     let all = all
         .code(0)
@@ -123,7 +123,7 @@ fn a_faultless_vehicle_is_accused_of_nothing_and_the_first_violation_of_another_
     assert!(all.stderr.contains("1 vehicle heard by now"), "{}", all.stderr);
     agv.kill();
     let mut agv = talkative(&bench, &broker, &["timestamp-local"]);
-    agv.line("1 reference AGV(s) on ");
+    agv.line("1 simulated AGV(s) on ");
     let found = bench.run(&["watch", "--broker", &broker, "--fail-fast"]).code(1);
     let lines: Vec<&str> = found.stdout.lines().collect();
     assert!(

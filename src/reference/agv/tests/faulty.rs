@@ -58,6 +58,8 @@ fn every_fault_shows_in_some_scenario() {
     let scenarios = super::scenarios::all();
     let good: Vec<_> = scenarios.iter().map(|scenario| run(scenario, &[])).collect();
     let shows = |name: &str| {
+        // Named where a scenario panics.
+        println!("{name}");
         scenarios
             .iter()
             .zip(&good)
