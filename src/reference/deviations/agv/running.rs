@@ -250,7 +250,7 @@ records! {
     fault "r1-trigger-times-out" ["ACT-37"] "A waitForTrigger is FINISHED after five seconds also without the trigger."
         => triggered(|| Duration::from_secs(5));
     fault "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting."
-        => triggered(|| Duration::ZERO);
+        => triggered(|| Duration::from_millis(1));
     fault "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done."
         => forgetting(|_| true);
     fault "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done."
