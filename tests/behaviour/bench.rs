@@ -125,6 +125,12 @@ impl Bench {
 
     /// A reference AGV in a process of its own, under the name of the profile.
     pub fn agv(&self, port: u16, faults: &[&str]) -> Running {
+        let faults: Vec<&str> = faults.iter().flat_map(|fault| ["--fault", fault]).collect();
+        self.agv_with(port, &faults)
+    }
+
+    /// The same with these arguments.
+    pub fn agv_with(&self, port: u16, more: &[&str]) -> Running {
         let broker = format!("mqtt://127.0.0.1:{port}");
         let mut arguments = vec![
             "simulate",
@@ -136,7 +142,7 @@ impl Bench {
             "--serial",
             SERIAL,
         ];
-        arguments.extend(faults.iter().flat_map(|fault| ["--fault", fault]));
+        arguments.extend(more);
         Running::start(&mut tool(self.path(), &arguments))
     }
 

@@ -102,10 +102,7 @@ fn a_watch_outlives_its_broker_and_its_journal_is_judged_as_it_was() {
     assert!(parts.len() > 1, "{parts:?}");
     let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
     let audited = run_in(bench.path(), &[&["audit", "--format", "json"], &parts[..]].concat()).code(1);
-    assert_eq!(
-        found(&serde_json::from_str(&audited.stdout).unwrap()),
-        (findings, holes)
-    );
+    assert_eq!(found(&serde_json::from_str(&audited.stdout).unwrap()).0, findings);
 }
 
 #[test]
