@@ -63,6 +63,7 @@ records! {
             Some(refusal.naming("actionId", &refused.id).naming("actionType", &refused.action_type))
         });
     fault "unsupported-field-ignored" ["ORD-REJ-05", "OPT-02"] "Ignores fields of an order it has no use for."
+        because "Whether a vehicle ignores a field that its factsheet does not list, or honours it, cannot be seen; the ruling of OPT-02 is a warning."
         => overlooking(|_, what| matches!(what, Objection::Unused(..)));
     fault "r2-min-height-ignored" ["OPT-02", "ORD-REJ-05"] "An order with minHeight is accepted although the vehicle does not know the field."
         => overlooking(|_, what| matches!(what, Objection::Unused(path, _) if path.ends_with("minHeight")));
