@@ -9,7 +9,7 @@ use super::{DeviceArgs, OutputArgs};
 const EXPLORE_HELP: &str = "\
 Examples:
   vda5050-tck explore --virtual                              conversations with the built-in AGV
-  vda5050-tck explore --virtual --fault r4-drops-message-right-after-another   see a finding shrink
+  vda5050-tck explore --virtual --fault outdated-update-taken-over   see a finding shrink
   vda5050-tck explore --profile device.toml --conversations 20   # not in CI: needs a device
   vda5050-tck explore --virtual --replay fixtures/conversations/outdated.yaml   carry out a conversation again
 
