@@ -123,20 +123,6 @@ impl BuiltIn {
         }
     }
 
-    /// Every fault of the reference device.
-    pub fn every_fault(role: Role) -> impl Iterator<Item = &'static Fault> {
-        Self::faults(role).iter().chain(Self::blind_faults(role))
-    }
-
-    /// Its faults of blind rounds, which the suites need not find yet.
-    #[must_use]
-    pub fn blind_faults(role: Role) -> &'static [Fault] {
-        match role {
-            Role::Agv => &vehicles::BLIND_FAULTS,
-            Role::MasterControl => &deviations::BLIND_FAULTS,
-        }
-    }
-
     /// The liberties it can take.
     #[must_use]
     pub fn tolerances(role: Role) -> &'static [Tolerance] {
