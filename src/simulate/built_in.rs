@@ -18,8 +18,8 @@ use crate::pack::Participant;
 use crate::pack::Role;
 use crate::profile::TimeLimits;
 use crate::reference::Fault;
-use crate::reference::agv::Agv;
 use crate::reference::deviations::agv::Tolerance;
+use crate::reference::deviations::personas::mock;
 use crate::reference::deviations::{agv as vehicles, master_control as deviations};
 
 /// A built-in device under test.
@@ -223,6 +223,6 @@ impl BuiltIn {
     /// The mock AGVs, for a bench in memory.
     pub fn mock_peers(&self) -> impl Iterator<Item = Box<dyn Peer>> {
         let vehicles = self.fleet().into_iter().flat_map(|fleet| &fleet.vehicles);
-        vehicles.map(|vehicle| Box::new(DevicePeer(Agv::new(vehicle.config.clone()))) as Box<dyn Peer>)
+        vehicles.map(|vehicle| Box::new(DevicePeer(mock(vehicle.config.clone()))) as Box<dyn Peer>)
     }
 }

@@ -22,7 +22,6 @@ impl Agv {
             self.book.nodes.truncate(1);
             self.book.edges.clear();
         }
-        self.hold_cancel_as_told();
         self.book.cancel = Some(Cancel {
             action_id: action_id.to_owned(),
             to_node,
@@ -87,7 +86,7 @@ impl Agv {
         let open = |action: &Action| action.of_order() && !action.status.is_terminal();
         let awaited = |action: &Action| open(action) && self.allows(Permission::CancelAwaits(action), true);
         let ends = !under_way && !self.actions.iter().any(awaited);
-        if !self.allows(Permission::EndCancel, ends) || self.holds_cancel_as_told() {
+        if !self.allows(Permission::EndCancel, ends) {
             return false;
         }
         self.happens(Event::CancelEnding);

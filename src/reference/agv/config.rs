@@ -212,6 +212,8 @@ pub struct AgvConfig {
     pub max_instant_actions: usize,
     /// Most characters of an id.
     pub max_id: usize,
+    /// It takes ids of digits only.
+    pub numerical_ids: bool,
     /// Names of its load handling devices (loadSpecification.loadPositions).
     pub load_positions: Vec<String>,
     /// Largest message in bytes.
@@ -295,6 +297,7 @@ impl Default for AgvConfig {
             max_actions: 20,
             max_instant_actions: MAX_INSTANT_ACTIONS,
             max_id: MAX_STRING,
+            numerical_ids: false,
             load_positions: LOAD_POSITIONS.map(str::to_owned).to_vec(),
             max_message: 1 << 20,
             switched_on: Vec::new(),

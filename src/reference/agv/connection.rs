@@ -100,7 +100,6 @@ impl Agv {
         let will = self.config.topic("connection").map(str::to_owned).map(|topic| {
             // The will does not count: it has the headerId of the message that would be next.
             let mut message = self.header("connection", false);
-            self.date_back_as_told(&mut message);
             message.insert("connectionState".into(), json!("CONNECTIONBROKEN"));
             Publication {
                 topic,
@@ -226,11 +225,10 @@ impl Agv {
         if counts {
             *next = next.wrapping_add(1);
         }
-        let version = self.told_version().unwrap_or(&self.config.version);
         let mut header = Map::new();
         header.insert("headerId".into(), json!(id));
         header.insert("timestamp".into(), json!(format!("{:.2}", self.now.utc)));
-        header.insert("version".into(), json!(version));
+        header.insert("version".into(), json!(self.config.version));
         header.insert("manufacturer".into(), json!(self.config.manufacturer));
         header.insert("serialNumber".into(), json!(self.config.serial_number));
         self.heads(Head { name, counts }, &mut header);

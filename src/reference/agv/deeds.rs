@@ -155,9 +155,6 @@ impl Agv {
         let Some(action) = self.actions.get(id).cloned() else {
             return;
         };
-        if self.fails_as_told(&action) {
-            return;
-        }
         let outcome = match self.does(&action) {
             Some(outcome) => outcome,
             None => {
@@ -333,7 +330,7 @@ impl Agv {
 
     /// Takes a pose over, and the node it is on.
     pub(crate) fn take_pose(&mut self, pose: Pose, node: &str) {
-        self.find_position();
+        self.happens(Event::Placed);
         self.maps.enable_any(&pose.map_id);
         self.motion.place(pose);
         node.clone_into(&mut self.book.last_node);

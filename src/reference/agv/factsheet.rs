@@ -39,7 +39,7 @@ const ON_A_LINE: [&str; 4] = [
 impl Agv {
     /// Publishes the factsheet.
     pub(crate) fn publish_factsheet(&mut self) {
-        let body = self.shown_factsheet(self.true_factsheet());
+        let body = self.true_factsheet();
         self.publish("factsheet", body);
     }
 
@@ -116,7 +116,7 @@ impl Agv {
                 "msgLen": self.config.max_message,
                 "idLen": self.config.max_id,
                 "enumLen": MAX_STRING,
-                "idNumericalOnly": false,
+                "idNumericalOnly": self.config.numerical_ids,
             },
             "maxArrayLens": {
                 "order.nodes": nodes,

@@ -63,10 +63,7 @@ impl Agv {
             (Hindrance::Action, self.actions_forbid_driving()),
         ];
         let stops = |(what, there): (Hindrance, bool)| there && !self.allows(Permission::DriveAgainst(what), false);
-        !hindrances.into_iter().any(stops)
-            && !self.is_told_to_stand()
-            && self.lingers_until.is_none()
-            && self.allows(Permission::Drive, true)
+        !hindrances.into_iter().any(stops) && self.lingers_until.is_none() && self.allows(Permission::Drive, true)
     }
 
     /// The next node, if it may be driven to (ORD-07).
@@ -162,7 +159,6 @@ impl Agv {
             return;
         }
         self.happens(Event::LegEnded);
-        self.stand_as_told();
         let Some(sequence_id) = self.book.edge_ahead().map(|edge| edge.sequence_id) else {
             return;
         };

@@ -123,12 +123,11 @@ impl Agv {
 
     /// The shortest time between two states.
     pub(crate) fn min_state_interval(&self) -> Duration {
-        self.told_state_interval().max(self.config.min_state_interval)
+        self.lasts(Span::LeastBetweenStates, self.config.min_state_interval)
     }
 
     fn state_interval(&self) -> Duration {
         self.lasts(Span::BetweenStates, self.stated_interval())
-            .max(self.told_state_interval())
     }
 
     /// The interval the factsheet promises (FACT-14).
@@ -223,10 +222,7 @@ impl Agv {
     fn send_state(&mut self, body: Map<String, Value>, periodic: bool) {
         let kept = body.clone();
         self.report.periodic = periodic;
-        if !self.swallows_state() {
-            let body = self.shown_state(body);
-            self.publish("state", body);
-        }
+        self.publish("state", body);
         let next_visualization = self.report.next_visualization;
         self.report = Report {
             last: Some((self.moment(), kept)),
@@ -244,7 +240,6 @@ impl Agv {
         }
         body.insert("velocity".into(), self.velocity_picture());
         self.says(Part::Visualization, &mut body);
-        let body = self.shown_visualization(body);
         self.publish("visualization", body);
     }
 }

@@ -100,7 +100,6 @@ impl Agv {
         let stops = edge.is_some_and(|edge| self.stops_on_edge(edge.sequence_id));
         let (way, to_node) = match stops {
             true => (BRAKING.min(distance / 4.0), false),
-            false if self.stops_before(&stop.node.id) => (distance / 2.0, false),
             false => (distance, true),
         };
         let own = match self.mode {

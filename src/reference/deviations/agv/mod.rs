@@ -173,5 +173,6 @@ pub fn built(config: AgvConfig, names: &[&str]) -> Result<Agv, UnknownFault> {
     for record in names.iter().copied().chain(liberties).filter_map(find) {
         agv.switch_on((record.make)());
     }
+    agv.switch_on(super::personas::persona());
     Ok(agv)
 }
