@@ -1,7 +1,9 @@
-//! Acceptance of orders and order updates: the decision table of figure 8, and taking an order over.
+//! Acceptance of orders and order updates: the decision table of figure 8 (section 6.6.2), and taking an order over.
 //!
-//! Whether the vehicle is able to do what it is asked is decided in `ability`, a refusal reported in `rejection`; what an
-//! update is about stands in `updates`.
+//! Whether the vehicle is able to do what it is asked is decided in `ability`, a refusal reported in `rejection`; what
+//! an update is about stands in `updates`. Instant actions that run keep no order from being begun (the ruling of
+//! ORD-FLOW-02); an order in a mode that takes none is refused (that of MODE-02); a duplicate is ignored whatever it
+//! says (that of ORD-REJ-13); actions of the horizon are represented, too (that of ASTATE-01).
 
 use serde_json::Value;
 

@@ -1,4 +1,8 @@
 //! cancelOrder, for all four capabilities of figure 9, and giving an order up altogether (section 6.6.3).
+//!
+//! A completed order is none, and its cancelOrder is FAILED although a table of section 6.8 knows no failure of it (the
+//! ruling of ORD-CANCEL-18); the error stays for a while, as nothing says how long (that of ORD-CANCEL-19). A vehicle
+//! that cannot stop between nodes keeps the next node, and no edge (that of ORD-CANCEL-09).
 
 use super::Agv;
 use super::action_kinds::Deed;

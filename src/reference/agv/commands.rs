@@ -1,4 +1,7 @@
-//! What people and tests do to the vehicle: buttons, switches, moving it by hand.
+//! What people and tests do to the vehicle: buttons, switches, moving it by hand (modes: section 6.10.6; errors:
+//! 6.10.5).
+//!
+//! What resolves itself is a WARNING, and FATAL what somebody has to see to (the ruling of ERR-03).
 
 use serde_json::{Value, json};
 

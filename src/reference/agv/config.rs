@@ -1,7 +1,9 @@
-//! What one reference AGV is told about itself: identity, site, capabilities and timing.
+//! What one reference AGV is told about itself: identity, site, capabilities and timing; most of it stands in its
+//! factsheet (section 6.15).
 //!
-//! Everything that differs between protocol versions (version string, topics, error names, features) is
-//! handed in by the caller, who takes it from the pack.
+//! Everything that differs between protocol versions (version string, topics, error names, features) is handed in by
+//! the caller, who takes it from the pack. Names of errors that the standard does not give are those of the rulings
+//! (ORD-FLOW-01, ORD-FLOW-04, ORD-REJ-15, CORR-07).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;

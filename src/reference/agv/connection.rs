@@ -1,4 +1,8 @@
-//! The link to the broker: last will, ONLINE and OFFLINE, reconnecting, headers and publishing (section 6.14).
+//! The link to the broker: last will, ONLINE and OFFLINE, reconnecting, headers and publishing (sections 6.2, 6.4 and
+//! 6.14).
+//!
+//! ONLINE comes before the first state (the ruling of CONN-05), the base is driven on without a link (that of MQTT-04),
+//! and headerIds count on over a reconnect and anew when the vehicle is switched on (that of HDR-02).
 
 use std::collections::BTreeMap;
 

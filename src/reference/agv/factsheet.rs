@@ -1,4 +1,6 @@
 //! The factsheet, generated from the configuration and the table of actions (section 6.15).
+//!
+//! It is published on every new connection, as nothing says when it first has to be (the ruling of FACT-01).
 
 use serde_json::{Map, Value, json};
 

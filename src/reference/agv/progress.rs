@@ -1,6 +1,8 @@
 //! Driving the order: setting out, arriving, traversing, and beginning actions (sections 6.10.2 and 6.12).
 //!
-//! Which way a leg leads, and how fast, stands in `way`.
+//! Which way a leg leads, and how fast, stands in `way`. A node counts as traversed inside its deviation range, and
+//! what that is without one the vehicle decides (the ruling of NODE-01). What stops the vehicle on an edge stops it on
+//! the edge, not on the node before (that of NODE-07); behind it the condition is as before (that of ACT-03).
 
 use std::f64::consts::PI;
 

@@ -1,7 +1,9 @@
 //! The state message: when it is sent, and the visualization beside it (sections 6.10 and 6.13).
 //!
-//! A state is due when it differs from the last one in anything but position, speed and battery charge. So no
-//! part of the vehicle has to remember to announce what it changed, and changes of one instant share a state.
+//! A state is due when it differs from the last one in anything but position, speed and battery charge. So no part of
+//! the vehicle has to remember to announce what it changed, and changes of one instant share a state (the ruling of
+//! STATE-09). What happens before minStateInterval is over is reported at its end (that of FACT-14), an order at once,
+//! also a refused one (that of STATE-03).
 
 mod picture;
 mod route;

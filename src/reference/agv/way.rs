@@ -1,4 +1,5 @@
-//! One leg after the other: how far it leads, how fast, and which way the vehicle looks (ORD-MSG-20 to ORD-MSG-25).
+//! One leg after the other: how far it leads, how fast, and which way the vehicle looks (section 6.6.6, ORD-MSG-20 to
+//! ORD-MSG-25).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

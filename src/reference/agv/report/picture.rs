@@ -1,4 +1,6 @@
-//! The body of the state message, part by part.
+//! The body of the state message, part by part (sections 6.10.3 to 6.10.6).
+//!
+//! agvPosition is left out by a vehicle on a line, which has none (the ruling of STATE-MSG-05).
 
 use serde_json::{Map, Value, json};
 
