@@ -15,6 +15,10 @@ use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
+/// The allocator of the program: a run is a million small trees.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Liberties that exclude another one: of each pair the second is left out where all are taken at once.
 const EXCLUDED: [&str; 12] = [
     // Beside single-precision, whose angles are rounded already.
