@@ -4,6 +4,7 @@
 //! afterwards. A [`Chain`] is a list of stimuli that a grammar allows, [`draw`](draw::draw) makes one, [`Chain::file`] writes it as an
 //! ordinary test, and [`shrink`](shrink::shrink) makes a failing one shorter. Running and judging tests is left to `run` and `judge`.
 
+mod broken;
 mod chain;
 mod coverage;
 pub mod draw;
@@ -16,10 +17,11 @@ pub mod shrink;
 mod tests;
 mod writing;
 
+pub use broken::family;
 pub use chain::Chain;
 pub use coverage::Coverage;
 pub use exploration::{Exploration, Explored, Purpose, Shown, Stage};
 pub use findings::{Finding, Source, findings};
-pub use grammar::{Grammar, GrammarError, Stimulus};
+pub use grammar::{Grammar, GrammarError, Stimulus, place};
 pub use model::Model;
 pub use writing::ConversationFile;
