@@ -99,7 +99,7 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
             let own = test.steps.iter().filter(|step| step.place.contains(&file.id));
             let step = own
                 .filter(|step| step.journal.is_some_and(|(first, _)| first <= seq))
-                .last();
+                .next_back();
             let at = step.and_then(|step| file.stimulus_at(line(&step.place)?));
             let cut = chain.until(at.unwrap_or(0));
             note(

@@ -40,7 +40,7 @@ pub(super) fn every_fault(
         .iter()
         .map(|(_, file)| (exploration.grammar.place(file), file.text.clone()));
     let tests = library.add(&places.collect::<Vec<_>>())?;
-    let faults: Vec<&'static Fault> = BuiltIn::every_fault(role).step_by(every).collect();
+    let faults: Vec<&'static Fault> = BuiltIn::faults(role).iter().step_by(every).collect();
     let next = AtomicUsize::new(0);
     let all: Mutex<Vec<Result<Measured, Problem>>> = Mutex::new(Vec::new());
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
