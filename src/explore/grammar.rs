@@ -4,10 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
 
-use super::broken::{Breaks, family, unfolded};
-use super::writing::ConversationFile;
+use super::broken::{Breaks, family};
 use crate::diagnostic::Source;
-use crate::pack::{Assets, Pack, Role, VersionRange};
+use crate::pack::{Assets, Role, VersionRange};
 use crate::yaml;
 
 /// Why there is no grammar.
@@ -145,12 +144,6 @@ pub struct Ending {
     pub steps: String,
 }
 
-/// Where a conversation stands as a test of a side.
-#[must_use]
-pub fn place(side: &str, file: &ConversationFile) -> String {
-    format!("suites/{side}/{}.yaml", file.id)
-}
-
 impl Grammar {
     /// The grammar of a side.
     ///
@@ -221,21 +214,6 @@ impl Grammar {
         })
     }
 
-    /// The same without the stimuli that a protocol version does not have, and those `keeps` refuses. A stimulus that stands
-    /// for many breakages has become as many.
-    #[must_use]
-    pub fn only(mut self, pack: &Pack, keeps: impl Fn(&str, &Stimulus) -> bool) -> Self {
-        self.stimuli.retain(|name, stimulus| {
-            let spec = stimulus
-                .spec
-                .as_deref()
-                .and_then(|spec| spec.parse::<VersionRange>().ok());
-            spec.is_none_or(|spec| spec.contains(pack.version)) && keeps(name, stimulus)
-        });
-        self.stimuli = unfolded(self.stimuli, pack);
-        self
-    }
-
     /// The first stimulus of every family, and every stimulus that has none.
     pub fn heads(&self) -> impl Iterator<Item = &String> {
         let mut seen = BTreeSet::new();
@@ -246,12 +224,6 @@ impl Grammar {
     #[must_use]
     pub fn side(&self) -> &str {
         &self.explore
-    }
-
-    /// Where a conversation of this side stands as a test.
-    #[must_use]
-    pub fn place(&self, file: &ConversationFile) -> String {
-        place(&self.explore, file)
     }
 
     /// The node at a place of the way.

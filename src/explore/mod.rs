@@ -15,6 +15,7 @@ mod model;
 pub mod shrink;
 #[cfg(test)]
 mod tests;
+mod unfold;
 mod writing;
 
 pub use broken::family;
@@ -22,6 +23,6 @@ pub use chain::Chain;
 pub use coverage::Coverage;
 pub use exploration::{Exploration, Explored, Purpose, Shown, Stage};
 pub use findings::{Finding, Source, findings};
-pub use grammar::{Grammar, GrammarError, Stimulus, place};
+pub use grammar::{Grammar, GrammarError, Stimulus};
 pub use model::Model;
 pub use writing::ConversationFile;

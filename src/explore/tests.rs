@@ -20,7 +20,7 @@ fn grammar(library: &Library, pack: &Pack, role: Role) -> Grammar {
 }
 
 fn places(grammar: &Grammar, files: &[ConversationFile]) -> Vec<(String, String)> {
-    let places = files.iter().map(|file| (grammar.place(file), file.text.clone()));
+    let places = files.iter().map(|file| (file.place(grammar.side()), file.text.clone()));
     places.collect()
 }
 

@@ -35,6 +35,12 @@ impl ConversationFile {
         Some(Self::new(id, text, 0, Vec::new()))
     }
 
+    /// Where it stands as a test of a side.
+    #[must_use]
+    pub fn place(&self, side: &str) -> String {
+        format!("suites/{side}/{}.yaml", self.id)
+    }
+
     /// Which stimulus a line belongs to, counted from zero.
     #[must_use]
     pub fn stimulus_at(&self, line: u32) -> Option<usize> {

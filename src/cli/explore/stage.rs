@@ -11,7 +11,7 @@ use crate::cli::device::tolerate;
 use crate::cli::problem::Problem;
 use crate::cli::run::interrupts;
 use crate::clock::WallClock;
-use crate::explore::{ConversationFile, Explored, Purpose, Stage, place};
+use crate::explore::{ConversationFile, Explored, Purpose, Stage};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::pack::{Catalogue, Pack, Participant, Role};
@@ -222,7 +222,7 @@ impl Stage for OnStage {
 
     fn carry_out(&mut self, files: &[ConversationFile], purpose: Purpose) -> Result<RunResult, Problem> {
         let side = self.subject().role.word();
-        let places = files.iter().map(|file| (place(side, file), file.text.clone()));
+        let places = files.iter().map(|file| (file.place(side), file.text.clone()));
         let places: Vec<(String, String)> = places.collect();
         let tests = self.library.add(&places)?;
         // Tests are added in the order of their ids; they are carried out as they were given.
