@@ -15,6 +15,10 @@ use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
+/// The allocator of the program: a run is a million small trees.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// What one vehicle has all at once: liberties of which none stands in the way of another.
 const MANNERS: [&str; 31] = [
     "states-coalesced",
