@@ -90,7 +90,4 @@ fn mistakes_of_the_user_are_named() {
     run(&["explore", "--virtual", "--replay", "missing.yaml"])
         .code(2)
         .says("missing.yaml");
-    run(&["explore", "--role", "master-control"])
-        .code(2)
-        .says("master-control");
 }

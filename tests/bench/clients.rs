@@ -87,7 +87,7 @@ async fn ended(program: &str, command: &mut Command) -> Option<Output> {
             missing(program);
             return None;
         }
-        Err(_) => panic!("{program} does not end"),
+        Err(late) => panic!("{program} does not end: {late}"),
     };
     Some(output)
 }
