@@ -31,9 +31,10 @@ pub(super) const VELOCITY_AXES: Check = Check {
     decides: &["MAP-03"],
     doc: "From one state, or one visualization, to the next of a vehicle that drives without turning, the pose changes in \
           the direction of velocity.vx and vy, seen from the vehicle. Found when it happens twice, never the other way in \
-          between, and the velocity fits along the axes of the map, or with vy mirrored.",
+          between, and the velocity fits along the axes of the map, or with vy mirrored. Not judged where a message in between \
+          shows the vehicle turned another way.",
     arguments: &[],
-    start: |_| Box::new(Signs::new(axes, "MAP-03")),
+    start: |_| Box::new(Signs::new(axes, "MAP-03").of_straight_ways()),
 };
 
 /// `motion/turn-sign`.
@@ -144,6 +145,8 @@ struct Signs {
     /// The last state and the last visualization: they may overtake each other.
     state: Option<Seen>,
     visualization: Option<Seen>,
+    /// It drove round a corner where a message of either kind shows it turned another way.
+    straight: bool,
     against: u32,
 }
 
@@ -155,7 +158,22 @@ impl Signs {
             requirement,
             state: None,
             visualization: None,
+            straight: false,
             against: 0,
+        }
+    }
+
+    fn of_straight_ways(mut self) -> Self {
+        self.straight = true;
+        self
+    }
+
+    /// Forgets where it was before it was turned like this.
+    fn forget_before_corner(&mut self, pose: &Pose) {
+        for before in [&mut self.state, &mut self.visualization] {
+            if before.as_ref().is_some_and(|seen| seen.pose.apart(pose).1 > TURNED) {
+                *before = None;
+            }
         }
     }
 }
@@ -170,10 +188,17 @@ impl Running for Signs {
         let Some(Delivered { name, .. }) = self.traffic.delivered(entry, context) else {
             return false;
         };
+        if !matches!(name, "state" | "visualization") {
+            return false;
+        }
+        if self.straight
+            && let Some(pose) = entry.json().and_then(Pose::of)
+        {
+            self.forget_before_corner(&pose);
+        }
         let before = match name {
             "state" => &mut self.state,
-            "visualization" => &mut self.visualization,
-            _ => return false,
+            _ => &mut self.visualization,
         };
         let now = entry.json().and_then(|message| Seen::read(entry.at().moment, message));
         let then = std::mem::replace(before, now.clone());
@@ -235,6 +260,26 @@ mod tests {
         // It drives backwards, or slips: another matter.
         assert!(north((-1.0, 0.0, 0.0)).is_empty());
         assert!(north((0.7, -0.7, 0.0)).is_empty());
+    }
+
+    /// Only the visualizations have a velocity; the states show the corner between two of them.
+    #[test]
+    fn a_vehicle_that_drove_round_a_corner_and_back_is_not_accused() {
+        let seen = |corner: f64| {
+            let mut trace = Trace::subscriber();
+            for step in 0..4 {
+                let x = 2.0 * f64::from(step);
+                trace
+                    .message("visualization", &at(x, 0.0, 1.57, (2.0, 0.0, 0.0)))
+                    .wait(0.5);
+                let mut state = at(x + 1.0, 0.0, corner, (2.0, 0.0, 0.0));
+                state.as_object_mut().unwrap().remove("velocity");
+                trace.message("state", &state).wait(0.5);
+            }
+            trace.judge("motion/velocity-axes").summary()
+        };
+        assert_eq!(seen(0.0), Vec::<String>::new());
+        assert_eq!(seen(1.57), ["MAP-03"]);
     }
 
     #[test]
