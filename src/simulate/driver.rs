@@ -354,9 +354,8 @@ async fn next_event(connection: &mut Option<(Client, mpsc::Receiver<ClientEvent>
 /// Fetches a file in a thread of its own.
 fn fetch(token: u64, url: String, authority: Option<PathBuf>, progress: mpsc::UnboundedSender<Progress>) {
     std::thread::spawn(move || {
-        let end = match download(&url, authority.as_ref(), || {
-            drop(progress.send((token, Download::Begun)))
-        }) {
+        let begun = || drop(progress.send((token, Download::Begun)));
+        let end = match download(&url, authority.as_ref(), begun) {
             Ok(body) => Download::Done(body),
             Err(error) => Download::Failed(error.to_string()),
         };

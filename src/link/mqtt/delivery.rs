@@ -55,12 +55,8 @@ impl Delivery {
                 self.proven.insert(topic.clone());
                 self.awaited.take_if(|(awaited, _)| awaited == topic);
             }
-            Event::Closed { connection, .. } => {
-                // Who is gone gets nothing.
-                if self.subscribed.remove(connection).is_some() {
-                    self.awaited = None;
-                }
-            }
+            // Who is gone gets nothing.
+            Event::Closed { connection, .. } if self.subscribed.remove(connection).is_some() => self.awaited = None,
             _ => {}
         }
     }
