@@ -8,6 +8,7 @@ mod discover;
 pub mod exit;
 mod explore;
 mod list;
+mod log;
 mod papers;
 mod pipeline;
 mod plan;
@@ -30,7 +31,7 @@ use std::sync::Arc;
 use clap::Parser as _;
 
 use crate::diagnostic::Diagnostic;
-use crate::pack::Pack;
+use crate::pack::{Pack, Packs};
 use crate::report::text::Color;
 use crate::run::Library;
 use args::{Cli, Command, Format};
@@ -48,7 +49,8 @@ pub fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let outcome = match &cli.command {
+    let logs = log::begin(cli.log_file.as_deref(), cli.command.verbose());
+    let outcome = logs.and_then(|()| match &cli.command {
         Command::Run(arguments) => run::run_command(arguments),
         Command::Certify(arguments) => certify::certify(arguments),
         Command::List(arguments) => list::list(arguments),
@@ -64,7 +66,7 @@ pub fn main() -> ExitCode {
         Command::Init(arguments) => discover::init(arguments),
         Command::Completions(arguments) => shell::completions(arguments),
         Command::Man(arguments) => shell::man(arguments),
-    };
+    });
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();
         match cli.command.format() {
@@ -88,7 +90,11 @@ fn color() -> Color {
 
 /// The pack of a version; the newest one unless said.
 fn pack(library: &Library, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
-    let packs = &library.rules.packs;
+    pack_among(&library.rules.packs, protocol)
+}
+
+/// The same where suites and catalogue are not needed, which take a while to be read.
+fn pack_among(packs: &Packs, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
     let Some(wanted) = protocol else {
         return Ok(Arc::clone(packs.latest()));
     };

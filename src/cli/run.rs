@@ -2,6 +2,7 @@
 
 mod conclude;
 
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -22,12 +23,14 @@ use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{self, Effective, Surroundings};
 use crate::run::{
-    Bundle, Library, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, run_virtually, write_result,
+    Bundle, Library, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, run_virtually, write_result,
 };
 use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
+use crate::ui::{Desk, put_terminal_back};
 
 /// What `run` and `certify` have in common.
 struct Job {
+    desk: Desk,
     library: Library,
     pack: Arc<Pack>,
     effective: Effective,
@@ -104,7 +107,8 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
             .into());
     }
     check_faults(role, &arguments.fault)?;
-    let job = Job {
+    let mut job = Job {
+        desk: Desk::new(watch::channel(false).0),
         request: Request {
             complete: tests.len() == all.len(),
             tests,
@@ -134,8 +138,12 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         .enable_all()
         .build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
+    let mut desk = job.desk.clone();
     let outcome = runtime.block_on(async {
-        let interrupt = interrupts()?;
+        let stop = stop()?;
+        let interrupt = stop.subscribe();
+        job.desk = Desk::new(stop);
+        desk = job.desk.clone();
         if arguments.in_virtual_time {
             job.virtually(arguments, interrupt).await
         } else if built_in {
@@ -146,20 +154,37 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     });
     // Sockets of a silent peer must not keep the process from ending.
     runtime.shutdown_background();
+    desk.at_rest();
     outcome
 }
 
 /// A signal once ends the run in good order, twice at once.
 pub(super) fn interrupts() -> Result<watch::Receiver<bool>, Problem> {
-    let (sender, receiver) = watch::channel(false);
+    Ok(stop()?.subscribe())
+}
+
+/// The same, and what else ends the run in good order.
+pub(super) fn stop() -> Result<watch::Sender<bool>, Problem> {
+    let (sender, mut stopped) = watch::channel(false);
     let mut signals = Signals::listen()?;
+    let stop = sender.clone();
     tokio::spawn(async move {
+        tokio::select! {
+            () = signals.next() => {}
+            _ = stopped.wait_for(|stopped| *stopped) => {}
+        }
+        stop.send_replace(true);
         signals.next().await;
-        let _ = sender.send(true);
-        signals.next().await;
+        put_terminal_back();
         std::process::exit(i32::from(Exit::Interrupted.code()));
     });
-    Ok(receiver)
+    Ok(sender)
+}
+
+/// The desk, where somebody sits there who can be asked.
+pub(super) fn person(desk: &Desk) -> Option<Arc<dyn Person>> {
+    let attended = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+    attended.then(|| Arc::new(desk.clone()) as Arc<dyn Person>)
 }
 
 impl Job {
@@ -198,7 +223,7 @@ impl Job {
             folder: profile
                 .and_then(Path::parent)
                 .map_or_else(PathBuf::new, Path::to_path_buf),
-            attended: console::user_attended(),
+            person: person(&self.desk),
             vehicles: self.vehicles,
         };
         let mut run = SocketRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
@@ -317,7 +342,17 @@ impl Job {
                 eprintln!("{} = {}  ({})", setting.name, setting.value, setting.origin);
             }
         }
-        Screen::new(device.to_string(), self.pack.version.to_string(), show)
+        let screen = Screen::new(
+            device.to_string(),
+            self.pack.version.to_string(),
+            show,
+            self.desk.clone(),
+        );
+        if self.output.verbose >= 2 {
+            screen.beside_log()
+        } else {
+            screen
+        }
     }
 }
 

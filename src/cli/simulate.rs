@@ -14,8 +14,7 @@ use crate::bench::endpoint::{Credentials, Endpoint};
 use crate::clock::WallClock;
 use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
-use crate::pack::{Pack, Role};
-use crate::run::Library;
+use crate::pack::{Assets, Pack, Packs, Role};
 use crate::simulate::driver::RunningDevice;
 use crate::simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl};
 
@@ -25,10 +24,8 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         Simulated::Agv(device) => &device.connection,
         Simulated::MasterControl(device) => &device.connection,
     };
-    let library = Library::load(None)?;
-    let pack = super::pack(&library, connection.protocol.as_deref())?;
-    // Suites and catalogue are not needed by a device.
-    drop(library);
+    let packs = Packs::load(&Assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
+    let pack = super::pack_among(&packs, connection.protocol.as_deref())?;
     let endpoint = endpoint(connection)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -49,18 +46,15 @@ fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint, Problem> {
         username,
         password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
-    Endpoint::parse(&connection.broker, None, credentials).map_err(|error| {
+    Endpoint::parse(&connection.broker, connection.tls_ca.as_deref(), credentials).map_err(|error| {
         Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
     })
 }
 
-/// Says at once when nobody is there; later losses are the device's own business.
-async fn reach(endpoint: &Endpoint, connection: &ConnectionArgs) -> Result<(), Problem> {
-    let reached = tokio::net::TcpStream::connect((endpoint.host.as_str(), endpoint.port)).await;
-    reached.map(drop).map_err(|error| {
-        let broker = &connection.broker;
-        Problem::Environment(format!("the broker at {broker} is not reachable: {error}"))
-    })
+/// Says when the broker does not let the device in; later losses are the device's own business.
+async fn enter(device: &mut RunningDevice, endpoint: &Endpoint) -> Result<(), Problem> {
+    let entered = device.is_let_in().await;
+    entered.map_err(|reason| Problem::Environment(endpoint.lost(reason).to_string()))
 }
 
 fn start(
@@ -83,7 +77,6 @@ async fn end(device: RunningDevice) {
 async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
     let mut signals = Signals::listen()?;
-    reach(endpoint, &device.connection).await?;
     let clock = WallClock::start();
     let mut running = Vec::new();
     for number in 1..=device.count {
@@ -100,7 +93,10 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> R
         }
         let mut reference = BuiltIn::from(reference);
         tolerate(&mut reference, &device.tolerance)?;
-        let agv = start(&reference, &device.fault, endpoint, clock)?;
+        let mut agv = start(&reference, &device.fault, endpoint, clock)?;
+        if number == 1 {
+            enter(&mut agv, endpoint).await?;
+        }
         for persona in &device.persona {
             agv.command(persona.word, persona.parameters.clone()).await;
         }
@@ -126,8 +122,8 @@ async fn master_control(
     let mut signals = Signals::listen()?;
     let mut reference = BuiltIn::from(configured(device, pack)?);
     tolerate(&mut reference, &device.tolerance)?;
-    reach(endpoint, &device.connection).await?;
-    let running = start(&reference, &device.fault, endpoint, WallClock::start())?;
+    let mut running = start(&reference, &device.fault, endpoint, WallClock::start())?;
+    enter(&mut running, endpoint).await?;
     let server = HookServer::start(&device.hooks, running, reference.hooks()).await;
     let server = server.map_err(|error| Problem::Environment(error.to_string()))?;
     eprintln!("hooks are served at http://{}", server.address());

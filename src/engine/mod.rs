@@ -249,6 +249,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
 
     async fn step(&mut self, step: &Step, section: Section) -> Result<(), EngineError> {
         self.drain().await?;
+        tracing::debug!(step = step.path, "begins");
         self.note(Event::StepBegun {
             path: step.path.clone(),
         })?;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::flood::FloodGuard;
-use crate::journal::event::Occurrence;
+use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::journal::{Entry, Journal};
 use crate::judge::{JudgeError, Rules, RunJudge};
@@ -25,6 +25,8 @@ pub struct Recorder {
     writer: Option<JournalWriter>,
     judge: RunJudge,
     guard: FloodGuard,
+    /// Whether what others do was left out once; it is said once.
+    leaves_out: bool,
 }
 
 impl Recorder {
@@ -44,17 +46,37 @@ impl Recorder {
             writer,
             judge,
             guard,
+            leaves_out: false,
         })
     }
 
-    /// Records one occurrence: file first, then the judge.
+    /// Records one occurrence: file first, then the judge. Of clients that are not the device only so much is recorded; what
+    /// is left out comes back with the number of the last record.
     pub fn record(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
+        if self.guard.is_beset(occurrence.at.moment) && self.judge.can_do_without(&occurrence) {
+            let last = self.journal.entries().last().map_or(0, |entry| entry.seq());
+            if !std::mem::replace(&mut self.leaves_out, true) {
+                let text = "clients that are not the device do more than is recorded; until they do less, what has nothing to do \
+                            with the device is left out"
+                    .to_owned();
+                self.append(Occurrence::harness(occurrence.at, Event::Note { text }))?;
+            }
+            return Ok(Entry::new(occurrence.numbered(last)));
+        }
+        self.append(occurrence)
+    }
+
+    fn append(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
         let entry = self.journal.append(occurrence);
         if let Some(writer) = &mut self.writer {
             writer.write(&entry.record)?;
         }
         self.judge.observe(&entry)?;
-        self.guard.observe(&entry);
+        if self.judge.has_left_out() {
+            self.guard.observe_other(&entry);
+        } else {
+            self.guard.observe(&entry);
+        }
         Ok(entry)
     }
 
@@ -66,11 +88,6 @@ impl Recorder {
     /// The judge of this run.
     pub fn judge(&self) -> &RunJudge {
         &self.judge
-    }
-
-    /// The judge of this run, to break it off.
-    pub fn judge_mut(&mut self) -> &mut RunJudge {
-        &mut self.judge
     }
 
     /// The records so far.

@@ -44,6 +44,8 @@ pub enum StepEnd {
     Broken(String),
     /// The device does not do what a hook asks of it, or cannot be asked any more; the text says why.
     Refused(String),
+    /// The operator leaves the test out; the text says so.
+    Skipped(String),
 }
 
 /// One thing that happened.

@@ -94,6 +94,15 @@ impl Entry {
         self.shared().map(Arc::as_ref)
     }
 
+    /// About how many bytes of memory its payload takes: its bytes, and the value they are parsed to, unless another record
+    /// has that already.
+    #[must_use]
+    pub fn held(&self) -> u64 {
+        let bytes = self.payload().map_or(0, |payload| payload.bytes().len() as u64);
+        let own = self.shared().filter(|parsed| Arc::strong_count(parsed) == 1);
+        bytes + own.map_or(0, |parsed| parsed.weight())
+    }
+
     fn shared(&self) -> Option<&Arc<Parsed>> {
         let payload = self.payload()?;
         Some(self.parsed.get_or_init(|| Arc::new(Parsed::of(payload))))

@@ -22,7 +22,7 @@ use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
 use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
-use crate::journal::event::{Event, Gate, Plan, Reading, RunHeader, Waiver};
+use crate::journal::event::{Event, Gate, Occurrence, Plan, Reading, RunHeader, Waiver};
 use crate::pack::{Decided, Role};
 use crate::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
 use crate::suite::model::{Monitor, Test};
@@ -43,6 +43,8 @@ pub struct RunJudge {
     watches: Watches,
     /// Who is on the tap, where that is known.
     company: Option<Company>,
+    /// Whether the last entry was left out.
+    left_out: bool,
     reactions: Reactions,
     /// The instant actions the harness has sent: type by id.
     instants: BTreeMap<String, String>,
@@ -96,13 +98,28 @@ impl RunJudge {
             plan: Plan::default(),
             end: None,
             is_stranger: false,
+            left_out: false,
         })
+    }
+
+    /// Whether the last entry was left out, because it is of somebody who is not the device.
+    pub fn has_left_out(&self) -> bool {
+        self.left_out
+    }
+
+    /// Whether nothing would be judged otherwise without this: somebody who is not the device does something that has
+    /// nothing to do with it.
+    pub fn can_do_without(&self, occurrence: &Occurrence) -> bool {
+        self.company
+            .as_ref()
+            .is_some_and(|company| company.is_dispensable(occurrence))
     }
 
     /// Shows it the next entry.
     pub fn observe(&mut self, entry: &Arc<Entry>) -> Result<(), JudgeError> {
         self.last = entry.at();
-        if self.is_of_bystander(entry) {
+        self.left_out = self.is_of_bystander(entry);
+        if self.left_out {
             return Ok(());
         }
         let subject = self.timeline.add(entry);

@@ -267,6 +267,32 @@ fn a_full_profile_arrives_whole() {
 }
 
 #[test]
+fn a_hook_may_listen_or_carry_headers() {
+    let text = "[hooks.shutdown]\nlisten = \"5 min\"\n[hooks.start]\nhttp = { url = \"https://fleet.site/{vehicle}\", headers = \
+                { Authorization = \"Bearer ${env:TOKEN}\", X-Vehicle = \"{vehicle}\" } }\n";
+    let profile = check_text(text).expect("good").profile;
+    let listens = &profile.hooks["shutdown"];
+    assert_eq!(listens.action, HookAction::NaturalTraffic);
+    assert_eq!(listens.timeout, std::time::Duration::from_secs(300));
+    let mut surroundings = Surroundings::default();
+    let start = &profile.hooks["start"].action;
+    assert!(start.resolved(&surroundings).is_err(), "there is no TOKEN");
+    surroundings
+        .environment
+        .insert("TOKEN".to_owned(), "{vehicle}".to_owned());
+    let values = BTreeMap::from([("vehicle".to_owned(), "mock\r\n1".to_owned())]);
+    let HookAction::Http { url, headers, .. } = start.resolved(&surroundings).expect("TOKEN").filled(&values) else {
+        panic!("still a request");
+    };
+    assert_eq!(url, "https://fleet.site/mock%0D%0A1");
+    let headers: Vec<String> = headers
+        .iter()
+        .map(|(name, value)| format!("{name}: {}", value.reveal()))
+        .collect();
+    assert_eq!(headers, ["Authorization: Bearer {vehicle}", "X-Vehicle: mock  1"]);
+}
+
+#[test]
 fn a_limit_that_was_not_set_gives_way_to_the_one_that_was() {
     let limits = |text: &str| check_text(text).expect("no contradiction").profile.time;
     let tight = limits("[time]\nreact = \"4 s\"\nevent-warning = \"800 ms\"\n");

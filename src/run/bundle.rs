@@ -74,7 +74,10 @@ impl Bundle {
         let path = self.folder.join(name);
         let draft = self.folder.join(format!(".{name}.draft"));
         let written = std::fs::write(&draft, content).and_then(|()| std::fs::rename(&draft, &path));
-        written.map_err(|reason| BundleError::Write { path, reason })
+        written.map_err(|reason| {
+            let _ = std::fs::remove_file(&draft);
+            BundleError::Write { path, reason }
+        })
     }
 }
 

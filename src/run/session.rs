@@ -145,6 +145,8 @@ pub(super) struct Session<'a, L, O> {
     pub(super) unhelped: u32,
     /// How many orders were sent on that way.
     pub(super) orders: u32,
+    /// From which record on the device has what it needs after a start.
+    pub(super) ready_since: u64,
     /// Preconditions that are not reached again and again.
     strikes: Strikes,
 }
@@ -165,6 +167,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             refuses: false,
             unhelped: 0,
             orders: 0,
+            ready_since: 0,
             strikes: Strikes::default(),
         }
     }
@@ -420,6 +423,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
         self.settle_link().await?;
         self.engine.drain().await?;
+        if self.was_started()
+            && let Err(why) = self.after_start().await?
+        {
+            self.progress.note(&why);
+        }
         if self.engine.recorder.judge().role() == Role::MasterControl {
             return self.tidy_fleet(test).await;
         }

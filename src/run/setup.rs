@@ -201,6 +201,7 @@ impl DeviceUnderTest {
             claims: self.claims,
             vantage: bench.vantage,
             hooks: bench.hooks,
+            unattended: bench.unattended,
             maps: bench.maps,
             map_file,
             motion: self.motion,
@@ -215,7 +216,7 @@ impl DeviceUnderTest {
             vehicles,
             maps,
             deviations: self.deviations,
-            limits: self.limits,
+            limits: [self.limits, bench.limits].concat(),
             run: request.run,
             fail_fast: request.fail_fast,
         };
@@ -230,8 +231,12 @@ pub struct BenchFacts {
     pub vantage: Vantage,
     /// Names of the hooks that can be run.
     pub hooks: Vec<String>,
+    /// Names of the hooks that are prompts, where nobody can be asked.
+    pub unattended: Vec<String>,
     /// Whether the device can reach the map server; `Err` says why not.
     pub maps: Result<(), String>,
+    /// What the broker does not allow, and what cannot be said therefore.
+    pub limits: Vec<String>,
 }
 
 fn subject(profile: &Profile) -> Result<Participant, Vec<Diagnostic>> {

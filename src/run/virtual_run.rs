@@ -155,6 +155,8 @@ pub async fn run_virtually(
     let bench = BenchFacts {
         vantage: request.vantage,
         hooks: operator.hooks(),
+        unattended: operator.unattended(),
+        limits: Vec::new(),
         maps: Ok(()),
     };
     let composer = Composer::new(&request.run);

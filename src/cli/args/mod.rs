@@ -53,6 +53,15 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    /// Log what happens inside to this file; the variable `VDA5050_TCK_LOG` says how much
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILE",
+        env = "VDA5050_TCK_LOG_FILE",
+        hide_env_values = true
+    )]
+    pub log_file: Option<PathBuf>,
 }
 
 /// The commands.
@@ -93,6 +102,17 @@ pub enum Command {
 }
 
 impl Command {
+    /// How much is to be told of what happens inside.
+    #[must_use]
+    pub fn verbose(&self) -> u8 {
+        match self {
+            Self::Run(arguments) => arguments.output.verbose,
+            Self::Certify(arguments) => arguments.output.verbose,
+            Self::Explore(arguments) => arguments.output.verbose,
+            _ => 0,
+        }
+    }
+
     /// How the command writes, errors included.
     #[must_use]
     pub fn format(&self) -> Format {
@@ -136,7 +156,7 @@ pub struct DeviceArgs {
     /// Where the device connects; this machine only unless said [default: 127.0.0.1:1883]
     #[arg(long, value_name = "HOST:PORT", help_heading = "Bench")]
     pub listen: Option<String>,
-    /// Use this broker instead of the built-in one: mqtt://host:port or mqtts://host:port
+    /// Use this broker instead of the built-in one: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
     #[arg(long, value_name = "URL", help_heading = "Bench")]
     pub broker: Option<String>,
     /// The device is connected to the broker directly: packets cannot be seen (needs --broker)
@@ -197,7 +217,7 @@ pub struct OutputArgs {
         hide_env_values = true
     )]
     pub format: Format,
-    /// Verbose: every effective setting with its origin; twice, every step
+    /// Verbose: every effective setting with its origin; twice, every step, and what happens inside
     #[arg(short, long, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     pub verbose: u8,
     /// Say less: no line per test and no details, only the verdict and what is broken

@@ -31,12 +31,15 @@ pub enum Simulated {
 /// How a simulated device reaches its broker.
 #[derive(Clone, Debug, Args)]
 pub struct ConnectionArgs {
-    /// The broker: mqtt://host:port or mqtts://host:port
+    /// The broker: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
     #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
     pub broker: String,
     /// User name at the broker; its password is taken from the variable `VDA5050_TCK_PASSWORD`
     #[arg(long, value_name = "NAME")]
     pub username: Option<String>,
+    /// Whose certificates are trusted at a broker with TLS, as a PEM file
+    #[arg(long, value_name = "FILE")]
+    pub tls_ca: Option<PathBuf>,
     /// Protocol version it speaks; the newest one unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,

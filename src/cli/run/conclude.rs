@@ -27,7 +27,10 @@ impl Job {
             recorder.journal(),
             self.output.inconclusive.into(),
         );
-        let root = root.map_err(|error| Problem::Environment(error.to_string()))?;
+        let (root, unwritten) = match root {
+            Ok(root) => (Some(root), None),
+            Err(error) => (None, Some(error.to_string())),
+        };
         terminal.finish();
         let shown = bundle.folder().display().to_string();
         crate::cli::pipeline::tell(&result, &quoted, &shown);
@@ -46,8 +49,8 @@ impl Job {
                 }
                 let report = format!("{shown}/report.html");
                 let bundle = overview::Bundle {
-                    report: Some(&report),
-                    root: Some(&root),
+                    report: root.as_ref().map(|_| report.as_str()),
+                    root: root.as_deref(),
                 };
                 page.push_str(&overview::overview(
                     &result,
@@ -58,6 +61,12 @@ impl Job {
                 ));
                 crate::cli::print(&page)?;
             }
+        }
+        if let Some(why) = unwritten {
+            // What was found is not lost with the paper it should stand on.
+            let problem = Problem::Environment(format!("{why}; the journal is in {shown}, and `report` reads it"));
+            eprintln!("{}", problem.render(console::colors_enabled_stderr()));
+            return Ok(Exit::of_partial(result.verdict, matches!(end, End::Interrupted)));
         }
         match end {
             End::Completed => match result.tests.iter().find_map(|test| test.not_applicable.as_deref()) {
