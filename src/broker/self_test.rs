@@ -11,6 +11,9 @@ use crate::bench::client::{Client, ClientEvent, ClientOptions};
 use crate::bench::endpoint::Endpoint;
 use crate::bench::{LinkError, Outgoing};
 
+/// What the topics of the harness itself begin with.
+const OWN: &str = "vda5050-tck";
+
 /// How long each message may take.
 const LIMIT: Duration = Duration::from_secs(5);
 
@@ -19,7 +22,7 @@ const LIMIT: Duration = Duration::from_secs(5);
 /// # Errors
 /// [`LinkError::Broker`] when it cannot be reached, [`LinkError::Setup`] naming the rule it breaks.
 pub async fn self_test(endpoint: &Endpoint) -> Result<(), LinkError> {
-    let base = format!("vda5050-tck/self-test/{}", uuid::Uuid::new_v4().simple());
+    let base = format!("{OWN}/self-test/{}", uuid::Uuid::new_v4().simple());
     let mut watcher = Tester::connect(endpoint, "watcher", None, vec![(format!("{base}/#"), 2)]).await?;
     let result = check(endpoint, &base, &mut watcher).await;
     // Whatever came out of it, nothing stays behind on the broker.
@@ -140,6 +143,15 @@ impl<'a> Tester<'a> {
         }
     }
 
+    /// Who it is at the broker.
+    fn user(&self) -> String {
+        let user = self.endpoint.credentials.as_ref();
+        user.map_or_else(
+            || "everybody".to_owned(),
+            |user| format!("the user `{}`", user.username),
+        )
+    }
+
     fn publish(&self, message: Outgoing) -> Result<(), LinkError> {
         if self.client.publish(message) {
             Ok(())
@@ -161,7 +173,14 @@ impl<'a> Tester<'a> {
                 &format!("it ends the connection where {what} should arrive ({reason})"),
             )),
             Ok(Some(ClientEvent::Connected) | None) => Err(self.endpoint.lost("the connection ended")),
-            Err(_) => Err(broken(self.endpoint, &format!("{what} never arrives"))),
+            Err(_) => Err(broken(
+                self.endpoint,
+                &format!(
+                    "{what} never arrives on the topic {OWN}/self-test/…; where the broker has access rules (ACL), they have to \
+                     allow {} to read and write {OWN}/#",
+                    self.user()
+                ),
+            )),
         }
     }
 }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use super::args::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
+use super::args::{ConnectionArgs, Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
@@ -37,8 +37,8 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     runtime.block_on(async {
         match &arguments.what {
-            Simulated::Agv(device) => agvs(device, &pack, &endpoint).await,
-            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint).await,
+            Simulated::Agv(device) => agvs(device, &pack, &endpoint, arguments.format).await,
+            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint, arguments.format).await,
         }
     })
 }
@@ -49,7 +49,7 @@ fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint, Problem> {
         username,
         password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
-    Endpoint::parse(&connection.broker, None, credentials).map_err(|error| {
+    Endpoint::parse(&connection.broker, connection.tls_ca.as_deref(), credentials).map_err(|error| {
         Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
     })
 }
@@ -80,7 +80,18 @@ async fn end(device: RunningDevice) {
     device.stop().await;
 }
 
-async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> Result<Exit, Problem> {
+/// Says what is there: a text for people, a line for programs.
+fn say(format: Format, text: &str, event: &Value) -> Result<(), Problem> {
+    match format {
+        Format::Json => super::print(&format!("{event}\n")).map(drop),
+        Format::Text => {
+            eprintln!("{text}");
+            Ok(())
+        }
+    }
+}
+
+async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, format: Format) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
     let mut signals = Signals::listen()?;
     reach(endpoint, &device.connection).await?;
@@ -106,13 +117,40 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> R
         }
         running.push(agv);
     }
-    eprintln!(
-        "{} simulated AGV(s) on {}; press Ctrl-C to disconnect",
-        device.count, device.connection.broker
-    );
+    let server = match (&device.hooks, running.len()) {
+        (Some(listen), 1) => {
+            let known = BuiltIn::from(ReferenceAgv::of(device.vehicle.0, pack)).hooks();
+            let server = HookServer::start(listen, running.remove(0), known).await;
+            Some(server.map_err(|error| Problem::Environment(error.to_string()))?)
+        }
+        _ => None,
+    };
+    if let Some(server) = &server {
+        let hooks = format!("http://{}", server.address());
+        say(
+            format,
+            &format!("hooks are served at {hooks}"),
+            &json!({ "event": "hooks", "address": hooks }),
+        )?;
+    }
+    let broker = &device.connection.broker;
+    let count = device.count;
+    say(
+        format,
+        &format!("{count} simulated AGV(s) on {broker}; press Ctrl-C to disconnect"),
+        &json!({ "event": "simulating", "role": Role::Agv.word(), "count": count, "broker": broker }),
+    )?;
     signals.next().await;
+    if let Some(server) = server
+        && let Some(device) = server.stop().await
+    {
+        end(device).await;
+    }
     for device in running {
         end(device).await;
+    }
+    if format == Format::Json {
+        super::print(&format!("{}\n", json!({ "event": "disconnected" })))?;
     }
     Ok(Exit::Conforms)
 }
@@ -121,6 +159,7 @@ async fn master_control(
     device: &SimulatedMasterControl,
     pack: &Arc<Pack>,
     endpoint: &Endpoint,
+    format: Format,
 ) -> Result<Exit, Problem> {
     check_faults(Role::MasterControl, &device.fault)?;
     let mut signals = Signals::listen()?;
@@ -130,12 +169,18 @@ async fn master_control(
     let running = start(&reference, &device.fault, endpoint, WallClock::start())?;
     let server = HookServer::start(&device.hooks, running, reference.hooks()).await;
     let server = server.map_err(|error| Problem::Environment(error.to_string()))?;
-    eprintln!("hooks are served at http://{}", server.address());
+    let hooks = format!("http://{}", server.address());
     let vehicles = reference.fleet().map_or(0, |fleet| fleet.vehicles.len());
-    eprintln!(
-        "a reference master control of {vehicles} vehicle(s) on {}; press Ctrl-C to disconnect",
-        device.connection.broker
-    );
+    let broker = &device.connection.broker;
+    say(
+        format,
+        &format!(
+            "hooks are served at {hooks}\na reference master control of {vehicles} vehicle(s) on {broker}; press Ctrl-C to \
+             disconnect"
+        ),
+        &json!({ "event": "simulating", "role": Role::MasterControl.word(), "count": vehicles, "broker": broker,
+            "hooks": hooks }),
+    )?;
     signals.next().await;
     if let Some(running) = server.stop().await {
         end(running).await;

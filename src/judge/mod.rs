@@ -10,6 +10,7 @@ mod departure;
 mod grounds;
 mod hidden;
 mod holds;
+mod joined;
 mod limit;
 mod mend;
 mod monitor;
@@ -27,7 +28,7 @@ mod window;
 
 pub use monitor::MonitorJudge;
 pub use rules::{JudgeError, Rules};
-pub use run::{RESULT_FORMAT, RunJudge, judge};
+pub use run::{RESULT_FORMAT, RunJudge, judge, judged};
 pub use side::SideJudge;
 pub use step::Progress;
 pub use test::{Ground, TestJudge};

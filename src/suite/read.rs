@@ -7,7 +7,7 @@ use super::CheckInfo;
 use super::course::course_need;
 use super::drawn;
 use super::expand::Fill;
-use super::fields::{Fields, Problems, text_of};
+use super::fields::{Fields, Problems, short, text_of};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::matrix;
@@ -28,6 +28,7 @@ const TEST_KEYS: &[&str] = &[
     "moves",
     "reviewed",
     "watchlist",
+    "tags",
     "why",
     "cases",
     "given",
@@ -337,6 +338,7 @@ impl TestReader<'_> {
             );
         }
         let maturity = maturity(&fields, problems);
+        let tags = tags(&fields, problems);
         let moves = fields.flag("moves", problems);
         let mut reader = StepReader {
             states: self.states,
@@ -372,6 +374,7 @@ impl TestReader<'_> {
             },
             needs,
             moves,
+            tags,
             maturity,
             why: header.why,
             given,
@@ -397,6 +400,33 @@ impl TestReader<'_> {
         lint::test(&test, &places, self.vocabulary, self.known, problems);
         Some(test)
     }
+}
+
+/// What a test is filed under.
+fn tags(fields: &Fields<'_>, problems: &mut Problems) -> Vec<String> {
+    let mut tags = Vec::new();
+    for node in fields.list("tags", problems) {
+        let Some(tag) = text_of(node, problems) else { continue };
+        let is_word = !tag.is_empty()
+            && tag
+                .chars()
+                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+        if !is_word {
+            let title = format!("`{}` is no tag", short(tag));
+            problems.at(
+                "bad-tag",
+                &node.span,
+                title,
+                "a tag is a word of small letters, digits and `-`",
+            );
+        } else if Test::OWN_TAGS.contains(&tag) {
+            let title = format!("every test is given the tag `{tag}` by what it does");
+            problems.at("bad-tag", &node.span, title, "leave it out");
+        } else {
+            tags.push(tag.to_owned());
+        }
+    }
+    tags
 }
 
 /// Whether a second reader has held the test against the standard, or what is disputed of it.
