@@ -25,6 +25,17 @@ pub enum Vantage {
     Subscriber,
 }
 
+impl Vantage {
+    /// The word used in records and results.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Tap => "tap",
+            Self::Subscriber => "subscriber",
+        }
+    }
+}
+
 /// A message the harness publishes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outgoing {

@@ -2,11 +2,15 @@
 
 pub mod args;
 mod audit;
+mod browser;
 mod certify;
 mod device;
 mod discover;
+mod events;
 pub mod exit;
+mod explained;
 mod explore;
+mod expression;
 mod list;
 mod log;
 mod papers;
@@ -45,7 +49,11 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are no mistakes; a reader that has gone away is none either.
-            let _ = error.print();
+            if error.use_stderr() && wants_json() {
+                eprintln!("{}", mistyped(&error).to_json());
+            } else {
+                let _ = error.print();
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
@@ -76,6 +84,24 @@ pub fn main() -> ExitCode {
         problem.exit()
     });
     ExitCode::from(exit.code())
+}
+
+/// Whether a command line that cannot be read asks for JSON.
+fn wants_json() -> bool {
+    let words: Vec<String> = std::env::args().collect();
+    let asked = words.windows(2).any(|pair| pair[0] == "--format" && pair[1] == "json");
+    let by_variable = || std::env::var("VDA5050_TCK_FORMAT").is_ok_and(|format| format == "json");
+    asked || words.iter().any(|word| word == "--format=json") || by_variable()
+}
+
+/// What is wrong with a command line, as any other mistake.
+fn mistyped(error: &clap::Error) -> Problem {
+    let text = error.render().to_string();
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let title = lines.next().unwrap_or("the command line cannot be read");
+    let rest: Vec<&str> = lines.collect();
+    let title = title.strip_prefix("error: ").unwrap_or(title);
+    Diagnostic::whole("usage", title).hint(rest.join("\n")).into()
 }
 
 /// Whether results on standard output are coloured.

@@ -1,6 +1,7 @@
 //! `run`: test a device, write the evidence, say the verdict.
 
 mod conclude;
+mod resume;
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -9,21 +10,28 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use resume::Earlier;
+
 use super::args;
 use super::device::{check_faults, pack_of, tolerate};
+use super::events::{About, Followed};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::screen::{Screen, Show};
 use super::signals::Signals;
+use crate::bench::Vantage;
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
+use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::link::mqtt::BrokerChoice;
 use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{self, Effective, Surroundings};
+use crate::report::statement::many;
 use crate::run::{
-    Bundle, Library, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, run_virtually, write_result,
+    Bundle, Library, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
+    write_result,
 };
 use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 use crate::ui::{Desk, put_terminal_back};
@@ -38,6 +46,8 @@ struct Job {
     output: args::OutputArgs,
     no_motion: bool,
     certifies: bool,
+    /// The run that this one goes on with.
+    earlier: Option<Earlier>,
     /// How many mock AGVs are asked for when a master control is tested.
     vehicles: Option<usize>,
 }
@@ -54,14 +64,21 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     let all = library.tests(role, &pack.id);
-    let mut tests = super::selection::selected(
-        &all,
-        &arguments.tests,
-        &arguments.selection,
-        &arguments.output.out,
-        &library,
-        &pack,
-    )?;
+    let earlier = match &arguments.selection.resume {
+        Some(folder) => Some(Earlier::read(folder, &all, &library)?),
+        None => None,
+    };
+    let mut tests = match &earlier {
+        Some(earlier) => earlier.tests.clone(),
+        None => super::selection::selected(
+            &all,
+            &arguments.tests,
+            &arguments.selection,
+            &arguments.output.out,
+            &library,
+            &pack,
+        )?,
+    };
     if let Some(shard) = arguments.shard {
         let mut place = 0;
         tests.retain(|_| {
@@ -78,7 +95,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         None => random.simple().to_string()[..8].to_owned(),
     };
     // Whoever names a single case means it; the parts of one run have to draw the same.
-    let whole = arguments.thorough || arguments.tests.iter().any(|pattern| pattern.contains('['));
+    let whole = arguments.thorough || earlier.is_some() || arguments.tests.iter().any(|pattern| pattern.contains('['));
     let draw = match arguments.seed {
         _ if whole => None,
         Some(seed) => Some(seed),
@@ -110,12 +127,15 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let mut job = Job {
         desk: Desk::new(watch::channel(false).0),
         request: Request {
-            complete: tests.len() == all.len(),
+            complete: earlier
+                .as_ref()
+                .map_or(tests.len() == all.len(), |earlier| earlier.complete),
             tests,
             draw,
             run,
             command: std::env::args().collect(),
             fail_fast: arguments.selection.fail_fast,
+            repeat: arguments.selection.repeat,
             certifies: arguments.certifies,
         },
         library,
@@ -125,6 +145,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         no_motion: arguments.device.no_motion,
         certifies: arguments.certifies,
         vehicles: arguments.vehicles.map(|count| count as usize),
+        earlier,
     };
     if arguments.selection.plan {
         return job.plan(arguments, built_in, &surroundings);
@@ -234,9 +255,10 @@ impl Job {
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
+        self.is_resumable(device.subject(), Vantage::Tap)?;
         let bundle = self.bundle(device.subject(), utc)?;
-        let writer = bundle.journal().map_err(environment)?;
-        let mut terminal = self.screen(device.subject());
+        let writer = self.journal(&bundle)?;
+        let mut terminal = self.screen(device.subject(), &bundle)?;
         let mut run = VirtualRun::of_role(device.role(), &self.library, &self.pack);
         run.device = device;
         run.faults.clone_from(&arguments.fault);
@@ -248,6 +270,8 @@ impl Job {
         run.run.clone_from(&self.request.run);
         run.command.clone_from(&self.request.command);
         run.fail_fast = self.request.fail_fast;
+        run.repeat = self.request.repeat;
+        run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
         if self.no_motion {
             run.motion = Err(NO_MOTION.to_owned());
         }
@@ -310,10 +334,20 @@ impl Job {
             run.device.stand_still(NO_MOTION);
         }
         run.request = self.request.clone();
+        if let Some(earlier) = &self.earlier {
+            let vantage = if run.options.tap {
+                Vantage::Tap
+            } else {
+                Vantage::Subscriber
+            };
+            self.is_resumable(&run.device.subject, vantage)?;
+            run.options.clock = WallClock::going_on(going_on_at(Some(&earlier.journal)));
+            run.earlier = Some(earlier.journal.clone());
+        }
         let bundle = self.bundle(&run.device.subject, run.options.clock.origin_stamp().utc)?;
-        let writer = bundle.journal().map_err(environment)?;
+        let writer = self.journal(&bundle)?;
         run.device_log = Some(bundle.folder().join("device.log"));
-        let mut terminal = self.screen(&run.device.subject);
+        let mut terminal = self.screen(&run.device.subject, &bundle)?;
         let mut saved = saving(&bundle);
         let finished = run.carry_out(
             &self.library,
@@ -331,8 +365,34 @@ impl Job {
         self.conclude(&bundle, finished, terminal)
     }
 
-    fn screen(&self, device: &Participant) -> Screen {
+    /// The journal of the bundle. That of a run that is resumed begins with what is there already.
+    fn journal(&self, bundle: &Bundle) -> Result<JournalWriter, Problem> {
+        let writer = match &self.earlier {
+            Some(earlier) => bundle.journal_after(&earlier.path),
+            None => bundle.journal(),
+        };
+        writer.map_err(environment)
+    }
+
+    /// Whether the run before this one, if there is one, was about the same.
+    fn is_resumable(&self, subject: &Participant, vantage: Vantage) -> Result<(), Problem> {
+        let Some(earlier) = &self.earlier else { return Ok(()) };
+        earlier.is_about(subject, &self.pack, &self.library, vantage.word())?;
+        let (kept, left) = (earlier.kept, self.request.tests.len());
+        let verb = |count| if count == 1 { "is" } else { "are" };
+        eprintln!(
+            "resumed: {} {} kept, {} {} left",
+            many(kept, "test"),
+            verb(kept),
+            many(left, "test"),
+            verb(left)
+        );
+        Ok(())
+    }
+
+    fn screen(&self, device: &Participant, bundle: &Bundle) -> Result<Followed, Problem> {
         let show = match (self.output.format, self.output.quiet, self.output.failures) {
+            _ if self.output.speaks_events() => Show::Nothing,
             (args::Format::Json, ..) | (_, true, _) => Show::Nothing,
             (_, _, true) => Show::Failures,
             _ => Show::All,
@@ -342,17 +402,23 @@ impl Job {
                 eprintln!("{} = {}  ({})", setting.name, setting.value, setting.origin);
             }
         }
-        let screen = Screen::new(
-            device.to_string(),
-            self.pack.version.to_string(),
-            show,
-            self.desk.clone(),
-        );
-        if self.output.verbose >= 2 {
+        let protocol = self.pack.version.to_string();
+        let screen = Screen::new(device.to_string(), protocol.clone(), show, self.desk.clone());
+        let screen = if self.output.verbose >= 2 {
             screen.beside_log()
         } else {
             screen
-        }
+        };
+        let mut followed = Followed::new(screen, self.output.events.as_deref())?;
+        followed.begun(&About {
+            run: &self.request.run,
+            role: device.role.word(),
+            protocol: &protocol,
+            manufacturer: &device.manufacturer,
+            serial_number: &device.serial_number,
+            bundle: bundle.folder(),
+        });
+        Ok(followed)
     }
 }
 

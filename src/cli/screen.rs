@@ -103,7 +103,10 @@ impl run::Progress for Screen {
             return;
         }
         self.terminal.test_ended(&TestLine {
-            id: result.id.clone(),
+            id: match result.repetitions.last() {
+                Some(repetition) => format!("{} (time {})", result.id, repetition.number),
+                None => result.id.clone(),
+            },
             outcome: Outcome::Judged(verdict),
             elapsed: Duration::from_secs_f64(result.seconds.clamp(0.0, 1e6)),
             reason: result.reason.clone(),

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use super::args::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
+use super::args::{ConnectionArgs, Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
@@ -34,8 +34,8 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     runtime.block_on(async {
         match &arguments.what {
-            Simulated::Agv(device) => agvs(device, &pack, &endpoint).await,
-            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint).await,
+            Simulated::Agv(device) => agvs(device, &pack, &endpoint, arguments.format).await,
+            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint, arguments.format).await,
         }
     })
 }
@@ -74,7 +74,18 @@ async fn end(device: RunningDevice) {
     device.stop().await;
 }
 
-async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> Result<Exit, Problem> {
+/// Says what is there: a text for people, a line for programs.
+fn say(format: Format, text: &str, event: &Value) -> Result<(), Problem> {
+    match format {
+        Format::Json => super::print(&format!("{event}\n")).map(drop),
+        Format::Text => {
+            eprintln!("{text}");
+            Ok(())
+        }
+    }
+}
+
+async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, format: Format) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
     let mut signals = Signals::listen()?;
     let clock = WallClock::start();
@@ -102,13 +113,40 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> R
         }
         running.push(agv);
     }
-    eprintln!(
-        "{} simulated AGV(s) on {}; press Ctrl-C to disconnect",
-        device.count, device.connection.broker
-    );
+    let server = match (&device.hooks, running.len()) {
+        (Some(listen), 1) => {
+            let known = BuiltIn::from(ReferenceAgv::of(device.vehicle.0, pack)).hooks();
+            let server = HookServer::start(listen, running.remove(0), known).await;
+            Some(server.map_err(|error| Problem::Environment(error.to_string()))?)
+        }
+        _ => None,
+    };
+    if let Some(server) = &server {
+        let hooks = format!("http://{}", server.address());
+        say(
+            format,
+            &format!("hooks are served at {hooks}"),
+            &json!({ "event": "hooks", "address": hooks }),
+        )?;
+    }
+    let broker = &device.connection.broker;
+    let count = device.count;
+    say(
+        format,
+        &format!("{count} simulated AGV(s) on {broker}; press Ctrl-C to disconnect"),
+        &json!({ "event": "simulating", "role": Role::Agv.word(), "count": count, "broker": broker }),
+    )?;
     signals.next().await;
+    if let Some(server) = server
+        && let Some(device) = server.stop().await
+    {
+        end(device).await;
+    }
     for device in running {
         end(device).await;
+    }
+    if format == Format::Json {
+        super::print(&format!("{}\n", json!({ "event": "disconnected" })))?;
     }
     Ok(Exit::Conforms)
 }
@@ -117,6 +155,7 @@ async fn master_control(
     device: &SimulatedMasterControl,
     pack: &Arc<Pack>,
     endpoint: &Endpoint,
+    format: Format,
 ) -> Result<Exit, Problem> {
     check_faults(Role::MasterControl, &device.fault)?;
     let mut signals = Signals::listen()?;
@@ -126,12 +165,18 @@ async fn master_control(
     enter(&mut running, endpoint).await?;
     let server = HookServer::start(&device.hooks, running, reference.hooks()).await;
     let server = server.map_err(|error| Problem::Environment(error.to_string()))?;
-    eprintln!("hooks are served at http://{}", server.address());
+    let hooks = format!("http://{}", server.address());
     let vehicles = reference.fleet().map_or(0, |fleet| fleet.vehicles.len());
-    eprintln!(
-        "a reference master control of {vehicles} vehicle(s) on {}; press Ctrl-C to disconnect",
-        device.connection.broker
-    );
+    let broker = &device.connection.broker;
+    say(
+        format,
+        &format!(
+            "hooks are served at {hooks}\na reference master control of {vehicles} vehicle(s) on {broker}; press Ctrl-C to \
+             disconnect"
+        ),
+        &json!({ "event": "simulating", "role": Role::MasterControl.word(), "count": vehicles, "broker": broker,
+            "hooks": hooks }),
+    )?;
     signals.next().await;
     if let Some(running) = server.stop().await {
         end(running).await;

@@ -6,7 +6,7 @@ use super::flood::FloodGuard;
 use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::journal::{Entry, Journal};
-use crate::judge::{JudgeError, Rules, RunJudge};
+use crate::judge::{JudgeError, Rules, RunJudge, judged};
 
 /// Why something could not be recorded.
 #[derive(Debug, thiserror::Error)]
@@ -30,14 +30,26 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins with `RunBegun`.
-    pub fn begin(rules: &Rules, mut writer: Option<JournalWriter>, first: Occurrence) -> Result<Self, RecordError> {
-        let mut journal = Journal::new();
+    /// Begins with `RunBegun`; after the records of a run that broke off, where there is one.
+    pub fn begin(
+        rules: &Rules,
+        mut writer: Option<JournalWriter>,
+        earlier: Option<Journal>,
+        first: Occurrence,
+    ) -> Result<Self, RecordError> {
+        let mut journal = earlier.unwrap_or_default();
+        let before = match journal.entries() {
+            [] => None,
+            entries => Some(judged(rules, entries)?),
+        };
         let entry = journal.append(first);
         if let Some(writer) = &mut writer {
             writer.write(&entry.record)?;
         }
-        let mut judge = RunJudge::begin(rules, &entry)?;
+        let mut judge = match before {
+            Some(before) => before.resumed(&entry)?,
+            None => RunJudge::begin(rules, &entry)?,
+        };
         judge.observe(&entry)?;
         let mut guard = FloodGuard::default();
         guard.observe(&entry);

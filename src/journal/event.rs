@@ -79,6 +79,9 @@ pub enum Event {
         test: String,
         /// The values of all variables known at its start.
         bindings: Value,
+        /// Which time it is run, counted from 1, where tests are repeated.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        repetition: Option<u32>,
     },
     /// A test ended.
     TestEnded {

@@ -126,7 +126,7 @@ impl Entry {
 }
 
 /// The records of a run, in order.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Journal {
     entries: Vec<Arc<Entry>>,
 }

@@ -4,6 +4,8 @@
 //! result at any time. Nothing but the journal and the suites enters it, so judging a journal again gives
 //! the same result, byte for byte.
 
+mod going_on;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +16,9 @@ use super::company::{Company, Part};
 use super::decide::mood;
 use super::grounds::Grounds;
 use super::hidden::Hidden;
+use super::joined;
 use super::mend::mended;
+use super::opinions::Opinions;
 use super::reactions::Reactions;
 use super::rules::{JudgeError, Rules};
 use super::test::{Ground, TestJudge};
@@ -24,12 +28,15 @@ use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Occurrence, Plan, Reading, RunHeader, Waiver};
 use crate::pack::{Decided, Role};
-use crate::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
+use crate::result::{Capability, Decision, DeviceIdentity, Repetition, RequirementResult, RunResult, TestResult};
 use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};
 
 /// Format of `result.json`.
 pub const RESULT_FORMAT: &str = "vda5050-tck.result/1";
+
+/// Why a run without an end is over.
+const BREAKS_OFF: &str = "the journal breaks off here";
 
 /// A run being judged.
 pub struct RunJudge {
@@ -39,6 +46,8 @@ pub struct RunJudge {
     ground: Ground,
     begun: Stamp,
     last: Stamp,
+    /// The number of the last record.
+    records: u64,
     timeline: Timeline,
     watches: Watches,
     /// Who is on the tap, where that is known.
@@ -51,6 +60,10 @@ pub struct RunJudge {
     last_order: Option<(Moment, String)>,
     current: Option<TestJudge>,
     done: Vec<TestResult>,
+    /// Which repetition of the running test it is, where tests are repeated.
+    repetition: Option<u32>,
+    /// The run that broke off and that this one goes on with.
+    earlier: Option<Box<Self>>,
     plan: Plan,
     end: Option<(bool, Option<String>)>,
     /// Another device spoke than the one that was to be judged.
@@ -88,6 +101,7 @@ impl RunJudge {
             ground,
             begun: first.at(),
             last: first.at(),
+            records: first.seq(),
             watches,
             company,
             reactions,
@@ -95,6 +109,8 @@ impl RunJudge {
             last_order: None,
             current: None,
             done: Vec::new(),
+            repetition: None,
+            earlier: None,
             plan: Plan::default(),
             end: None,
             is_stranger: false,
@@ -118,6 +134,7 @@ impl RunJudge {
     /// Shows it the next entry.
     pub fn observe(&mut self, entry: &Arc<Entry>) -> Result<(), JudgeError> {
         self.last = entry.at();
+        self.records = entry.seq();
         self.left_out = self.is_of_bystander(entry);
         if self.left_out {
             return Ok(());
@@ -140,9 +157,14 @@ impl RunJudge {
                 bindings.set(name, value.clone());
                 self.ground.bindings = Arc::new(bindings.to_map());
             }
-            Event::TestBegun { test, bindings } => {
+            Event::TestBegun {
+                test,
+                bindings,
+                repetition,
+            } => {
                 self.break_off("the run went on without ending this test");
                 let found = self.test(test).ok_or_else(|| JudgeError::UnknownTest(test.clone()))?;
+                self.repetition = *repetition;
                 self.current = Some(TestJudge::begin(&found, &self.ground, entry, bindings));
             }
             Event::RunEnded {
@@ -220,13 +242,31 @@ impl RunJudge {
             let mut decisions = result.decisions.iter();
             decisions.any(|decision| decision.verdict() != Verdict::Inconclusive)
         };
-        let before = self.done.iter().position(|done| done.id == result.id && !decided(done));
+        self.number(&mut result);
+        let number = |result: &TestResult| result.repetitions.first().map(|one| one.number);
+        let same = |done: &TestResult| done.id == result.id && number(done) == number(&result);
+        let before = self.done.iter().position(|done| same(done) && !decided(done));
         if let Some(before) = before {
             let before = self.done.remove(before);
             let why = before.reason.unwrap_or_else(|| "it decided nothing".to_owned());
             result.allowances.push(format!("tried again, since at first: {why}"));
         }
         self.done.push(result);
+    }
+
+    /// Notes which repetition a result is of.
+    fn number(&self, result: &mut TestResult) {
+        result.repetitions = self
+            .repetition
+            .map(|number| Repetition {
+                number,
+                verdict: result.verdict,
+                seconds: result.seconds,
+                reason: result.reason.clone(),
+                journal: result.journal,
+            })
+            .into_iter()
+            .collect();
     }
 
     /// What the vehicle says of itself: the last state of its present connection, read as it is meant.
@@ -266,7 +306,9 @@ impl RunJudge {
     fn break_off(&mut self, why: &str) {
         if let Some(mut current) = self.current.take() {
             current.hide(hidden(&self.watches, &self.ground.waivers));
-            self.done.push(current.break_off(self.last.moment, why, &self.ground));
+            let mut result = current.break_off(self.last.moment, why, &self.ground);
+            self.number(&mut result);
+            self.done.push(result);
         }
     }
 
@@ -304,26 +346,45 @@ impl RunJudge {
         &self.ground
     }
 
-    /// The result as it stands.
-    pub fn result(&self) -> RunResult {
+    /// The tests that were planned, as this run and the one before it left them: what was run, in the order of the suites,
+    /// and then what was not.
+    fn tests(&self) -> Vec<TestResult> {
+        let mut tests = if self.is_stranger {
+            Vec::new()
+        } else {
+            let mut tests = joined::repetitions(&self.done);
+            tests.extend(self.set_aside());
+            tests
+        };
+        if let Some(earlier) = &self.earlier {
+            tests = joined::tests(earlier.tests(), tests);
+        }
         // Which order they were run in is the harness's own business.
-        let mut tests = self.done.clone();
-        let places: BTreeMap<&str, usize> = self
-            .rules
-            .suites
-            .tests
-            .iter()
-            .enumerate()
-            .map(|(at, test)| (test.id.as_str(), at))
-            .collect();
-        tests.sort_by_key(|test| places.get(test.id.as_str()).copied());
-        tests.extend(self.set_aside());
-        let watched = if self.is_stranger {
-            tests.clear();
+        let suites = self.rules.suites.tests.iter().enumerate();
+        let places: BTreeMap<&str, usize> = suites.map(|(at, test)| (test.id.as_str(), at)).collect();
+        tests.sort_by_key(|test| match test.journal {
+            Some(_) => (false, places.get(test.id.as_str()).copied()),
+            None => (true, None),
+        });
+        tests
+    }
+
+    fn watched(&self) -> Vec<Watched> {
+        let own = if self.is_stranger {
             Vec::new()
         } else {
             self.watches.results()
         };
+        match &self.earlier {
+            Some(earlier) => joined::watched(earlier.watched(), own),
+            None => own,
+        }
+    }
+
+    /// The result as it stands.
+    pub fn result(&self) -> RunResult {
+        let tests = self.tests();
+        let watched = self.watched();
         let all = tests
             .iter()
             .filter_map(|test| test.verdict)
@@ -342,13 +403,19 @@ impl RunJudge {
         let unknown = (partial && !self.is_stranger).then_some(Verdict::Inconclusive);
         let verdict = verdict.into_iter().chain(unknown).collect::<Accumulated>().get();
         let header = &self.header;
+        let joined = self.joined();
+        let fleet = match &self.earlier {
+            Some(earlier) => self.reactions.after(&earlier.reactions).result(),
+            None => self.reactions.result(),
+        };
         RunResult {
             format: RESULT_FORMAT.to_owned(),
             tool: header.tool.clone(),
             run: header.run.clone(),
             mode: header.mode.clone(),
             started: format!("{:.3}", self.begun.utc),
-            seconds: self.last.moment.since(self.begun.moment).as_secs_f64(),
+            seconds: joined.iter().map(|run| run.seconds).sum::<f64>()
+                + self.last.moment.since(self.begun.moment).as_secs_f64(),
             role: header.role.clone(),
             protocol: header.protocol.clone(),
             partial,
@@ -363,6 +430,7 @@ impl RunJudge {
             suites_sha256: header.suites.clone(),
             suites_modified: header.modified,
             journal: "journal.jsonl".to_owned(),
+            joined,
             requirements: self.requirements(&tests, &watched),
             tests,
             monitors: watched.into_iter().map(|watched| watched.result).collect(),
@@ -376,7 +444,7 @@ impl RunJudge {
                     source: capability.source.clone(),
                 })
                 .collect(),
-            fleet: self.reactions.result(),
+            fleet,
             limits: self.limits(),
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
@@ -394,6 +462,9 @@ impl RunJudge {
             ));
         }
         limits.extend(self.company.iter().flat_map(Company::limits));
+        let before = self.earlier.iter().flat_map(|earlier| earlier.limits());
+        let before: Vec<String> = before.filter(|limit| !limits.contains(limit)).collect();
+        limits.extend(before);
         limits
     }
 
@@ -418,6 +489,7 @@ impl RunJudge {
                 decisions: Vec::new(),
                 steps: Vec::new(),
                 allowances: Vec::new(),
+                repetitions: Vec::new(),
             };
             let why = match &planned.gate {
                 Gate::NotApplicable(why) => {
@@ -509,50 +581,6 @@ impl RunJudge {
     }
 }
 
-/// What tests and monitors say about one requirement.
-#[derive(Default)]
-struct Opinions {
-    /// Of those that ran.
-    run: Accumulated,
-    /// Of tests that were set aside before they began: for a hook that is missing, or motion that is not permitted.
-    aside: Accumulated,
-    by: Vec<String>,
-    given: BTreeMap<Verdict, Vec<String>>,
-}
-
-impl Opinions {
-    fn add(&mut self, verdict: Verdict, by: &str, ran: bool) {
-        if ran {
-            self.run.add(verdict);
-        } else {
-            self.aside.add(verdict);
-        }
-        let given = self.given.entry(verdict).or_default();
-        for list in [&mut self.by, given] {
-            if !list.iter().any(|known| known == by) {
-                list.push(by.to_owned());
-            }
-        }
-    }
-
-    /// What could not be tried does not make undecided what was decided.
-    fn verdict(&self) -> Option<Verdict> {
-        self.run.get().or(self.aside.get())
-    }
-
-    /// All of them, the worst first; nothing where they agree.
-    fn verdicts(&self) -> Vec<Given> {
-        if self.given.len() < 2 {
-            return Vec::new();
-        }
-        let given = self.given.iter().rev().map(|(verdict, by)| Given {
-            verdict: *verdict,
-            by: by.clone(),
-        });
-        given.collect()
-    }
-}
-
 /// What shows nothing in a test: what was found in it, and what is known from before.
 fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
     let mut all = watches.hidden();
@@ -574,11 +602,19 @@ fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Dec
 
 /// Judges a whole journal.
 pub fn judge(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunResult, JudgeError> {
+    Ok(judged(rules, entries)?.result())
+}
+
+/// The judge who has seen a whole journal. Where a run begins in it, it goes on with the one before.
+pub fn judged(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunJudge, JudgeError> {
     let first = entries.first().ok_or(JudgeError::NoHeader)?;
     let mut run = RunJudge::begin(rules, first)?;
     for entry in entries {
+        if entry.seq() != first.seq() && matches!(entry.event(), Event::RunBegun { .. }) {
+            run = run.resumed(entry)?;
+        }
         run.observe(entry)?;
     }
-    run.break_off_run("the journal breaks off here");
-    Ok(run.result())
+    run.break_off_run(BREAKS_OFF);
+    Ok(run)
 }

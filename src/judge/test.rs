@@ -130,6 +130,7 @@ impl TestJudge {
                 decisions: Vec::new(),
                 steps: Vec::new(),
                 allowances: Vec::new(),
+                repetitions: Vec::new(),
             },
             departure: Departure::default(),
             interference: ground.interference.clone(),

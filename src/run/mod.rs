@@ -36,7 +36,7 @@ mod site;
 mod strikes;
 mod virtual_run;
 
-pub use bundle::{Bundle, BundleError, LATEST};
+pub use bundle::{Bundle, BundleError, JOURNAL, LATEST};
 pub use capabilities::Capabilities;
 pub use discover::{Device, Heard, Position, listen};
 pub use draft::{Wishes, draft};
@@ -48,4 +48,4 @@ pub use person::{Answer, Person, Wanted};
 pub use plan::{How, PlanLine, RunPlan, Use, Waits};
 pub use session::{End, Finished, Progress, Setup, run};
 pub use setup::{BenchFacts, DeviceUnderTest, Request};
-pub use virtual_run::{Silent, VirtualRun, run_silently, run_virtually};
+pub use virtual_run::{Silent, VirtualRun, going_on_at, run_silently, run_virtually};

@@ -21,6 +21,7 @@ use crate::bench::{LinkError, Vantage};
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, RecordError, Recorder};
+use crate::journal::Journal;
 use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
@@ -43,6 +44,8 @@ pub struct SocketRun {
     source: Source,
     /// Whether the device can reach the map server; `Err` says why not.
     maps: Result<(), String>,
+    /// The records of a run that broke off, with which this one goes on; its clock has to go on with theirs.
+    pub earlier: Option<Journal>,
     /// Where a device prints that the harness starts itself.
     pub device_log: Option<PathBuf>,
 }
@@ -111,6 +114,7 @@ impl SocketRun {
                 faults: faults.to_vec(),
             },
             maps: Ok(()),
+            earlier: None,
             device_log: None,
         }
     }
@@ -149,6 +153,7 @@ impl SocketRun {
                 secrets,
             },
             maps,
+            earlier: None,
             device_log: None,
         })
     }
@@ -236,6 +241,7 @@ impl SocketRun {
             maps: self.maps,
             vantage,
             clock,
+            earlier: self.earlier,
         };
         match self.source {
             Source::BuiltIn { device, faults } => {
@@ -287,6 +293,7 @@ struct Stage<'a> {
     maps: Result<(), String>,
     vantage: Vantage,
     clock: WallClock,
+    earlier: Option<Journal>,
 }
 
 impl Stage<'_> {
@@ -310,7 +317,7 @@ impl Stage<'_> {
         let (header, setup) = self.device.on(bench, self.request, self.library, self.pack);
         let header = Box::new(header);
         let first = Occurrence::harness(self.clock.now(), Event::RunBegun { header });
-        let recorder = Recorder::begin(&self.library.rules, self.writer, first)?;
+        let recorder = Recorder::begin(&self.library.rules, self.writer, self.earlier, first)?;
         let operator = match &fleet {
             None => WithFleet::alone(operator),
             Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter()),

@@ -39,6 +39,8 @@ pub struct Request {
     pub command: Vec<String>,
     /// Whether the run ends after the first test that fails.
     pub fail_fast: bool,
+    /// How often each test is run.
+    pub repeat: u32,
     /// Whether nothing is left to choose: the run is for a certificate.
     pub certifies: bool,
 }
@@ -54,6 +56,7 @@ impl Request {
             run: uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
             command: Vec::new(),
             fail_fast: false,
+            repeat: 1,
             certifies: false,
         }
     }
@@ -219,6 +222,7 @@ impl DeviceUnderTest {
             limits: [self.limits, bench.limits].concat(),
             run: request.run,
             fail_fast: request.fail_fast,
+            repeat: request.repeat.max(1),
         };
         (header, setup)
     }

@@ -95,7 +95,7 @@ fn links_to_maps_name_the_host_of_the_profile_and_lead_to_its_files() {
     };
     let (run, _) = bench.start(&profile, &["maps/download"]);
     run.end().code(0);
-    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    let journal = bench.journal();
     assert!(
         journal.contains("\"url\":\"http://127.0.0.2:"),
         "the link names another host"

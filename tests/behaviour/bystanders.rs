@@ -32,7 +32,7 @@ fn run_beside(others: impl FnOnce(u16, &[String])) -> (Bench, Ended) {
 }
 
 fn records(bench: &Bench) -> Vec<Value> {
-    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    let journal = bench.journal();
     journal
         .lines()
         .filter_map(|line| serde_json::from_str(line).ok())

@@ -97,6 +97,9 @@ pub struct Init {
     /// Write over a file that is there
     #[arg(long)]
     pub force: bool,
+    /// How is said what was written
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
     /// Write the built-in suites, the schemas for editors and every setting with its default into this folder, and no profile
     #[arg(long, value_name = "DIR", conflicts_with_all = ["broker", "username", "tls_ca", "topic", "seconds", "manufacturer", "serial", "lif", "file", "force"])]
     pub suites: Option<PathBuf>,

@@ -127,7 +127,11 @@ impl Command {
             Self::Audit(arguments) => arguments.format,
             Self::Watch(arguments) => arguments.format,
             Self::Explore(arguments) => arguments.output.format,
-            Self::Explain(_) | Self::Simulate(_) | Self::Init(_) | Self::Completions(_) | Self::Man(_) => Format::Text,
+            Self::Explain(arguments) => arguments.format,
+            Self::Simulate(arguments) => arguments.format,
+            Self::Init(arguments) => arguments.format,
+            // What these print is meant for a shell and for `man`.
+            Self::Completions(_) | Self::Man(_) => Format::Text,
         }
     }
 }
@@ -226,12 +230,26 @@ pub struct OutputArgs {
     /// Show tests that failed or broke, and no others
     #[arg(long, conflicts_with = "quiet")]
     pub failures: bool,
+    /// Write what happens as JSON lines while it happens; `-` is standard output (docs/events.md)
+    #[arg(long, value_name = "FILE")]
+    pub events: Option<PathBuf>,
+    /// Show the report in the browser when the run is over
+    #[arg(long)]
+    pub open: bool,
     /// How junit.xml shows what was not decided
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub inconclusive: InconclusiveArg,
     /// Show the NUMBER tests that took longest
     #[arg(long, value_name = "NUMBER")]
     pub slowest: Option<usize>,
+}
+
+impl OutputArgs {
+    /// Whether standard output belongs to the stream of events.
+    #[must_use]
+    pub fn speaks_events(&self) -> bool {
+        self.events.as_deref().is_some_and(|path| path.as_os_str() == "-")
+    }
 }
 
 /// The format of standard output.

@@ -142,6 +142,7 @@ impl OnStage {
             run: run.to_owned(),
             command: std::env::args().collect(),
             fail_fast: false,
+            repeat: 1,
             certifies: false,
         }
     }
