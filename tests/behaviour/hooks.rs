@@ -123,7 +123,6 @@ fn a_request_with_a_token_is_made_over_https_and_no_secret_is_left_anywhere() {
     let address = run.line("the device is expected at mqtt://");
     let port = address.rsplit(':').next().unwrap().parse().unwrap();
     let _agv = bench.agv(port, &[]);
-    let status = run.wait();
     let ended = run.end();
     let asked = fleet.asked.lock().unwrap().join("\n");
     for header in [
@@ -133,7 +132,8 @@ fn a_request_with_a_token_is_made_over_https_and_no_secret_is_left_anywhere() {
     ] {
         assert!(
             asked.lines().any(|line| line.eq_ignore_ascii_case(header)),
-            "no `{header}` in {asked}\n{status}\n{}",
+            "no `{header}` in {asked}\n{}\n{}",
+            ended.status,
             ended.stderr
         );
     }
