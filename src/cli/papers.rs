@@ -80,7 +80,7 @@ fn intact(folder: &Path, library: &Library) -> Result<(RunResult, String), Probl
         file::read(&journal_path).map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string())))?;
     let mut result = judge::judge(&library.rules, journal.entries())
         .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
-    result.journal = super::report::name_of(&journal_path);
+    result.journal = file::name_of(&journal_path);
     let path = folder.join("result.json");
     let saved = json::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
     if saved != result {

@@ -45,7 +45,7 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     }
     let mut result = judge::judge(&library.rules, journal.entries())
         .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
-    result.journal = name_of(&path);
+    result.journal = file::name_of(&path);
     if arguments.rejudge {
         return rejudge(folder, &result, arguments.format);
     }
@@ -80,12 +80,6 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
         }
     };
     Ok(Exit::of(result.verdict))
-}
-
-/// How a journal is called in its bundle.
-pub(super) fn name_of(path: &Path) -> String {
-    path.file_name()
-        .map_or_else(|| NAME.to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 /// The tests that lie in a bundle because no suite has them: conversations of an exploration.
@@ -124,7 +118,7 @@ fn unchanged(folder: &Path) -> Result<(), Problem> {
     }
     let found = manifest::Manifest::verify(folder)
         .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
-    let name = name_of(&file::find(folder));
+    let name = file::name_of(&file::find(folder));
     let is_there = !found.missing.iter().any(|file| [NAME, PACKED].contains(&file.as_str()));
     if found.root_holds && found.changed.is_empty() && found.extra.is_empty() && is_there {
         return Ok(());

@@ -34,6 +34,13 @@ pub fn find(folder: &Path) -> PathBuf {
     folder.join(NAME)
 }
 
+/// How a journal is called in its bundle.
+#[must_use]
+pub fn name_of(path: &Path) -> String {
+    let name = path.file_name();
+    name.map_or_else(|| NAME.to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
 /// Packs the journal of a bundle with gzip.
 ///
 /// # Errors

@@ -14,6 +14,7 @@ mod joined;
 mod limit;
 mod mend;
 mod monitor;
+mod opinions;
 mod own_errors;
 mod reactions;
 mod rules;

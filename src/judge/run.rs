@@ -4,6 +4,8 @@
 //! result at any time. Nothing but the journal and the suites enters it, so judging a journal again gives
 //! the same result, byte for byte.
 
+mod going_on;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,6 +18,7 @@ use super::grounds::Grounds;
 use super::hidden::Hidden;
 use super::joined;
 use super::mend::mended;
+use super::opinions::Opinions;
 use super::reactions::Reactions;
 use super::rules::{JudgeError, Rules};
 use super::test::{Ground, TestJudge};
@@ -25,9 +28,7 @@ use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Gate, Plan, Reading, RunHeader, Waiver};
 use crate::pack::{Decided, Role};
-use crate::result::{
-    Capability, Decision, DeviceIdentity, Given, JoinedRun, Repetition, RequirementResult, RunResult, TestResult,
-};
+use crate::result::{Capability, Decision, DeviceIdentity, Repetition, RequirementResult, RunResult, TestResult};
 use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};
 
@@ -328,33 +329,6 @@ impl RunJudge {
         &self.ground
     }
 
-    /// Goes on after a run that broke off: the first entry is that of the next run.
-    ///
-    /// # Errors
-    /// When the next run is about another device, or was judged by other suites.
-    pub fn resumed(mut self, first: &Entry) -> Result<Self, JudgeError> {
-        self.break_off_run(BREAKS_OFF);
-        let mut next = Self::begin(&self.rules, first)?;
-        let facts = |header: &RunHeader| {
-            let of_device = (
-                header.manufacturer.clone(),
-                header.serial_number.clone(),
-                header.role.clone(),
-            );
-            (
-                of_device,
-                header.protocol.clone(),
-                header.suites.clone(),
-                header.vantage.clone(),
-            )
-        };
-        if facts(&self.header) != facts(&next.header) {
-            return Err(JudgeError::AnotherRun);
-        }
-        next.earlier = Some(Box::new(self));
-        Ok(next)
-    }
-
     /// The tests that were planned, as this run and the one before it left them: what was run, in the order of the suites,
     /// and then what was not.
     fn tests(&self) -> Vec<TestResult> {
@@ -388,44 +362,6 @@ impl RunJudge {
             Some(earlier) => joined::watched(earlier.watched(), own),
             None => own,
         }
-    }
-
-    /// The runs before this one.
-    fn joined(&self) -> Vec<JoinedRun> {
-        let Some(earlier) = &self.earlier else {
-            return Vec::new();
-        };
-        let mut all = earlier.joined();
-        let before = all.iter().map(|run| run.records).sum::<u64>();
-        let reason = earlier.end.as_ref().and_then(|(_, reason)| reason.clone());
-        all.push(JoinedRun {
-            run: earlier.header.run.clone(),
-            started: format!("{:.3}", earlier.begun.utc),
-            seconds: earlier.last.moment.since(earlier.begun.moment).as_secs_f64(),
-            reason: reason.unwrap_or_else(|| "it ended".to_owned()),
-            kept: earlier.done.iter().filter(|test| joined::is_decided(test)).count(),
-            records: earlier.records - before,
-        });
-        all
-    }
-
-    /// What is left to do of a run that broke off: the planned tests that were not decided, in their order.
-    pub fn left(&self) -> Vec<String> {
-        let undecided = self.tests().into_iter().filter(|test| !joined::is_decided(test));
-        let undecided: Vec<String> = undecided.map(|test| test.id).collect();
-        let mut planned = self.planned();
-        planned.retain(|id| undecided.contains(id));
-        planned
-    }
-
-    fn planned(&self) -> Vec<String> {
-        let mut all = self.earlier.as_ref().map_or_else(Vec::new, |earlier| earlier.planned());
-        for planned in &self.plan.tests {
-            if !all.contains(&planned.test) {
-                all.push(planned.test.clone());
-            }
-        }
-        all
     }
 
     /// The result as it stands.
@@ -625,50 +561,6 @@ impl RunJudge {
             result.not_applicable.clone()
         });
         reason.map_or_else(|| "not selected".to_owned(), |why| format!("not applicable: {why}"))
-    }
-}
-
-/// What tests and monitors say about one requirement.
-#[derive(Default)]
-struct Opinions {
-    /// Of those that ran.
-    run: Accumulated,
-    /// Of tests that were set aside before they began: for a hook that is missing, or motion that is not permitted.
-    aside: Accumulated,
-    by: Vec<String>,
-    given: BTreeMap<Verdict, Vec<String>>,
-}
-
-impl Opinions {
-    fn add(&mut self, verdict: Verdict, by: &str, ran: bool) {
-        if ran {
-            self.run.add(verdict);
-        } else {
-            self.aside.add(verdict);
-        }
-        let given = self.given.entry(verdict).or_default();
-        for list in [&mut self.by, given] {
-            if !list.iter().any(|known| known == by) {
-                list.push(by.to_owned());
-            }
-        }
-    }
-
-    /// What could not be tried does not make undecided what was decided.
-    fn verdict(&self) -> Option<Verdict> {
-        self.run.get().or(self.aside.get())
-    }
-
-    /// All of them, the worst first; nothing where they agree.
-    fn verdicts(&self) -> Vec<Given> {
-        if self.given.len() < 2 {
-            return Vec::new();
-        }
-        let given = self.given.iter().rev().map(|(verdict, by)| Given {
-            verdict: *verdict,
-            by: by.clone(),
-        });
-        given.collect()
     }
 }
 

@@ -1,0 +1,75 @@
+//! A run that goes on with one that broke off.
+
+use super::super::joined;
+use super::super::rules::JudgeError;
+use super::{BREAKS_OFF, RunJudge};
+use crate::journal::Entry;
+use crate::journal::event::RunHeader;
+use crate::result::JoinedRun;
+
+impl RunJudge {
+    /// Goes on after a run that broke off: the first entry is that of the next run.
+    ///
+    /// # Errors
+    /// When the next run is about another device, or was judged by other suites.
+    pub fn resumed(mut self, first: &Entry) -> Result<Self, JudgeError> {
+        self.break_off_run(BREAKS_OFF);
+        let mut next = Self::begin(&self.rules, first)?;
+        let facts = |header: &RunHeader| {
+            let of_device = (
+                header.manufacturer.clone(),
+                header.serial_number.clone(),
+                header.role.clone(),
+            );
+            (
+                of_device,
+                header.protocol.clone(),
+                header.suites.clone(),
+                header.vantage.clone(),
+            )
+        };
+        if facts(&self.header) != facts(&next.header) {
+            return Err(JudgeError::AnotherRun);
+        }
+        next.earlier = Some(Box::new(self));
+        Ok(next)
+    }
+
+    /// The runs before this one.
+    pub(super) fn joined(&self) -> Vec<JoinedRun> {
+        let Some(earlier) = &self.earlier else {
+            return Vec::new();
+        };
+        let mut all = earlier.joined();
+        let before = all.iter().map(|run| run.records).sum::<u64>();
+        let reason = earlier.end.as_ref().and_then(|(_, reason)| reason.clone());
+        all.push(JoinedRun {
+            run: earlier.header.run.clone(),
+            started: format!("{:.3}", earlier.begun.utc),
+            seconds: earlier.last.moment.since(earlier.begun.moment).as_secs_f64(),
+            reason: reason.unwrap_or_else(|| "it ended".to_owned()),
+            kept: earlier.done.iter().filter(|test| joined::is_decided(test)).count(),
+            records: earlier.records - before,
+        });
+        all
+    }
+
+    /// What is left to do of a run that broke off: the planned tests that were not decided, in their order.
+    pub fn left(&self) -> Vec<String> {
+        let undecided = self.tests().into_iter().filter(|test| !joined::is_decided(test));
+        let undecided: Vec<String> = undecided.map(|test| test.id).collect();
+        let mut planned = self.planned();
+        planned.retain(|id| undecided.contains(id));
+        planned
+    }
+
+    fn planned(&self) -> Vec<String> {
+        let mut all = self.earlier.as_ref().map_or_else(Vec::new, |earlier| earlier.planned());
+        for planned in &self.plan.tests {
+            if !all.contains(&planned.test) {
+                all.push(planned.test.clone());
+            }
+        }
+        all
+    }
+}
