@@ -369,18 +369,6 @@ impl RunJudge {
         tests
     }
 
-    fn watched(&self) -> Vec<Watched> {
-        let own = if self.is_stranger {
-            Vec::new()
-        } else {
-            self.watches.results()
-        };
-        match &self.earlier {
-            Some(earlier) => joined::watched(earlier.watched(), own),
-            None => own,
-        }
-    }
-
     /// The result as it stands.
     pub fn result(&self) -> RunResult {
         let tests = self.tests();

@@ -2,6 +2,7 @@
 
 use super::super::joined;
 use super::super::rules::JudgeError;
+use super::super::watches::Watched;
 use super::{BREAKS_OFF, RunJudge};
 use crate::journal::Entry;
 use crate::journal::event::RunHeader;
@@ -71,5 +72,18 @@ impl RunJudge {
             }
         }
         all
+    }
+
+    /// What monitors found in this run and in those before it.
+    pub(super) fn watched(&self) -> Vec<Watched> {
+        let own = if self.is_stranger {
+            Vec::new()
+        } else {
+            self.watches.results()
+        };
+        match &self.earlier {
+            Some(earlier) => joined::watched(earlier.watched(), own),
+            None => own,
+        }
     }
 }
