@@ -45,6 +45,11 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+/// The allocator of the program: half of what the tests do is to make small trees.
+#[cfg(test)]
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 pub mod audit;
 pub mod bench;
 pub mod broker;

@@ -221,6 +221,17 @@ impl TestResult {
             .iter()
             .filter(|decision| decision.verdict() != Verdict::Pass)
     }
+
+    /// Whether every one of its steps was carried out, whatever came of them.
+    #[must_use]
+    pub fn came_to_its_end(&self) -> bool {
+        self.journal.is_some() && self.steps.iter().all(|step| step.outcome != StepResult::NOT_RUN)
+    }
+}
+
+impl StepResult {
+    /// The outcome of a step that was not reached.
+    pub const NOT_RUN: &str = "not run";
 }
 
 /// One step of a test.

@@ -451,9 +451,10 @@ fn lines_about_deviating(text: &str) -> Vec<(usize, &str)> {
 }
 
 #[test]
-fn the_reference_master_control_keeps_to_the_standard() {
+fn the_reference_devices_keep_to_the_standard() {
+    let rooms = ["reference/agv/", "reference/master_control/"];
+    let room = |name: &str| rooms.iter().any(|room| name.starts_with(room)) && !name.ends_with("/seam.rs");
     let mut wrong = Vec::new();
-    let room = |name: &str| name.starts_with("reference/master_control/") && !name.ends_with("/seam.rs");
     for (path, text) in sources()
         .iter()
         .filter(|(path, _)| room(&below_src(path)) && !is_test_file(path))
@@ -466,41 +467,6 @@ fn the_reference_master_control_keeps_to_the_standard() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-/// Files of the reference AGV that still speak of what can be done otherwise. The list may only become shorter.
-const NOT_CLEAN: [&str; 5] = [
-    "mod.rs",
-    "personas/declared.rs",
-    "personas/mod.rs",
-    "personas/orders.rs",
-    "personas/speech.rs",
-];
-
-#[test]
-fn files_of_the_reference_agv_that_keep_to_the_standard_stay_so() {
-    let mut wrong = Vec::new();
-    let room = |name: &str| name.starts_with("reference/agv/") && !name.ends_with("/seam.rs");
-    let mut clean: BTreeSet<&str> = NOT_CLEAN.into_iter().collect();
-    for (path, text) in sources()
-        .iter()
-        .filter(|(path, _)| room(&below_src(path)) && !is_test_file(path))
-    {
-        let name = below_src(path);
-        let lines = lines_about_deviating(text);
-        let listed = NOT_CLEAN.contains(&name.trim_start_matches("reference/agv/"));
-        if listed && !lines.is_empty() {
-            clean.remove(name.trim_start_matches("reference/agv/"));
-        } else if !listed {
-            wrong.extend(
-                lines
-                    .into_iter()
-                    .map(|(line, content)| format!("{name}:{line}: {content}")),
-            );
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    assert!(clean.is_empty(), "clean by now, or gone: {clean:?}");
 }
 
 #[test]

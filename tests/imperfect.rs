@@ -12,6 +12,10 @@ use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
+/// The allocator of the program: a run is a million small trees.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Mistakes that show in every state from some moment on, or that a test leaves behind in the vehicle.
 const LASTING: [&str; 20] = [
     "cancel-leaves-nodes",

@@ -12,6 +12,10 @@ use vda5050_tck::judge::judge;
 use vda5050_tck::report::json;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 
+/// The allocator of the program: a run is a million small trees.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn library() -> Library {
     Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]))
 }

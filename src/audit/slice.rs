@@ -222,7 +222,9 @@ mod tests {
         ] {
             let messages = traffic(&library, pack, role, tests, &[fault]);
             let mut audit = Audit::new(&library.rules, Options::default()).expect("options");
-            messages.iter().for_each(|message| audit.observe(message.clone()));
+            for message in &messages {
+                audit.observe(message.clone());
+            }
             let result = audit.finish(Vec::new());
             let target = Target::find(&result, requirement).expect("a finding");
             let all: Vec<Message> = messages.into_iter().map(written).collect();

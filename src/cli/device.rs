@@ -27,8 +27,7 @@ pub(super) fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pa
 pub(super) fn check_faults(role: Role, faults: &[String]) -> Result<(), Problem> {
     let known = BuiltIn::faults(role);
     for fault in faults {
-        let every = known.iter().chain(BuiltIn::blind_faults(role));
-        if !every.into_iter().any(|known| known.name == fault) {
+        if !known.iter().any(|known| known.name == fault) {
             let hint = match crate::diagnostic::closest(fault, known.iter().map(|known| known.name)) {
                 Some(close) => format!("did you mean `{close}`?"),
                 None => "`vda5050-tck list faults` shows them all".to_owned(),

@@ -259,10 +259,17 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             let _ = writeln!(text, "parameters: {}", hook.parameters.join(", "));
         }
     }
-    if let Some(fault) = all_faults().find(|fault| fault.name == id) {
+    for role in [Role::Agv, Role::MasterControl] {
+        let Some(fault) = BuiltIn::faults(role).iter().find(|fault| fault.name == id) else {
+            continue;
+        };
+        let (device, flag) = match role {
+            Role::Agv => ("AGV", ""),
+            Role::MasterControl => ("master control", " --role master-control"),
+        };
         let _ = writeln!(
             text,
-            "fault {id} of the reference AGV\n\n{}\n\nbreaks {}\ntry    vda5050-tck run --virtual --fault {id}",
+            "fault {id} of the reference {device}\n\n{}\n\nbreaks {}\ntry    vda5050-tck run --virtual{flag} --fault {id}",
             fault.wrong,
             fault.breaks.join(", ")
         );

@@ -21,7 +21,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
     };
     // A fault or a test belongs to one side; the other one is left out without a word.
     let known = |role: Role| {
-        let of_role = |name: &String| BuiltIn::every_fault(role).any(|fault| fault.name == name);
+        let of_role = |name: &String| BuiltIn::faults(role).iter().any(|fault| fault.name == name);
         arguments.fault.iter().all(of_role)
     };
     let with_faults: Vec<Role> = roles.iter().copied().filter(|role| known(*role)).collect();
@@ -43,7 +43,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         .flat_map(|role| packs.iter().map(move |pack| (*role, pack)))
     {
         let is_asked = |fault: &&Fault| !named || arguments.fault.iter().any(|name| name == fault.name);
-        let faults: Vec<Fault> = BuiltIn::every_fault(role).filter(is_asked).copied().collect();
+        let faults: Vec<Fault> = BuiltIn::faults(role).iter().filter(is_asked).copied().collect();
         let all = library.tests(role, &pack.id);
         match super::select::select(&all, &arguments.tests) {
             Ok(tests) => jobs.push((role, pack, tests, faults)),

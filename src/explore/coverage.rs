@@ -1,7 +1,8 @@
 //! Which stimuli were tried in which situation.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use super::broken::family;
 use super::grammar::Grammar;
 
 /// How often each stimulus came in each situation.
@@ -37,16 +38,16 @@ impl Coverage {
     /// How many pairs of a situation and a stimulus were tried, out of how many the grammar has.
     #[must_use]
     pub fn pairs(&self, grammar: &Grammar) -> (usize, usize) {
-        let all = grammar.stimuli.iter().flat_map(|(name, stimulus)| {
+        let families = grammar.stimuli.iter().flat_map(|(name, stimulus)| {
             let situations = stimulus.situations.iter();
-            situations.map(move |situation| (situation, name))
+            situations.map(move |situation| (situation.as_str(), family(name)))
         });
-        let mut tried = 0;
-        let mut of = 0;
-        for (situation, name) in all {
-            of += 1;
-            tried += usize::from(self.tried(situation, name));
-        }
+        let all: BTreeSet<(&str, &str)> = families.collect();
+        let of = all.len();
+        let tried = all
+            .iter()
+            .filter(|(situation, name)| self.tried(situation, name))
+            .count();
         (tried, of)
     }
 }

@@ -1,5 +1,6 @@
 //! Conversations at random, which are the same for the same seed, and turn to what was not tried yet.
 
+use super::broken::family;
 use super::chain::Chain;
 use super::coverage::Coverage;
 use super::grammar::{Grammar, Stimulus};
@@ -42,7 +43,7 @@ pub fn draw(grammar: &Grammar, random: &mut Random, length: usize, coverage: &mu
             .filter(|(_, stimulus)| model.allows(stimulus))
             .map(|(name, stimulus)| {
                 let weight = u64::from(stimulus.weight.max(1));
-                let tried = coverage.tried(&model.situation, name);
+                let tried = coverage.tried(&model.situation, family(name));
                 (name, stimulus, if tried { weight } else { weight * UNTRIED })
             })
             .collect();
@@ -57,7 +58,7 @@ pub fn draw(grammar: &Grammar, random: &mut Random, length: usize, coverage: &mu
             hit
         });
         let Some((name, stimulus, _)) = drawn else { break };
-        coverage.note(&model.situation, name);
+        coverage.note(&model.situation, family(name));
         model.hear(stimulus, String::new());
         names.push(name.clone());
     }

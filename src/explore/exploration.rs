@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::broken::family;
 use super::chain::Chain;
 use super::coverage::Coverage;
 use super::draw::{Random, draw};
@@ -10,7 +11,6 @@ use super::grammar::Grammar;
 use super::shrink::shrink;
 use super::writing::ConversationFile;
 use crate::result::RunResult;
-use crate::verdict::Verdict;
 
 /// What a round of conversations is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,7 +119,7 @@ impl Exploration {
         let left_out = left_out(&probes, &probed);
         let unfit: BTreeSet<&str> = left_out.iter().map(|(name, _)| name.as_str()).collect();
         let mut grammar = self.grammar.clone();
-        grammar.stimuli.retain(|name, _| !unfit.contains(name.as_str()));
+        grammar.stimuli.retain(|name, _| !unfit.contains(family(name)));
         let mut found = findings(&probed, &probes);
 
         let mut undecided = (0, None);
@@ -130,8 +130,8 @@ impl Exploration {
             note(&format!("{} conversations of {stimuli} stimuli", drawn.len()));
             let files: Vec<ConversationFile> = drawn.iter().map(|(_, file)| file.clone()).collect();
             let result = stage.carry_out(&files, Purpose::Conversations)?;
-            let short = |verdict| matches!(verdict, Some(Verdict::Inconclusive | Verdict::Error));
-            let short: Vec<_> = result.tests.iter().filter(|test| short(test.verdict)).collect();
+            let carried_out = result.tests.iter().filter(|test| test.not_applicable.is_none());
+            let short: Vec<_> = carried_out.filter(|test| !test.came_to_its_end()).collect();
             undecided = (short.len(), short.first().and_then(|test| test.reason.clone()));
             conversations = result.tests.iter().filter(|test| test.journal.is_some()).count();
             merge(&mut found, findings(&result, &drawn));
@@ -161,14 +161,14 @@ impl Exploration {
         })
     }
 
-    /// Every stimulus by the shortest way to it.
+    /// Every stimulus, of those that break a message one, by the shortest way to it.
     fn probes(&self) -> Vec<(Chain, ConversationFile)> {
-        let names = self.grammar.stimuli.keys();
+        let names = self.grammar.heads();
         let chains = names.filter_map(|name| Some((name, Chain::shortest_to(&self.grammar, name)?)));
         let probes = chains.map(|(name, chain)| {
             let file = chain.file(
                 &self.grammar,
-                &format!("explore/probe-{name}"),
+                &format!("explore/probe-{}", family(name)),
                 "Every stimulus is tried once.",
             );
             (chain, file)
@@ -223,7 +223,7 @@ fn left_out(probes: &[(Chain, ConversationFile)], result: &RunResult) -> Vec<(St
         let test = result.tests.iter().find(|test| test.id == file.id)?;
         let never_began = test.journal.is_none().then(|| test.reason.clone().unwrap_or_default());
         let why = test.not_applicable.clone().or(never_began)?;
-        Some((chain.stimuli().last()?.clone(), why))
+        Some((family(chain.stimuli().last()?).to_owned(), why))
     });
     unfit.collect()
 }

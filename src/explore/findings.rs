@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::broken::family;
 use super::chain::Chain;
 use super::writing::ConversationFile;
-use crate::result::RunResult;
+use crate::result::{RunResult, TestResult};
 use crate::verdict::Verdict;
 
 /// What saw it.
@@ -69,7 +70,7 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
         note(
             &first.requirement,
             first.verdict(),
-            Source::Stimulus(chain.stimuli()[at].clone()),
+            Source::Stimulus(family(&chain.stimuli()[at]).to_owned()),
             &first.message,
             chain.until(at),
         );
@@ -80,21 +81,27 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
             .iter()
             .filter(|one| matches!(one.verdict, Verdict::Fail | Verdict::Warning));
         for finding in bad {
-            let seq = finding.first.first().copied().unwrap_or_default();
-            let during = |range: Option<(u64, u64)>| range.is_some_and(|(first, last)| (first..=last).contains(&seq));
-            let test = result.tests.iter().find(|test| during(test.journal));
-            let Some((test, (chain, file))) = test.and_then(|test| {
-                let conversation = conversations.iter().find(|(_, file)| file.id == test.id)?;
-                Some((test, conversation))
-            }) else {
+            let within = |test: &TestResult, seq: u64| {
+                let range = test.journal;
+                range.is_some_and(|(first, last)| (first..=last).contains(&seq))
+            };
+            let placed = finding.first.iter().find_map(|seq| {
+                let test = result.tests.iter().find(|test| within(test, *seq))?;
+                Some((*seq, test))
+            });
+            // What shows before the first conversation shows in each, whatever is said.
+            let placed = placed.or_else(|| Some((*finding.first.first()?, result.tests.first()?)));
+            let Some((seq, test)) = placed else { continue };
+            let Some((chain, file)) = conversations.iter().find(|(_, file)| file.id == test.id) else {
                 continue;
             };
-            let step = test
-                .steps
-                .iter()
-                .rfind(|step| step.journal.is_some_and(|(first, _)| first <= seq));
+            // Steps of a shared state name its file, and belong to the stimulus before them.
+            let own = test.steps.iter().filter(|step| step.place.contains(&file.id));
+            let step = own
+                .filter(|step| step.journal.is_some_and(|(first, _)| first <= seq))
+                .next_back();
             let at = step.and_then(|step| file.stimulus_at(line(&step.place)?));
-            let cut = at.map_or_else(|| chain.clone(), |at| chain.until(at));
+            let cut = chain.until(at.unwrap_or(0));
             note(
                 &finding.requirement,
                 finding.verdict,

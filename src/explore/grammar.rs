@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
 
+use super::broken::{Breaks, family};
 use crate::diagnostic::Source;
-use crate::pack::{Assets, Pack, Role, VersionRange};
+use crate::pack::{Assets, Role, VersionRange};
 use crate::yaml;
 
 /// Why there is no grammar.
@@ -36,6 +37,11 @@ pub struct Grammar {
     pub begins: String,
     /// The nodes of the way, which is walked to its end and back again.
     pub nodes: Vec<String>,
+    /// Steps behind the last stimulus that judge the conversation as a whole.
+    #[serde(default)]
+    pub closing: String,
+    /// Steps that bring device and harness to the beginning of every conversation.
+    pub given: String,
     /// What a conversation can have come to, with one sentence each.
     pub situations: BTreeMap<String, String>,
     /// Answers that stimuli share.
@@ -67,6 +73,9 @@ pub struct Stimulus {
     /// What device, bench or profile must offer, as in a test.
     #[serde(default)]
     pub needs: BTreeSet<String>,
+    /// The breakages it stands for, one of which goes where `sends` says `${break.patch}`.
+    #[serde(default)]
+    pub breaks: Option<Breaks>,
     /// How often it is drawn, compared with others.
     #[serde(default = "once")]
     pub weight: u32,
@@ -177,6 +186,9 @@ impl Grammar {
             return Some("the way has fewer than two nodes".to_owned());
         }
         self.stimuli.iter().find_map(|(name, stimulus)| {
+            if family(name) != name {
+                return Some(format!("the stimulus `{name}` has a dot in its name"));
+            }
             let then = stimulus.then.situation.iter();
             let lost = stimulus
                 .situations
@@ -202,17 +214,10 @@ impl Grammar {
         })
     }
 
-    /// The same without the stimuli that a protocol version does not have, and those `keeps` refuses.
-    #[must_use]
-    pub fn only(mut self, pack: &Pack, keeps: impl Fn(&str, &Stimulus) -> bool) -> Self {
-        self.stimuli.retain(|name, stimulus| {
-            let spec = stimulus
-                .spec
-                .as_deref()
-                .and_then(|spec| spec.parse::<VersionRange>().ok());
-            spec.is_none_or(|spec| spec.contains(pack.version)) && keeps(name, stimulus)
-        });
-        self
+    /// The first stimulus of every family, and every stimulus that has none.
+    pub fn heads(&self) -> impl Iterator<Item = &String> {
+        let mut seen = BTreeSet::new();
+        self.stimuli.keys().filter(move |name| seen.insert(family(name)))
     }
 
     /// The side it is for, in the word of a test.

@@ -4,6 +4,7 @@
 //! afterwards. A [`Chain`] is a list of stimuli that a grammar allows, [`draw`](draw::draw) makes one, [`Chain::file`] writes it as an
 //! ordinary test, and [`shrink`](shrink::shrink) makes a failing one shorter. Running and judging tests is left to `run` and `judge`.
 
+mod broken;
 mod chain;
 mod coverage;
 pub mod draw;
@@ -14,8 +15,10 @@ mod model;
 pub mod shrink;
 #[cfg(test)]
 mod tests;
+mod unfold;
 mod writing;
 
+pub use broken::family;
 pub use chain::Chain;
 pub use coverage::Coverage;
 pub use exploration::{Exploration, Explored, Purpose, Shown, Stage};

@@ -11,17 +11,17 @@ use super::{Chain, ConversationFile, Coverage, Exploration, Grammar, Source, fin
 use crate::pack::{Pack, Role};
 use crate::run::{Library, VirtualRun, run_silently};
 
-fn grammar(library: &Library, pack: &Pack) -> Grammar {
-    Grammar::load(&library.assets, Role::Agv)
+const ROLES: [Role; 2] = [Role::Agv, Role::MasterControl];
+
+fn grammar(library: &Library, pack: &Pack, role: Role) -> Grammar {
+    Grammar::load(&library.assets, role)
         .expect("the grammar of the suites")
         .only(pack, |_, _| true)
 }
 
-fn places(files: &[ConversationFile]) -> Vec<(String, String)> {
-    files
-        .iter()
-        .map(|file| (format!("suites/agv/{}.yaml", file.id), file.text.clone()))
-        .collect()
+fn places(grammar: &Grammar, files: &[ConversationFile]) -> Vec<(String, String)> {
+    let places = files.iter().map(|file| (file.place(grammar.side()), file.text.clone()));
+    places.collect()
 }
 
 fn exploration(grammar: Grammar, seed: u64, conversations: usize) -> Exploration {
@@ -37,9 +37,9 @@ fn exploration(grammar: Grammar, seed: u64, conversations: usize) -> Exploration
 #[test]
 fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
     let packs = Library::load(None).expect("the built-in suites").rules.packs;
-    for pack in packs.all() {
+    for (pack, role) in packs.all().iter().flat_map(|pack| ROLES.map(|role| (pack, role))) {
         let mut library = Library::load(None).expect("the built-in suites");
-        let grammar = grammar(&library, pack);
+        let grammar = grammar(&library, pack, role);
         let reach =
             |name: &String| Chain::shortest_to(&grammar, name).unwrap_or_else(|| panic!("nothing leads to {name}"));
         let probes = grammar
@@ -48,7 +48,7 @@ fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
             .map(|name| reach(name).file(&grammar, &format!("explore/{name}"), "Why."));
         let files: Vec<ConversationFile> = probes.collect();
         let tests = library
-            .add(&places(&files))
+            .add(&places(&grammar, &files))
             .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
         assert_eq!(tests.len(), grammar.stimuli.len());
     }
@@ -57,20 +57,20 @@ fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
 #[test]
 fn the_same_seed_draws_the_same_conversations_and_they_are_tests_without_a_complaint() {
     let mut library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, library.rules.packs.latest());
+    let grammar = grammar(&library, library.rules.packs.latest(), Role::Agv);
     let drawn = |seed| exploration(grammar.clone(), seed, 20).drawn(&grammar, &mut Coverage::default());
     assert_eq!(drawn(1), drawn(1));
     assert_ne!(drawn(1), drawn(2));
     let files: Vec<ConversationFile> = drawn(3).into_iter().map(|(_, file)| file).collect();
     library
-        .add(&places(&files))
+        .add(&places(&grammar, &files))
         .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
 }
 
 #[test]
 fn what_was_not_tried_yet_is_drawn_first() {
     let library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, library.rules.packs.latest());
+    let grammar = grammar(&library, library.rules.packs.latest(), Role::Agv);
     let mut coverage = Coverage::default();
     let drawn = exploration(grammar.clone(), 1, 60).drawn(&grammar, &mut coverage);
     let (tried, of) = coverage.pairs(&grammar);
@@ -78,53 +78,54 @@ fn what_was_not_tried_yet_is_drawn_first() {
     assert!(tried * 10 >= of * 9, "{tried} of {of} pairs in {stimuli} stimuli");
 }
 
-/// What is found in conversations with the reference AGV.
-fn found(faults: &[&str], seed: u64, conversations: usize) -> Vec<super::Finding> {
+/// What is found in conversations with the reference device of a side.
+fn found(role: Role, faults: &[&str], seed: u64, conversations: usize) -> Vec<super::Finding> {
     let mut library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, library.rules.packs.latest());
-    let drawn = exploration(grammar.clone(), seed, conversations).drawn(&grammar, &mut Coverage::default());
+    let grammar = grammar(&library, library.rules.packs.latest(), role);
+    let exploration = exploration(grammar.clone(), seed, conversations);
+    let drawn = exploration.drawn(&grammar, &mut Coverage::default());
     let files: Vec<ConversationFile> = drawn.iter().map(|(_, file)| file.clone()).collect();
-    let tests = library.add(&places(&files)).expect("tests");
+    let tests = library.add(&places(&grammar, &files)).expect("tests");
     let pack = library.rules.packs.latest().clone();
-    let mut run = VirtualRun::of(&library, &pack);
+    let mut run = VirtualRun::of_role(role, &library, &pack);
     run.tests = tests;
     run.draw = None;
     run.complete = false;
     run.faults = faults.iter().map(|&fault| fault.to_owned()).collect();
     let finished = run_silently(&library, &pack, run).expect("a run");
-    let undecided = finished
-        .result
-        .tests
-        .iter()
-        .filter(|test| test.journal.is_none())
-        .count();
-    assert_eq!(undecided, 0, "every conversation begins");
+    for test in &finished.result.tests {
+        assert!(test.journal.is_some(), "{} never begins", test.id);
+        let well = test.came_to_its_end() || !faults.is_empty();
+        assert!(well, "{}: {:?}", test.id, test.reason);
+    }
     findings(&finished.result, &drawn)
 }
 
 #[test]
-fn a_faultless_vehicle_is_accused_of_nothing() {
-    for seed in 1..=3 {
-        let all = found(&[], seed, 20);
-        assert!(all.is_empty(), "{all:#?}");
+fn a_faultless_device_is_accused_of_nothing_and_every_conversation_comes_to_its_end() {
+    for (role, seed) in ROLES.into_iter().flat_map(|role| (1..=3).map(move |seed| (role, seed))) {
+        let all = found(role, &[], seed, 20);
+        assert!(all.is_empty(), "{role}, seed {seed}: {all:#?}");
     }
 }
 
 #[test]
 fn a_fault_is_found_where_it_shows() {
-    let all = found(&["outdated-update-taken-over"], 1, 20);
-    let source = Source::Stimulus("outdated".to_owned());
-    assert!(
-        all.iter()
-            .any(|one| one.requirement == "ORD-REJ-10" && one.source == source),
-        "{all:#?}"
-    );
+    for (role, fault, requirement, stimulus) in [
+        (Role::Agv, "outdated-update-taken-over", "ORD-REJ-10", "outdated"),
+        (Role::MasterControl, "orders-in-manual", "MODE-04", "ordered-by-hand"),
+    ] {
+        let all = found(role, &[fault], 1, 20);
+        let source = Source::Stimulus(stimulus.to_owned());
+        let shows = |one: &super::Finding| one.requirement == requirement && one.source == source;
+        assert!(all.iter().any(shows), "{all:#?}");
+    }
 }
 
 #[test]
 fn shrinking_keeps_what_a_failure_needs_and_nothing_else() {
     let library = Library::load(None).expect("the built-in suites");
-    let grammar = grammar(&library, library.rules.packs.latest());
+    let grammar = grammar(&library, library.rules.packs.latest(), Role::Agv);
     let names = |all: &[&str]| all.iter().map(|&name| name.to_owned()).collect::<Vec<String>>();
     let long = names(&[
         "ask-state",
@@ -154,7 +155,7 @@ fn shrinking_keeps_what_a_failure_needs_and_nothing_else() {
 
 #[test]
 fn a_grammar_that_names_what_is_not_there_is_refused_with_a_reason() {
-    let text = "explore: agv\nspec: \">=2.0\"\nbegins: rest\nnodes: [a, b]\nsituations: { rest: It rests }\nanswers: {}\n\
+    let text = "explore: agv\nspec: \">=2.0\"\nbegins: rest\nnodes: [a, b]\ngiven: \"\"\nsituations: { rest: It rests }\nanswers: {}\n\
                 stimuli: { one: { title: One, in: [lost] } }\nendings: []\n";
     let error = Grammar::read("suites/explore/agv.yaml", text).expect_err("a situation is missing");
     assert_eq!(

@@ -35,32 +35,23 @@ impl ConversationFile {
         Some(Self::new(id, text, 0, Vec::new()))
     }
 
+    /// Where it stands as a test of a side.
+    #[must_use]
+    pub fn place(&self, side: &str) -> String {
+        format!("suites/{side}/{}.yaml", self.id)
+    }
+
     /// Which stimulus a line belongs to, counted from zero.
     #[must_use]
     pub fn stimulus_at(&self, line: u32) -> Option<usize> {
         if line < self.first {
             return None;
         }
-        self.ends.iter().position(|end| line <= *end)
+        // What is judged of a conversation as a whole is known at its last stimulus.
+        let last = self.ends.len().checked_sub(1);
+        self.ends.iter().position(|end| line <= *end).or(last)
     }
 }
-
-/// The preamble: the order 0 of the conversation.
-const GIVEN: &str = "  - use: idle
-  - send: order
-    title: An order of one node, on which the vehicle stands
-    route: { base: [a] }
-    payload: { orderId: \"${run.order0}\" }
-  - expect: state
-    title: It is accepted and done
-    within: ${time.drive}
-    where:
-      orderId: \"${run.order0}\"
-      lastNodeId: \"${course.a}\"
-      driving: false
-      nodeStates: { $empty: true }
-      edgeStates: { $empty: true }
-";
 
 /// The text, and which line belongs to which stimulus.
 pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -> ConversationFile {
@@ -103,17 +94,16 @@ pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -
         .chars()
         .map(|one| if one.is_control() { ' ' } else { one })
         .collect();
-    let _ = writeln!(
-        text,
-        "why: \"{}\"\n\ngiven:\n{GIVEN}\nsteps:",
-        why.replace(['"', '\\'], "'")
-    );
+    let _ = writeln!(text, "why: \"{}\"\n\ngiven:", why.replace(['"', '\\'], "'"));
+    indented(&grammar.given, &mut text);
+    text.push_str("\nsteps:\n");
     let first = lines(&text) + 1;
     let ends = lengths
         .iter()
         .map(|length| first - 1 + u32::try_from(*length).unwrap_or(u32::MAX - first))
         .collect();
     text.push_str(&body);
+    indented(&grammar.closing, &mut text);
     text.push_str("\nfinally:\n");
     for ending in grammar
         .endings

@@ -465,7 +465,7 @@ impl TestJudge {
                 verb: step.verb_span.text().to_owned(),
                 title: step.title.clone(),
                 place: step.span.place(),
-                outcome: "not run".to_owned(),
+                outcome: StepResult::NOT_RUN.to_owned(),
                 journal: None,
                 took: None,
                 seconds: 0.0,

@@ -157,25 +157,26 @@ impl Bound {
         };
         match which {
             Element::Has if !matching.is_empty() => decided_by(matching.first()),
-            Element::HasNew => match matching.iter().find(|at| baseline.is_new(self, found, **at)) {
-                Some(at) => decided_by(Some(at)),
-                // What is new and is not as expected says more than what is as expected and old.
-                None if (0..found.len()).any(|at| baseline.is_new(self, found, at)) => {
-                    self.nearest_new(inner, found, baseline, trail)
+            Element::HasNew => {
+                let new = baseline.newcomers(self, found);
+                match matching.iter().find(|at| new[**at]) {
+                    Some(at) => decided_by(Some(at)),
+                    // What is new and is not as expected says more than what is as expected and old.
+                    None if new.contains(&true) => self.nearest_new(inner, found, &new, baseline, trail),
+                    None => match matching.first() {
+                        Some(at) => {
+                            let mut miss = self.miss(
+                                &Trail::Element(trail, *at),
+                                &format!("a new element {}", inner.describe()),
+                                &format!("already there before the stimulus: {}", shown(found.get(*at))),
+                            );
+                            miss.score.0 = inner.leaves();
+                            miss
+                        }
+                        None => self.nearest(inner, found, baseline, trail),
+                    },
                 }
-                None => match matching.first() {
-                    Some(at) => {
-                        let mut miss = self.miss(
-                            &Trail::Element(trail, *at),
-                            &format!("a new element {}", inner.describe()),
-                            &format!("already there before the stimulus: {}", shown(found.get(*at))),
-                        );
-                        miss.score.0 = inner.leaves();
-                        miss
-                    }
-                    None => self.nearest(inner, found, baseline, trail),
-                },
-            },
+            }
             Element::One if matching.len() == 1 => decided_by(matching.first()),
             Element::Has => self.nearest(inner, found, baseline, trail),
             Element::One if matching.is_empty() => self.nearest(inner, found, baseline, trail),
@@ -246,9 +247,16 @@ impl Bound {
     }
 
     /// The same among those that were not there before.
-    fn nearest_new(&self, inner: &Self, found: &[Value], baseline: &Baseline, trail: &Trail<'_>) -> Examination {
+    fn nearest_new(
+        &self,
+        inner: &Self,
+        found: &[Value],
+        new: &[bool],
+        baseline: &Baseline,
+        trail: &Trail<'_>,
+    ) -> Examination {
         let best = (0..found.len())
-            .filter(|at| baseline.is_new(self, found, *at))
+            .filter(|at| new[*at])
             .map(|at| (at, inner.agreeing(&found[at], baseline)))
             .max_by(|left, right| left.1.cmp(&right.1).then(right.0.cmp(&left.0)));
         let Some((at, _)) = best else {

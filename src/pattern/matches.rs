@@ -24,15 +24,20 @@ impl Baseline {
         Self(old)
     }
 
-    /// Whether this element of the list a `$hasNew` looks at was not there before.
-    pub(super) fn is_new(&self, pattern: &Bound, list: &[Value], at: usize) -> bool {
-        let (Some(old), Some(element)) = (self.0.get(&std::ptr::from_ref(pattern)), list.get(at)) else {
-            return true;
+    /// Which elements of the list a `$hasNew` looks at were not there before, by their places.
+    pub(super) fn newcomers(&self, pattern: &Bound, list: &[Value]) -> Vec<bool> {
+        let Some(old) = self.0.get(&std::ptr::from_ref(pattern)).filter(|old| !old.is_empty()) else {
+            return vec![true; list.len()];
         };
-        let text = canonical(element);
-        let Some(before) = old.get(&text) else { return true };
-        let like = list[..=at].iter().filter(|other| canonical(other) == text);
-        like.count() > *before
+        let mut like: HashMap<String, usize> = HashMap::new();
+        let new = list.iter().map(|element| {
+            let text = canonical(element);
+            let before = old.get(&text).copied().unwrap_or(0);
+            let here = like.entry(text).or_insert(0);
+            *here += 1;
+            *here > before
+        });
+        new.collect()
     }
 }
 
@@ -124,8 +129,8 @@ impl Bound {
             BoundKind::Not(inner) => inner.gather_new(values, baseline, found),
             BoundKind::Elements(Element::HasNew, _) => {
                 for list in values.iter().filter_map(|value| value.as_array()) {
-                    let new = (0..list.len()).filter(|at| baseline.is_new(self, list, *at));
-                    found.extend(new.filter_map(|at| list.get(at)));
+                    let new = baseline.newcomers(self, list);
+                    found.extend(list.iter().zip(new).filter_map(|(element, new)| new.then_some(element)));
                 }
             }
             _ => {}
@@ -200,8 +205,13 @@ impl Bound {
 
     fn elements_accept(&self, which: Element, inner: &Self, found: &[Value], baseline: &Baseline) -> bool {
         if which == Element::HasNew {
-            return (0..found.len())
-                .any(|at| inner.accepts(found.get(at), baseline) && baseline.is_new(self, found, at));
+            let matching: Vec<bool> = found
+                .iter()
+                .map(|element| inner.accepts(Some(element), baseline))
+                .collect();
+            // What is new is costly to tell, and most messages have nothing that matches.
+            return matching.contains(&true)
+                && std::iter::zip(matching, baseline.newcomers(self, found)).any(|(matches, new)| matches && new);
         }
         let mut matching = found.iter().filter(|element| inner.accepts(Some(element), baseline));
         match which {

@@ -18,8 +18,8 @@ use crate::pack::Participant;
 use crate::pack::Role;
 use crate::profile::TimeLimits;
 use crate::reference::Fault;
-use crate::reference::agv::Agv;
 use crate::reference::deviations::agv::Tolerance;
+use crate::reference::deviations::personas::mock;
 use crate::reference::deviations::{agv as vehicles, master_control as deviations};
 
 /// A built-in device under test.
@@ -123,20 +123,6 @@ impl BuiltIn {
         }
     }
 
-    /// Every fault of the reference device.
-    pub fn every_fault(role: Role) -> impl Iterator<Item = &'static Fault> {
-        Self::faults(role).iter().chain(Self::blind_faults(role))
-    }
-
-    /// Its faults of blind rounds, which the suites need not find yet.
-    #[must_use]
-    pub fn blind_faults(role: Role) -> &'static [Fault] {
-        match role {
-            Role::Agv => &vehicles::BLIND_FAULTS,
-            Role::MasterControl => &deviations::BLIND_FAULTS,
-        }
-    }
-
     /// The liberties it can take.
     #[must_use]
     pub fn tolerances(role: Role) -> &'static [Tolerance] {
@@ -237,6 +223,6 @@ impl BuiltIn {
     /// The mock AGVs, for a bench in memory.
     pub fn mock_peers(&self) -> impl Iterator<Item = Box<dyn Peer>> {
         let vehicles = self.fleet().into_iter().flat_map(|fleet| &fleet.vehicles);
-        vehicles.map(|vehicle| Box::new(DevicePeer(Agv::new(vehicle.config.clone()))) as Box<dyn Peer>)
+        vehicles.map(|vehicle| Box::new(DevicePeer(mock(vehicle.config.clone()))) as Box<dyn Peer>)
     }
 }

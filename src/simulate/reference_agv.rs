@@ -322,7 +322,9 @@ impl ReferenceAgv {
     pub fn tolerate(&mut self, name: &str) -> Result<(), UnknownTolerance> {
         let speed = self.config.speed;
         self.config.tolerate(name)?;
-        self.time.drive = self.time.drive.mul_f64((speed / self.config.speed).max(1.0));
+        // Many small delays on one way are a long one.
+        let usual = self.time.drive + Duration::from_millis(500);
+        self.time.drive = usual.mul_f64((speed / self.config.speed).max(1.0));
         let latency = self.config.answers_after + self.config.min_state_interval;
         self.time.quiet = self.time.quiet.max(latency * 2);
         // Long enough for what a test does meanwhile.

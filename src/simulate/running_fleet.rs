@@ -10,7 +10,7 @@ use crate::bench::endpoint::Endpoint;
 use crate::clock::WallClock;
 use crate::engine::{HookOutcome, Operator};
 use crate::link::mqtt::Reporter;
-use crate::reference::agv::Agv;
+use crate::reference::deviations::personas::mock;
 
 /// Hooks, and the mock AGVs of the harness; none when an AGV is tested.
 pub struct WithFleet<O> {
@@ -31,7 +31,7 @@ impl<O> WithFleet<O> {
     pub fn start(operator: O, fleet: &Fleet, broker: &Endpoint, clock: WallClock, reporter: &Reporter) -> Self {
         let mut vehicles = Vec::with_capacity(fleet.vehicles.len());
         for vehicle in &fleet.vehicles {
-            let agv = Agv::new(vehicle.config.clone());
+            let agv = mock(vehicle.config.clone());
             vehicles.push(RunningDevice::start(agv, broker.clone(), clock, Some(reporter.clone())));
         }
         Self { operator, vehicles }

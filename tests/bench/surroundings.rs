@@ -1,5 +1,6 @@
 //! TLS towards the device, and the map server.
 
+use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use tokio::net::TcpStream;
 use vda5050_tck::bench::Offer;
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
 use vda5050_tck::bench::endpoint::Endpoint;
+use vda5050_tck::bench::tls::TlsFiles;
 use vda5050_tck::journal::event::{Event, Source};
 use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::BenchOptions;
@@ -61,43 +63,31 @@ async fn map_files_are_served_well_and_badly() {
     rig.link.stop().await;
 }
 
-#[tokio::test]
-async fn the_device_side_can_be_tls() {
-    let folder = tempfile::tempdir().unwrap();
-    let (certificate, key) = (folder.path().join("cert.pem"), folder.path().join("key.pem"));
+/// A certificate for this machine, valid for two days; `None` without openssl.
+pub fn certificate(folder: &Path) -> Option<TlsFiles> {
+    let (certificate, key) = (folder.join("cert.pem"), folder.join("key.pem"));
     let made = std::process::Command::new("openssl")
-        .args([
-            "req",
-            "-x509",
-            "-newkey",
-            "ec",
-            "-pkeyopt",
-            "ec_paramgen_curve:prime256v1",
-            "-nodes",
-            "-days",
-            "2",
-        ])
-        .args([
-            "-subj",
-            "/CN=localhost",
-            "-addext",
-            "subjectAltName=DNS:localhost,IP:127.0.0.1",
-        ])
-        .args(["-addext", "basicConstraints=critical,CA:FALSE"])
+        .args(
+            "req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=localhost".split(' '),
+        )
+        .args("-addext subjectAltName=DNS:localhost,IP:127.0.0.1 -addext basicConstraints=critical,CA:FALSE".split(' '))
         .arg("-out")
         .arg(&certificate)
         .arg("-keyout")
         .arg(&key)
         .stderr(Stdio::null())
         .status();
-    if !made.is_ok_and(|status| status.success()) {
-        missing("openssl");
-        return;
-    }
-    let tls = vda5050_tck::bench::tls::TlsFiles {
-        certificate: certificate.clone(),
-        key,
+    made.is_ok_and(|status| status.success())
+        .then_some(TlsFiles { certificate, key })
+}
+
+#[tokio::test]
+async fn the_device_side_can_be_tls() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(tls) = certificate(folder.path()) else {
+        return missing("openssl");
     };
+    let certificate = tls.certificate.clone();
     let mut rig = rig_with(BenchOptions {
         tls: Some(tls),
         ..BenchOptions::loopback(topics())

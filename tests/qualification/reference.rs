@@ -59,7 +59,7 @@ fn a_fault_that_does_nothing_is_missed() {
     let mut tests = library.tests(Role::Agv, &pack.id);
     tests.retain(|test| test.id == "order-rejection/lower-update-id");
     let named = |name: &str| -> Vec<Fault> {
-        let mut all = BuiltIn::every_fault(Role::Agv);
+        let mut all = BuiltIn::faults(Role::Agv).iter();
         vec![*all.find(|fault| fault.name == name).expect("a fault")]
     };
     let found = qualify(
@@ -95,7 +95,7 @@ fn a_fault_that_does_nothing_is_missed() {
 fn what_nothing_finds_is_a_fault() {
     let library = library();
     for one in &library.rules.suites.exceptions.unfound {
-        let mut all = BuiltIn::every_fault(one.role);
+        let mut all = BuiltIn::faults(one.role).iter();
         assert!(
             all.any(|fault| fault.name == one.fault),
             "there is no fault {}",

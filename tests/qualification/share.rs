@@ -41,7 +41,7 @@ pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
         (seed.trim(), fault.name).hash(&mut hasher);
         hasher.finish().is_multiple_of(SHARE)
     };
-    let all = BuiltIn::every_fault(role);
+    let all = BuiltIn::faults(role).iter();
     let share: Vec<Fault> = all
         .filter(|fault| is_drawn(fault) || touched.contains(fault.name))
         .copied()
@@ -71,7 +71,8 @@ fn touched(library: &Library, role: Role, change: &str) -> BTreeSet<&'static str
     }
     let is_touched =
         |fault: &&Fault| words.contains(fault.name) || fault.breaks.first().is_some_and(|id| about.contains(*id));
-    BuiltIn::every_fault(role)
+    BuiltIn::faults(role)
+        .iter()
         .filter(is_touched)
         .map(|fault| fault.name)
         .collect()

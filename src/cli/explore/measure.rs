@@ -38,9 +38,9 @@ pub(super) fn every_fault(
     let drawn = exploration.drawn(&exploration.grammar, &mut Coverage::default());
     let places = drawn
         .iter()
-        .map(|(_, file)| (format!("suites/agv/{}.yaml", file.id), file.text.clone()));
+        .map(|(_, file)| (file.place(exploration.grammar.side()), file.text.clone()));
     let tests = library.add(&places.collect::<Vec<_>>())?;
-    let faults: Vec<&'static Fault> = BuiltIn::every_fault(role).step_by(every).collect();
+    let faults: Vec<&'static Fault> = BuiltIn::faults(role).iter().step_by(every).collect();
     let next = AtomicUsize::new(0);
     let all: Mutex<Vec<Result<Measured, Problem>>> = Mutex::new(Vec::new());
     let threads = std::thread::available_parallelism().map_or(1, usize::from);

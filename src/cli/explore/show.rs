@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::cli::args::Format;
 use crate::cli::problem::Problem;
-use crate::explore::{Exploration, Explored, Grammar, Shown, Source};
+use crate::explore::{Exploration, Explored, Grammar, Shown, Source, family};
 use crate::pack::Catalogue;
 use crate::result::RunResult;
 use crate::verdict::Verdict;
@@ -26,12 +26,18 @@ pub(super) fn stimuli(grammar: &Grammar) -> String {
     let mut text = String::new();
     for (situation, title) in &grammar.situations {
         let _ = writeln!(text, "{situation}: {title}");
-        let here = grammar
-            .stimuli
-            .iter()
-            .filter(|(_, one)| one.situations.contains(situation));
-        for (name, stimulus) in here {
-            let _ = writeln!(text, "  {name:<24} {}", stimulus.title);
+        let here = |name: &&String| {
+            let stimulus = grammar.stimuli.get(*name)?;
+            stimulus.situations.contains(situation).then_some(stimulus)
+        };
+        for (name, stimulus) in grammar.heads().filter_map(|name| Some((name, here(&name)?))) {
+            let title = stimulus.title.split(": ").next().unwrap_or_default();
+            let many = grammar.stimuli.keys().filter(|other| family(other) == family(name));
+            let many = match many.count() {
+                1 => String::new(),
+                many => format!(" ({many} breakages)"),
+            };
+            let _ = writeln!(text, "  {:<24} {title}{many}", family(name));
         }
         text.push('\n');
     }

@@ -221,8 +221,9 @@ impl Stage for OnStage {
     type Error = Problem;
 
     fn carry_out(&mut self, files: &[ConversationFile], purpose: Purpose) -> Result<RunResult, Problem> {
-        let place = |file: &ConversationFile| (format!("suites/agv/{}.yaml", file.id), file.text.clone());
-        let places: Vec<(String, String)> = files.iter().map(place).collect();
+        let side = self.subject().role.word();
+        let places = files.iter().map(|file| (file.place(side), file.text.clone()));
+        let places: Vec<(String, String)> = places.collect();
         let tests = self.library.add(&places)?;
         // Tests are added in the order of their ids; they are carried out as they were given.
         let mut tests: Vec<Arc<Test>> = tests;

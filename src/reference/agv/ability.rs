@@ -1,4 +1,8 @@
-//! Whether the vehicle can do what an order asks for: memory, fields, maps, ways and actions.
+//! Whether the vehicle can do what an order asks for: memory (section 6.1.2), optional fields (6.1.1), maps (6.7.1),
+//! ways and actions (6.6.4.2 and 6.8.1).
+//!
+//! How an order is refused that exceeds the memory or leads over a map that is not on board, is left open: as an order
+//! error (the rulings of ORD-REJ-15 and MAP-08). Of a mapId any enabled version will do (the ruling of MAP-13).
 
 use super::action_kinds::{self, Scope};
 use super::actions::Origin;

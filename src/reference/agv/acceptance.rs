@@ -1,7 +1,9 @@
-//! Acceptance of orders and order updates: the decision table of figure 8, and taking an order over.
+//! Acceptance of orders and order updates: the decision table of figure 8 (section 6.6.2), and taking an order over.
 //!
-//! Whether the vehicle is able to do what it is asked is decided in `ability`, a refusal reported in `rejection`; what an
-//! update is about stands in `updates`.
+//! Whether the vehicle is able to do what it is asked is decided in `ability`, a refusal reported in `rejection`; what
+//! an update is about stands in `updates`. Instant actions that run keep no order from being begun (the ruling of
+//! ORD-FLOW-02); an order in a mode that takes none is refused (that of MODE-02); a duplicate is ignored whatever it
+//! says (that of ORD-REJ-13); actions of the horizon are represented, too (that of ASTATE-01).
 
 use serde_json::Value;
 
@@ -28,9 +30,6 @@ enum Decision {
 impl Agv {
     /// Takes an order message.
     pub(crate) fn order_received(&mut self, payload: &[u8]) {
-        if self.ignores_order() {
-            return;
-        }
         self.report.order_received = true;
         let message = if payload.len() > self.config.max_message {
             Err(Refusal::new(Rule::Malformed, "the message is too long"))
@@ -55,9 +54,6 @@ impl Agv {
             self.object(objection, defect.clone().into())?;
         }
         self.check_ids(&order)?;
-        if self.rejects_as_told(&order, message) {
-            return Ok(());
-        }
         let decision = self.decide(&order)?;
         let update = decision == Decision::Continue;
         if decision == Decision::Discard {
@@ -73,6 +69,22 @@ impl Agv {
             true if update => self.continue_with(order),
             true => self.begin(order),
             false => {}
+        }
+        Ok(())
+    }
+
+    /// Whether all ids have the form that the factsheet states (FACT-12).
+    pub(crate) fn check_ids(&self, order: &Order) -> Result<(), Refusal> {
+        let nodes = order.nodes.iter().map(|node| &node.id);
+        let edges = order.edges.iter().map(|edge| &edge.id);
+        let actions = order.actions().map(|action| &action.id);
+        for id in std::iter::once(&order.id).chain(nodes).chain(edges).chain(actions) {
+            if id.chars().count() > self.config.max_id {
+                return Err(Refusal::at_field(Rule::Malformed, "an id is too long", id));
+            }
+            if self.config.numerical_ids && !id.bytes().all(|digit| digit.is_ascii_digit()) {
+                return Err(Refusal::at_field(Rule::Malformed, "an id is no number", id));
+            }
         }
         Ok(())
     }
@@ -139,7 +151,7 @@ impl Agv {
         let position = node.position.as_ref();
         let allowed = position.and_then(|position| position.allowed_deviation);
         let near = self.is_within(node, allowed.unwrap_or(0.0), true);
-        !self.is_told_to_be_lost() && self.allows(Permission::BeginAt(node), near)
+        self.allows(Permission::BeginAt(node), near)
     }
 
     /// Whether it stands so far from a node at most, on the map of the node if that counts.

@@ -1,6 +1,7 @@
-//! The actions the vehicle offers: scopes, parameters, and how they behave.
+//! The actions the vehicle offers: scopes, parameters, and how they behave (the tables of section 6.8).
 //!
-//! One table feeds the factsheet, the check of orders and instant actions, and the life cycle.
+//! One table feeds the factsheet (FACT-07), the check of orders and instant actions (ACT-10, IACT-06), and the life
+//! cycle (section 6.11).
 
 use serde_json::Value;
 

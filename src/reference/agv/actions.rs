@@ -1,7 +1,8 @@
-//! Action states and the life cycle of actions: triggering, blocking types, pause, end.
+//! Action states and the life cycle of actions: triggering, blocking types, pause, end (section 6.11 and figure 16).
 //!
 //! Knows *when* an action starts and ends, not *what* it does (see `deeds`), nor what may run beside what (see
-//! `blocking`).
+//! `blocking`). With the vehicle its actions are paused, which the two tables of section 6.8 say differently (the
+//! ruling of ACT-15).
 
 use std::collections::VecDeque;
 use std::time::Duration;

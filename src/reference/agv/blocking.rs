@@ -1,4 +1,7 @@
-//! What may run beside what: actions beside each other, and beside driving (blockingType, section 6.10.2 and figure 17).
+//! What may run beside what: actions beside each other, and beside driving (blockingType, section 6.12 and figure 17).
+//!
+//! Instant actions do not stand in a list, and block none that do (the ruling of BLOCK-05); NONE actions that are open
+//! are not awaited before driving on (that of BLOCK-07).
 
 use super::Agv;
 use super::actions::{Action, List, Origin, Status};

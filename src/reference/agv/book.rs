@@ -1,4 +1,6 @@
-//! The order book: the order, what is left of it, and where the vehicle was last.
+//! The order book: the order, what is left of it, and where the vehicle was last (sections 6.6.1, 6.10.1 and 6.10.2).
+//!
+//! The orderId stays when the order is done or called off (the ruling of MODE-05).
 
 use std::collections::VecDeque;
 

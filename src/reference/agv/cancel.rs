@@ -1,4 +1,8 @@
 //! cancelOrder, for all four capabilities of figure 9, and giving an order up altogether (section 6.6.3).
+//!
+//! A completed order is none, and its cancelOrder is FAILED although a table of section 6.8 knows no failure of it (the
+//! ruling of ORD-CANCEL-18); the error stays for a while, as nothing says how long (that of ORD-CANCEL-19). A vehicle
+//! that cannot stop between nodes keeps the next node, and no edge (that of ORD-CANCEL-09).
 
 use super::Agv;
 use super::action_kinds::Deed;
@@ -22,7 +26,6 @@ impl Agv {
             self.book.nodes.truncate(1);
             self.book.edges.clear();
         }
-        self.hold_cancel_as_told();
         self.book.cancel = Some(Cancel {
             action_id: action_id.to_owned(),
             to_node,
@@ -87,7 +90,7 @@ impl Agv {
         let open = |action: &Action| action.of_order() && !action.status.is_terminal();
         let awaited = |action: &Action| open(action) && self.allows(Permission::CancelAwaits(action), true);
         let ends = !under_way && !self.actions.iter().any(awaited);
-        if !self.allows(Permission::EndCancel, ends) || self.holds_cancel_as_told() {
+        if !self.allows(Permission::EndCancel, ends) {
             return false;
         }
         self.happens(Event::CancelEnding);

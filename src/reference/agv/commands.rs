@@ -1,4 +1,7 @@
-//! What people and tests do to the vehicle: buttons, switches, moving it by hand.
+//! What people and tests do to the vehicle: buttons, switches, moving it by hand (modes: section 6.10.6; errors:
+//! 6.10.5).
+//!
+//! What resolves itself is a WARNING, and FATAL what somebody has to see to (the ruling of ERR-03).
 
 use serde_json::{Value, json};
 
@@ -44,32 +47,6 @@ pub const COMMANDS: &[&str] = &[
     "leave-field",
     "place-load",
     "remove-load",
-    "reset",
-    "well-behaved",
-    "break-off",
-    "stale-will",
-    "lose-position",
-    "find-position",
-    "halt",
-    "stop-before",
-    "go-on",
-    "set-battery",
-    "request-new-base",
-    "answer-after",
-    "state-interval",
-    "lose-states",
-    "stay-silent",
-    "ignore-orders",
-    "reject-orders",
-    "reject-updates",
-    "hold-cancel",
-    "fail-actions",
-    "refuse-map",
-    "declare",
-    "show",
-    "show-visualization",
-    "publish",
-    "speak-version",
 ];
 
 /// More things than this do not stand about.
@@ -78,7 +55,7 @@ const MAX_OBSTACLES: usize = 100;
 impl Agv {
     pub(crate) fn command(&mut self, name: &str, arguments: &Value) {
         let text = |key: &str| arguments.get(key).and_then(Value::as_str).unwrap_or_default();
-        if self.told_how_to_behave(name, arguments) {
+        if !self.asked(name, arguments) {
             return;
         }
         match name {

@@ -1,7 +1,9 @@
-//! What one reference AGV is told about itself: identity, site, capabilities and timing.
+//! What one reference AGV is told about itself: identity, site, capabilities and timing; most of it stands in its
+//! factsheet (section 6.15).
 //!
-//! Everything that differs between protocol versions (version string, topics, error names, features) is
-//! handed in by the caller, who takes it from the pack.
+//! Everything that differs between protocol versions (version string, topics, error names, features) is handed in by
+//! the caller, who takes it from the pack. Names of errors that the standard does not give are those of the rulings
+//! (ORD-FLOW-01, ORD-FLOW-04, ORD-REJ-15, CORR-07).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -212,6 +214,8 @@ pub struct AgvConfig {
     pub max_instant_actions: usize,
     /// Most characters of an id.
     pub max_id: usize,
+    /// It takes ids of digits only.
+    pub numerical_ids: bool,
     /// Names of its load handling devices (loadSpecification.loadPositions).
     pub load_positions: Vec<String>,
     /// Largest message in bytes.
@@ -295,6 +299,7 @@ impl Default for AgvConfig {
             max_actions: 20,
             max_instant_actions: MAX_INSTANT_ACTIONS,
             max_id: MAX_STRING,
+            numerical_ids: false,
             load_positions: LOAD_POSITIONS.map(str::to_owned).to_vec(),
             max_message: 1 << 20,
             switched_on: Vec::new(),

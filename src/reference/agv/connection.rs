@@ -1,4 +1,8 @@
-//! The link to the broker: last will, ONLINE and OFFLINE, reconnecting, headers and publishing (section 6.14).
+//! The link to the broker: last will, ONLINE and OFFLINE, reconnecting, headers and publishing (sections 6.2, 6.4 and
+//! 6.14).
+//!
+//! ONLINE comes before the first state (the ruling of CONN-05), the base is driven on without a link (that of MQTT-04),
+//! and headerIds count on over a reconnect and anew when the vehicle is switched on (that of HDR-02).
 
 use std::collections::BTreeMap;
 
@@ -100,7 +104,6 @@ impl Agv {
         let will = self.config.topic("connection").map(str::to_owned).map(|topic| {
             // The will does not count: it has the headerId of the message that would be next.
             let mut message = self.header("connection", false);
-            self.date_back_as_told(&mut message);
             message.insert("connectionState".into(), json!("CONNECTIONBROKEN"));
             Publication {
                 topic,
@@ -226,11 +229,10 @@ impl Agv {
         if counts {
             *next = next.wrapping_add(1);
         }
-        let version = self.told_version().unwrap_or(&self.config.version);
         let mut header = Map::new();
         header.insert("headerId".into(), json!(id));
         header.insert("timestamp".into(), json!(format!("{:.2}", self.now.utc)));
-        header.insert("version".into(), json!(version));
+        header.insert("version".into(), json!(self.config.version));
         header.insert("manufacturer".into(), json!(self.config.manufacturer));
         header.insert("serialNumber".into(), json!(self.config.serial_number));
         self.heads(Head { name, counts }, &mut header);

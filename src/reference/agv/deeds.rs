@@ -1,4 +1,10 @@
-//! What actions do: their stages, their effect on the vehicle, and how a failure is reported.
+//! What actions do: their stages, their effect on the vehicle, and how a failure is reported (sections 6.8.2, 6.9 and
+//! 7.1).
+//!
+//! lastNodeId of initPosition goes to the root of the state (the ruling of ACT-24), and a pose on no map or an unknown
+//! one is refused (that of ACT-25). A failed action is named by its actionId (that of BP-03), an instant action that
+//! cannot be performed is FAILED with an error (that of IACT-06), and a map that was deleted before cannot be deleted
+//! (that of MAP-33).
 
 use std::f64::consts::PI;
 use std::time::Duration;
@@ -155,9 +161,6 @@ impl Agv {
         let Some(action) = self.actions.get(id).cloned() else {
             return;
         };
-        if self.fails_as_told(&action) {
-            return;
-        }
         let outcome = match self.does(&action) {
             Some(outcome) => outcome,
             None => {
@@ -333,7 +336,7 @@ impl Agv {
 
     /// Takes a pose over, and the node it is on.
     pub(crate) fn take_pose(&mut self, pose: Pose, node: &str) {
-        self.find_position();
+        self.happens(Event::Placed);
         self.maps.enable_any(&pose.map_id);
         self.motion.place(pose);
         node.clone_into(&mut self.book.last_node);

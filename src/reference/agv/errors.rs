@@ -1,4 +1,7 @@
-//! The active errors of the vehicle and how long each of them is reported.
+//! The active errors of the vehicle and how long each of them is reported (sections 6.6.4 and 6.10.5).
+//!
+//! What was refused stays until a new order is accepted (the rulings of ORD-REJ-03 and ORD-REJ-08); every other error
+//! ends with its cause, or after a while where it has none that lasts.
 
 use serde_json::{Value, json};
 

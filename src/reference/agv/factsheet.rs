@@ -1,4 +1,6 @@
 //! The factsheet, generated from the configuration and the table of actions (section 6.15).
+//!
+//! It is published on every new connection, as nothing says when it first has to be (the ruling of FACT-01).
 
 use serde_json::{Map, Value, json};
 
@@ -39,7 +41,7 @@ const ON_A_LINE: [&str; 4] = [
 impl Agv {
     /// Publishes the factsheet.
     pub(crate) fn publish_factsheet(&mut self) {
-        let body = self.shown_factsheet(self.true_factsheet());
+        let body = self.true_factsheet();
         self.publish("factsheet", body);
     }
 
@@ -116,7 +118,7 @@ impl Agv {
                 "msgLen": self.config.max_message,
                 "idLen": self.config.max_id,
                 "enumLen": MAX_STRING,
-                "idNumericalOnly": false,
+                "idNumericalOnly": self.config.numerical_ids,
             },
             "maxArrayLens": {
                 "order.nodes": nodes,

@@ -1,4 +1,7 @@
 //! Instant actions: read one by one, represented in the action states, performed at once (section 6.9).
+//!
+//! They stand beside the actions of the order (the ruling of IACT-03), and those of one message are taken in its
+//! sequence, whatever their blocking types (that of IACT-07).
 
 use serde_json::Value;
 

@@ -1,4 +1,6 @@
-//! The maps on board: stored, enabled, deleted (section 6.7).
+//! The maps on board: stored, enabled, deleted (sections 6.7.3 to 6.7.5).
+//!
+//! To enable one version disables the others of its mapId; the map that is in use is not deleted.
 
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};

@@ -31,7 +31,6 @@ pub(crate) mod motion;
 pub(crate) mod objections;
 pub(crate) mod order_message;
 pub(crate) mod path;
-mod personas;
 pub(crate) mod points;
 pub(crate) mod progress;
 pub(crate) mod read;
@@ -59,7 +58,6 @@ use downloads::Downloads;
 use errors::Errors;
 use maps::Maps;
 use motion::{Motion, Pose};
-use personas::Persona;
 use report::Report;
 use seam::Seam;
 
@@ -151,8 +149,6 @@ pub struct Agv {
     pub(crate) logs: u32,
     /// What was decided and is still to be handed to the driver.
     pub(crate) pending: Vec<Output>,
-    /// How a test told it to behave.
-    persona: Persona,
 }
 
 impl Agv {
@@ -210,7 +206,6 @@ impl Agv {
             states_sent: 0,
             logs: 0,
             pending: Vec::new(),
-            persona: Persona::default(),
             config,
         }
     }
@@ -230,7 +225,6 @@ impl Agv {
             self.lingers_until,
             self.inbox.front().map(|(due, _)| *due),
             self.due(),
-            self.told_until(),
             self.next_report(),
         ];
         events.into_iter().flatten().min()
@@ -260,7 +254,6 @@ impl Agv {
         }
         self.errors.expire(moment);
         self.happens(seam::Event::Woken);
-        self.forget_what_was_told_until(moment);
         self.lingers_until = self.lingers_until.filter(|until| *until > moment);
         while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
             match self.inbox.pop_front() {
@@ -305,7 +298,7 @@ impl Agv {
         let is_message = |input: &Input| matches!(input, Input::Message { .. });
         let mut due = self.moment() + self.config.answers_after;
         if is_message(&input) {
-            due = self.moment() + self.told_delay().unwrap_or(self.config.answers_after);
+            due = self.moment() + self.lasts(seam::Span::Answer, self.config.answers_after);
             let before = self.inbox.iter().filter(|(_, other)| is_message(other));
             due = before.map(|(other, _)| *other).fold(due, Moment::max);
         }

@@ -1,4 +1,5 @@
-//! Where the vehicle is: a pose, and at most one leg (a turn or a straight line) under way.
+//! Where the vehicle is: a pose, and at most one leg (a turn or a straight line) under way (agvPosition and velocity of
+//! section 6.10.6).
 //!
 //! Legs have constant speed; acceleration is ignored. Knows nothing of orders.
 

@@ -1,4 +1,7 @@
-//! The order message as the vehicle understands it, read from JSON (flow step 1: format and types).
+//! The order message as the vehicle understands it, read from JSON (section 6.6.6; flow step 1: format and types).
+//!
+//! An order whose nodes, edges and release flags do not fit together is as malformed as one that cannot be read (the
+//! ruling of ORD-11).
 
 use serde_json::Value;
 

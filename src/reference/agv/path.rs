@@ -1,5 +1,8 @@
-//! The way over an edge where it is no straight line: trajectories, corridors and what stands in them, the path a
-//! self-planning vehicle reports, and the branches of a line on the floor.
+//! The way over an edge where it is no straight line: trajectories (section 6.6.6), corridors and what stands in them
+//! (6.6.5), the path a self-planning vehicle reports (6.10.1), and the branches of a line on the floor.
+//!
+//! Outside its corridor the vehicle stops and reports a FATAL error of a name of its own (the ruling of CORR-07); a
+//! path is reported where that was agreed (that of STATE-14).
 
 use serde_json::{Value, json};
 

@@ -191,6 +191,10 @@ pub(crate) enum Span<'a> {
     BetweenStates,
     /// From one state to the next, as the factsheet says (FACT-14).
     StatedBetweenStates,
+    /// From one state to the next at least (FACT-14).
+    LeastBetweenStates,
+    /// From a message to when it is looked at.
+    Answer,
     /// From one visualization to the next (VIS-02).
     BetweenVisualizations,
     /// From the begin of an action to its end.
@@ -264,6 +268,8 @@ pub(crate) enum Event {
     GivenUpForMode(Mode),
     /// The mode has changed, from this one.
     ModeChanged(Mode),
+    /// It is told where it is; it takes that over next.
+    Placed,
     /// It was driven by hand.
     DrivenByHand,
     /// It is switched off and on.

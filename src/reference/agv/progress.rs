@@ -1,6 +1,8 @@
 //! Driving the order: setting out, arriving, traversing, and beginning actions (sections 6.10.2 and 6.12).
 //!
-//! Which way a leg leads, and how fast, stands in `way`.
+//! Which way a leg leads, and how fast, stands in `way`. A node counts as traversed inside its deviation range, and
+//! what that is without one the vehicle decides (the ruling of NODE-01). What stops the vehicle on an edge stops it on
+//! the edge, not on the node before (that of NODE-07); behind it the condition is as before (that of ACT-03).
 
 use std::f64::consts::PI;
 
@@ -63,10 +65,7 @@ impl Agv {
             (Hindrance::Action, self.actions_forbid_driving()),
         ];
         let stops = |(what, there): (Hindrance, bool)| there && !self.allows(Permission::DriveAgainst(what), false);
-        !hindrances.into_iter().any(stops)
-            && !self.is_told_to_stand()
-            && self.lingers_until.is_none()
-            && self.allows(Permission::Drive, true)
+        !hindrances.into_iter().any(stops) && self.lingers_until.is_none() && self.allows(Permission::Drive, true)
     }
 
     /// The next node, if it may be driven to (ORD-07).
@@ -162,7 +161,6 @@ impl Agv {
             return;
         }
         self.happens(Event::LegEnded);
-        self.stand_as_told();
         let Some(sequence_id) = self.book.edge_ahead().map(|edge| edge.sequence_id) else {
             return;
         };

@@ -1,4 +1,7 @@
-//! Careful reading of incoming JSON: every field is typed, bounded and named when it is wrong.
+//! Careful reading of incoming JSON: every field is typed, bounded and named when it is wrong (sections 6.1.2 to
+//! 6.1.4).
+//!
+//! A whole number may be written with a fraction of zero (the ruling of JSON-09); unknown members are left aside.
 
 use serde_json::{Map, Value};
 

@@ -1,4 +1,7 @@
-//! Why an order is not taken over, and how the vehicle reports that (section 6.6.4).
+//! Why an order is not taken over, and how the vehicle reports that (sections 6.6.4 and 7.1).
+//!
+//! Every refusal is a WARNING that names the order (the rulings of ORD-FLOW-01 and ORD-FLOW-04, where the text has no
+//! name), and what is wrong with it (BP-02).
 
 use serde_json::Value;
 

@@ -1,7 +1,9 @@
 //! The state message: when it is sent, and the visualization beside it (sections 6.10 and 6.13).
 //!
-//! A state is due when it differs from the last one in anything but position, speed and battery charge. So no
-//! part of the vehicle has to remember to announce what it changed, and changes of one instant share a state.
+//! A state is due when it differs from the last one in anything but position, speed and battery charge. So no part of
+//! the vehicle has to remember to announce what it changed, and changes of one instant share a state (the ruling of
+//! STATE-09). What happens before minStateInterval is over is reported at its end (that of FACT-14), an order at once,
+//! also a refused one (that of STATE-03).
 
 mod picture;
 mod route;
@@ -123,12 +125,11 @@ impl Agv {
 
     /// The shortest time between two states.
     pub(crate) fn min_state_interval(&self) -> Duration {
-        self.told_state_interval().max(self.config.min_state_interval)
+        self.lasts(Span::LeastBetweenStates, self.config.min_state_interval)
     }
 
     fn state_interval(&self) -> Duration {
         self.lasts(Span::BetweenStates, self.stated_interval())
-            .max(self.told_state_interval())
     }
 
     /// The interval the factsheet promises (FACT-14).
@@ -223,10 +224,7 @@ impl Agv {
     fn send_state(&mut self, body: Map<String, Value>, periodic: bool) {
         let kept = body.clone();
         self.report.periodic = periodic;
-        if !self.swallows_state() {
-            let body = self.shown_state(body);
-            self.publish("state", body);
-        }
+        self.publish("state", body);
         let next_visualization = self.report.next_visualization;
         self.report = Report {
             last: Some((self.moment(), kept)),
@@ -244,7 +242,6 @@ impl Agv {
         }
         body.insert("velocity".into(), self.velocity_picture());
         self.says(Part::Visualization, &mut body);
-        let body = self.shown_visualization(body);
         self.publish("visualization", body);
     }
 }

@@ -63,6 +63,11 @@ pub(crate) trait Deviation: Send {
         usual
     }
 
+    /// Somebody does something to the vehicle; false when nothing is left to be done.
+    fn asked(&mut self, agv: &mut Agv, command: &str, arguments: &Value) -> bool {
+        true
+    }
+
     /// A message of a topic name came in; false to overlook it.
     fn hears(&mut self, agv: &mut Agv, name: &str, payload: &[u8]) -> bool {
         true
@@ -210,6 +215,12 @@ impl Agv {
     pub(crate) fn allows(&self, what: Permission<'_>, usual: bool) -> bool {
         let all = self.seam.all();
         all.fold(usual, |usual, one| one.allows(self, what, usual))
+    }
+
+    pub(crate) fn asked(&mut self, command: &str, arguments: &Value) -> bool {
+        let mut open = true;
+        self.each(|one, agv| open = open && one.asked(agv, command, arguments));
+        open
     }
 
     pub(crate) fn hears(&mut self, name: &str, payload: &[u8]) -> bool {

@@ -1,4 +1,7 @@
-//! What is done at a station: picking, dropping, detecting, aligning, charging.
+//! What is done at a station: picking, dropping, detecting, aligning, charging (the tables of section 6.8).
+//!
+//! stopCharging of a vehicle that does not charge is FINISHED (the ruling of ACT-11); a vehicle that aligns itself
+//! leaves its node (that of ACT-36).
 
 use serde_json::Value;
 

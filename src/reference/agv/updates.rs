@@ -1,4 +1,7 @@
-//! Order updates: whether one continues the order, and taking it over (rows 8 and 10 of figure 8).
+//! Order updates: whether one continues the order, and taking it over (rows 8 and 10 of figure 8, section 6.6.2).
+//!
+//! What the first transmission of the stitching node said stands (the ruling of ORD-UPD-07); the actions of a horizon
+//! that is replaced are forgotten with it (that of ORD-UPD-10).
 
 use super::Agv;
 use super::actions::{Action, Origin};

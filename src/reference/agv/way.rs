@@ -1,4 +1,5 @@
-//! One leg after the other: how far it leads, how fast, and which way the vehicle looks (ORD-MSG-20 to ORD-MSG-25).
+//! One leg after the other: how far it leads, how fast, and which way the vehicle looks (section 6.6.6, ORD-MSG-20 to
+//! ORD-MSG-25).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -100,7 +101,6 @@ impl Agv {
         let stops = edge.is_some_and(|edge| self.stops_on_edge(edge.sequence_id));
         let (way, to_node) = match stops {
             true => (BRAKING.min(distance / 4.0), false),
-            false if self.stops_before(&stop.node.id) => (distance / 2.0, false),
             false => (distance, true),
         };
         let own = match self.mode {

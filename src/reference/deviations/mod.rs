@@ -8,6 +8,7 @@
 mod records;
 pub mod agv;
 pub mod master_control;
+pub mod personas;
 pub mod record;
 pub mod words;
 

@@ -13,8 +13,6 @@ pub enum Kind {
     Lapse(&'static str),
     /// What a good device may do: nobody may be accused because of it.
     Liberty,
-    /// A behaviour that tests switch on and off while the device runs.
-    Persona,
 }
 
 /// One deviation of a role whose seam is the trait `D`.
@@ -22,7 +20,7 @@ pub enum Kind {
 pub struct Record<D: ?Sized + 'static> {
     /// Name, in kebab-case; it says what the device does.
     pub name: &'static str,
-    /// Fault, lapse, liberty or persona.
+    /// Fault, lapse or liberty.
     pub kind: Kind,
     /// Ids of the requirements it breaks, the first being the one it is about; of a liberty those that leave it.
     pub requirements: &'static [&'static str],

@@ -1,4 +1,7 @@
-//! Calling orders off: cancelOrder, its end, and only then what comes next (section 6.6.3).
+//! Calling orders off: cancelOrder, its end, and only then what comes next (section 6.6.3, ORD-CANCEL-01).
+//!
+//! Where the vehicle stands after that, and how the next order begins there, stands in `ways` (the ruling of
+//! ORD-CANCEL-17).
 
 use serde_json::Value;
 

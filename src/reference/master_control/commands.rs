@@ -1,4 +1,5 @@
-//! What people and tests ask of the master control.
+//! What people and tests ask of the master control; each leads to an order (section 6.6), an instant action (6.9) or a
+//! map (6.7).
 
 use serde_json::Value;
 

@@ -1,4 +1,5 @@
-//! What the reference master control is told: its fleet, its site and its manners.
+//! What the reference master control is told: its fleet, its site and its manners; what a vehicle can do comes from the
+//! vehicle's factsheet (section 6.15).
 //!
 //! Everything that differs between protocol versions is handed in by the caller, who takes it from the pack.
 

@@ -1,4 +1,6 @@
-//! Ways over the layout.
+//! Ways over the layout: the graph of nodes and edges that orders are cut from (section 6.6.1).
+//!
+//! No sentence says which way to take; an edge that is closed to a vehicle is on none of its ways (ORD-12).
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,5 +1,8 @@
 //! Maps: rolled out ahead of their use, deleted before a repeated download, enabled before an order needs them (section
 //! 6.7).
+//!
+//! That maps are on board early is called essential, and so done (the ruling of MAP-10); mapVersion is always given
+//! (that of MAP-16).
 
 use serde_json::{Value, json};
 

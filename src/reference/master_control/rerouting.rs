@@ -1,4 +1,7 @@
 //! Another destination for a transport under way, an edge that is closed, and the next transport (section 6.6.2).
+//!
+//! Behind the base the way is changed by an update; where the base itself would have to change, the order is called off
+//! first (ORD-CANCEL-01).
 
 use super::Site;
 use super::dispatch::Way;

@@ -1,4 +1,8 @@
-//! What the vehicles say, read leniently: a message that lacks what is needed is ignored as a whole.
+//! What the vehicles say, read leniently: a message that lacks what is needed is ignored as a whole (sections 6.10 and
+//! 6.14).
+//!
+//! Informations, the localization score and the deviation range are for people, and decide nothing (INFO-02 and
+//! INFO-03).
 
 #![expect(clippy::struct_field_names, reason = "the names are those of the messages")]
 

@@ -1,4 +1,5 @@
-//! One vehicle as the master control sees it, and what it is to do.
+//! One vehicle as the master control sees it, and what it is to do: its last state (section 6.10), whether it is
+//! connected (6.14), its factsheet (6.15), the order under way and the transports that wait.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

@@ -1,4 +1,6 @@
-//! The body of the state message, part by part.
+//! The body of the state message, part by part (sections 6.10.3 to 6.10.6).
+//!
+//! agvPosition is left out by a vehicle on a line, which has none (the ruling of STATE-MSG-05).
 
 use serde_json::{Map, Value, json};
 
@@ -35,8 +37,7 @@ impl Agv {
         set("driving", json!(self.motion.is_moving()));
         let paused = self.holds.pause || self.holds.button || self.holds.emergency;
         set("paused", json!(paused));
-        let wanted = self.book.base_runs_low() || self.is_told_to_want_base();
-        set("newBaseRequest", json!(wanted));
+        set("newBaseRequest", json!(self.book.base_runs_low()));
         let actions = self.actions.iter();
         set(
             "actionStates",
@@ -89,7 +90,7 @@ impl Agv {
         let pose = self.motion.pose(self.moment());
         let mut position = Map::new();
         let mut set = |key: &str, value: Value| position.insert(key.to_owned(), value);
-        set("positionInitialized", json!(!self.is_told_to_be_lost()));
+        set("positionInitialized", json!(true));
         set("localizationScore", json!(0.98));
         set("x", json!(pose.x));
         set("y", json!(pose.y));
@@ -128,7 +129,7 @@ impl Agv {
 
     fn battery(&self) -> Value {
         json!({
-            "batteryCharge": self.told_charge().unwrap_or(87.5),
+            "batteryCharge": 87.5,
             "batteryVoltage": 48.2,
             "batteryHealth": 96,
             "charging": self.charging,

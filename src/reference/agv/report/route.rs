@@ -1,4 +1,6 @@
-//! The way ahead in a state: nodes and edges that are still to be traversed.
+//! The way ahead in a state: nodes and edges that are still to be traversed (section 6.10.1).
+//!
+//! The first node of an order is behind the vehicle as soon as the order is taken over (the ruling of ORD-FLOW-06).
 
 use serde_json::{Value, json};
 

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use super::*;
 use crate::profile::VEHICLE_WORDS;
 use crate::reference::agv::COMMANDS;
+use crate::reference::deviations::personas::WORDS;
 
 /// A version the vehicle was not made for.
 const OTHER_VERSION: &str = "7.7.7";
@@ -12,9 +13,9 @@ const OTHER_VERSION: &str = "7.7.7";
 #[test]
 fn the_vehicle_knows_exactly_the_words_of_the_suites() {
     let words: BTreeSet<&str> = VEHICLE_WORDS.iter().map(|word| word.name).collect();
-    let commands: BTreeSet<&str> = COMMANDS.iter().copied().collect();
+    let commands: BTreeSet<&str> = COMMANDS.iter().chain(WORDS).copied().collect();
     assert_eq!(words, commands);
-    assert_eq!(commands.len(), COMMANDS.len());
+    assert_eq!(commands.len(), COMMANDS.len() + WORDS.len());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::reference::deviations::words::Words;
 use serde_json::{Value, json};
 
 records! {
-    fault "r3-action-states-omitted-when-empty" ["STATE-MSG-01", "STATE-01"] "It leaves actionStates out of the state when there are none."
+    fault "action-states-omitted-when-empty" ["STATE-MSG-01", "STATE-01"] "It leaves actionStates out of the state when there are none."
         => state(|_, m| if m.says("actionStates", json!([])) { m.unset("actionStates") });
     fault "instant-action-listed-twice" ["STATE-MSG-09"] "Lists instant actions twice."
         => state(|agv, m| {
@@ -25,7 +25,7 @@ records! {
             });
             m.set("actionStates", doubled.collect::<Vec<_>>());
         });
-    fault "r3-far-actions-unlisted" ["ASTATE-01", "ORD-FLOW-06", "STATE-MSG-09"] "It lists the actions of a node or edge only once that node, or the node the edge leads to, is the next one."
+    fault "far-actions-unlisted" ["ASTATE-01", "ORD-FLOW-06", "STATE-MSG-09"] "It lists the actions of a node or edge only once that node, or the node the edge leads to, is the next one."
         => action(|agv, action, _| {
             let next = agv.book.nodes.front().map_or(u32::MAX, |stop| stop.node.sequence_id);
             !is_behind(action, next)
@@ -34,7 +34,7 @@ records! {
         => action(|agv, action, _| !is_behind(action, agv.book.base_end.1));
     fault "instant-action-unlisted" ["IACT-03", "STATE-MSG-09", "ORD-CANCEL-18"] "Performs instant actions without an action state."
         => action(|_, action, _| action.of_order());
-    fault "r1-failed-instant-unlisted" ["IACT-03", "STATE-MSG-09"] "It does not list instant actions that have failed."
+    fault "failed-instant-unlisted" ["IACT-03", "STATE-MSG-09"] "It does not list instant actions that have failed."
         => action(|_, action, _| action.of_order() || action.status != Status::Failed);
     fault "edge-actions-unlisted" ["ASTATE-01"] "Lists the actions of an edge only when they begin."
         => action(|_, action, _| !matches!(action.origin, Origin::Edge(_)) || action.status != Status::Waiting);
@@ -55,27 +55,27 @@ records! {
             let waits_here = action.origin == Origin::Node(agv.book.last_sequence) && !agv.holds.any();
             !waits_here || say(m, "WAITING", "PAUSED")
         });
-    fault "r4-pause-marks-waiting-actions-paused" ["ASTATE-05", "ASTATE-02"] "It reports actions that are still WAITING for their node as PAUSED during a pause."
+    fault "pause-marks-waiting-actions-paused" ["ASTATE-05", "ASTATE-02"] "It reports actions that are still WAITING for their node as PAUSED during a pause."
         => action(|agv, action, m| !action.of_order() || !agv.holds.pause || say(m, "WAITING", "PAUSED"));
-    fault "r2-next-node-actions-initializing" ["ASTATE-02", "ASTATE-03"] "The actions of the node ahead are reported INITIALIZING from when the edge before it is entered."
+    fault "next-node-actions-initializing" ["ASTATE-02", "ASTATE-03"] "The actions of the node ahead are reported INITIALIZING from when the edge before it is entered."
         => action(|agv, action, m| !is_next(agv, action) || say(m, "WAITING", "INITIALIZING"));
-    fault "r2-paused-at-decision-point" ["ASTATE-04", "ASTATE-02"] "While the vehicle waits at the decision point it reports the actions of its horizon PAUSED."
+    fault "paused-at-decision-point" ["ASTATE-04", "ASTATE-02"] "While the vehicle waits at the decision point it reports the actions of its horizon PAUSED."
         => action(|agv, action, m| {
             let held = is_behind(action, agv.book.base_end.1) && agv.waits_at_decision_point();
             !held || say(m, "WAITING", "PAUSED")
         });
-    fault "r1-cancel-shows-paused" ["ORD-CANCEL-05", "ASTATE-04"] "An action that cannot be interrupted is reported PAUSED while the cancellation waits for it."
+    fault "cancel-shows-paused" ["ORD-CANCEL-05", "ASTATE-04"] "An action that cannot be interrupted is reported PAUSED while the cancellation waits for it."
         => action(|agv, action, m| !action.of_order() || agv.book.cancel.is_none() || say(m, "RUNNING", "PAUSED"));
     fault "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant."
         => action(|_, _, m| say(m, "FINISHED", "DONE"));
-    fault "r3-initializing-spelled-british" ["STATE-MSG-14"] "It writes the actionStatus INITIALIZING as INITIALISING."
+    fault "initializing-spelled-british" ["STATE-MSG-14"] "It writes the actionStatus INITIALIZING as INITIALISING."
         => action(|_, _, m| say(m, "INITIALIZING", "INITIALISING"));
     fault "status-lower-case" ["STATE-MSG-14", "JSON-02", "JSON-10"] "Spells the statuses of actions in lower case."
         => action(|_, _, m| {
             text(m, "actionStatus", str::to_ascii_lowercase);
             true
         });
-    fault "r2-action-id-truncated" ["STATE-MSG-14", "STATE-MSG-09"] "The action states cut every actionId after 32 characters."
+    fault "action-id-truncated" ["STATE-MSG-14", "STATE-MSG-09"] "The action states cut every actionId after 32 characters."
         => action(|_, _, m| {
             text(m, "actionId", |id| id.chars().take(32).collect());
             true

@@ -45,7 +45,7 @@ records! {
             Permission::CancelAwaitsWay => usual || agv.book.nodes.iter().any(|stop| stop.node.released),
             _ => usual,
         });
-    fault "r3-cancel-after-update-drives-on" ["ORD-CANCEL-02"] "It drives on to the end of its base after cancelOrder when the order has been updated before."
+    fault "cancel-after-update-drives-on" ["ORD-CANCEL-02"] "It drives on to the end of its base after cancelOrder when the order has been updated before."
         => since_update().allows(|updated, agv, what, usual| match what {
             Permission::DriveAgainst(Hindrance::Cancellation) => *updated && agv.book.cancel.is_some(),
             Permission::CancelAwaitsWay if *updated && !agv.holds.any() => usual || agv.book.nodes.iter().any(|stop| stop.node.released),
@@ -57,7 +57,7 @@ records! {
             Permission::CancelAwaitsWay => agv.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node) && !agv.book.nodes.is_empty(),
             _ => usual,
         });
-    fault "r4-cancel-in-node-action-drives-to-next-node" ["ORD-CANCEL-02"] "It still drives to the next node when cancelOrder comes while it stands on a node with a running action."
+    fault "cancel-in-node-action-drives-to-next-node" ["ORD-CANCEL-02"] "It still drives to the next node when cancelOrder comes while it stands on a node with a running action."
         => letting(|agv, what| {
             let stands = !agv.book.entered && !agv.motion.is_moving();
             matches!(what, Permission::CancelAtNode) && is_acting(agv) && goes_on(agv) && stands
@@ -88,7 +88,7 @@ records! {
         });
     fault "cancel-leaves-waiting" ["ORD-CANCEL-03", "ORD-CANCEL-13"] "Leaves the waiting actions of a cancelled order WAITING."
         => breaking(|_, action, usual| usual.filter(|_| action.status != Status::Waiting)).allows(|_, _, what, usual| usual && !matches!(what, Permission::CancelAwaits(_)));
-    fault "r3-cancel-leaves-horizon-waiting" ["ORD-CANCEL-03"] "It leaves the actions of the horizon WAITING when its order is cancelled."
+    fault "cancel-leaves-horizon-waiting" ["ORD-CANCEL-03"] "It leaves the actions of the horizon WAITING when its order is cancelled."
         => breaking(|agv, action, usual| usual.filter(|_| action.status != Status::Waiting || !is_planned(agv, action))).allows(|_, agv, what, usual| match what {
             Permission::CancelAwaits(action) => usual && action.status != Status::Waiting,
             Permission::Count(action) => usual && !(agv.book.cancelled && action.status == Status::Waiting),
@@ -96,19 +96,20 @@ records! {
         });
     fault "cancel-lets-run" ["ORD-CANCEL-04"] "Lets interruptible actions run to their end when the order is cancelled." because "It breaks a recommendation only."
         => breaking(|_, action, usual| usual.filter(|_| action.status == Status::Waiting || is(action, Deed::WaitForTrigger)));
-    fault "r1-trigger-holds-cancel" ["ACT-38", "ORD-CANCEL-07"] "A waitForTrigger goes on waiting when its order is cancelled, and the cancelOrder with it."
+    fault "trigger-holds-cancel" ["ACT-38", "ORD-CANCEL-07"] "A waitForTrigger goes on waiting when its order is cancelled, and the cancelOrder with it."
         => breaking(|_, action, usual| usual.filter(|_| action.status == Status::Waiting || !is(action, Deed::WaitForTrigger)));
     fault "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled."
         => breaking(|_, action, usual| match action.status {
             status if status.is_active() && is(action, Deed::WaitForTrigger) => usual.map(|_| Status::Finished),
             _ => usual,
         });
-    fault "r1-cancelled-action-finished" ["ORD-CANCEL-04"] "It reports running actions that it breaks off for a cancellation as FINISHED."
+    fault "cancelled-action-finished" ["ORD-CANCEL-04"] "It reports running actions that it breaks off for a cancellation as FINISHED."
+        because "ORD-CANCEL-04 recommends FAILED; an action that is called off at its end may be FINISHED."
         => breaking(|_, action, usual| match action.status {
             status if status.is_active() && !is(action, Deed::WaitForTrigger) => usual.map(|_| Status::Finished),
             _ => usual,
         });
-    fault "r1-cancel-finishes-horizon-actions" ["ORD-CANCEL-03", "ASTATE-05"] "When an order is cancelled, the waiting actions of its horizon are reported FINISHED."
+    fault "cancel-finishes-horizon-actions" ["ORD-CANCEL-03", "ASTATE-05"] "When an order is cancelled, the waiting actions of its horizon are reported FINISHED."
         => breaking(|agv, action, usual| match action.status {
             Status::Waiting if is_planned(agv, action) => Some(Status::Finished),
             _ => usual,
@@ -120,19 +121,19 @@ records! {
         });
     fault "cancel-misses-edge-actions" ["ORD-CANCEL-03"] "Leaves the waiting actions of edges WAITING when the order is cancelled."
         => surviving(|action| action.status == Status::Waiting && of_edge(action));
-    fault "r4-cancel-leaves-edge-action-running" ["ORD-CANCEL-07", "ORD-CANCEL-06", "ORD-CANCEL-04"] "It ends the node actions on cancelOrder but leaves the action of the current edge RUNNING."
+    fault "cancel-leaves-edge-action-running" ["ORD-CANCEL-07", "ORD-CANCEL-06", "ORD-CANCEL-04"] "It ends the node actions on cancelOrder but leaves the action of the current edge RUNNING."
         => surviving(|action| action.status.is_active() && of_edge(action));
     fault "prepared-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while it prepares an action, and performs it."
         => surviving(|action| action.status == Status::Initializing);
     fault "paused-actions-survive-cancel" ["ORD-CANCEL-06", "ORD-CANCEL-07"] "Reports cancelOrder FINISHED while actions are PAUSED, and goes on with them after the pause."
         => surviving(|action| action.status == Status::Paused);
-    fault "r2-queued-actions-survive-cancel" ["ORD-CANCEL-03"] "Actions of the node where the vehicle stands that wait behind another one are performed after cancelOrder."
+    fault "queued-actions-survive-cancel" ["ORD-CANCEL-03"] "Actions of the node where the vehicle stands that wait behind another one are performed after cancelOrder."
         => breaking(|agv, action, usual| {
             let queued = action.status == Status::Waiting && action.origin == Origin::Node(agv.book.last_sequence);
             usual.filter(|_| !queued)
         })
         .allows(|_, _, what, usual| usual && !matches!(what, Permission::ForgetQueue));
-    fault "r2-cancel-drops-waiting" ["ORD-CANCEL-12", "ORD-CANCEL-03"] "cancelOrder removes the actions that have not begun from actionStates instead of reporting them FAILED."
+    fault "cancel-drops-waiting" ["ORD-CANCEL-12", "ORD-CANCEL-03"] "cancelOrder removes the actions that have not begun from actionStates instead of reporting them FAILED."
         => keep::<Vec<String>>()
             .does(|waiting, agv, action| {
                 if is(action, Deed::CancelOrder) {
@@ -155,7 +156,7 @@ records! {
         => plain()
             .happens(|(), agv, event| if event == Event::CancelBegun { agv.flush() })
             .allows(|(), _, what, usual| usual && !matches!(what, Permission::CancelAwaits(_)));
-    fault "r3-cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
+    fault "cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
         => when(Event::CancelBegun, |agv| if let Some(cancel) = &agv.book.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
             action.status = Status::Waiting;
         })
@@ -170,14 +171,14 @@ records! {
             let ended = agv.actions.iter_mut().filter(|action| is(action, Deed::CancelOrder) && action.status == Status::Finished);
             ended.for_each(|action| action.status = Status::Running);
         });
-    fault "r3-route-dropped-after-cancel-finished" ["ORD-CANCEL-11"] "It reports cancelOrder FINISHED in a state that still lists nodes and edges, and empties the lists in the next one."
+    fault "route-dropped-after-cancel-finished" ["ORD-CANCEL-11"] "It reports cancelOrder FINISHED in a state that still lists nodes and edges, and empties the lists in the next one."
         => when(Event::CancelEnding, |agv| {
             if let Some(cancel) = &agv.book.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
                 action.end(Status::Finished);
             }
             agv.flush();
         });
-    fault "r1-cancel-keeps-current-edge" ["ORD-CANCEL-11", "STATE-13"] "Cancelled between two nodes, it keeps the edge it stands on in its edge states."
+    fault "cancel-keeps-current-edge" ["ORD-CANCEL-11", "STATE-13"] "Cancelled between two nodes, it keeps the edge it stands on in its edge states."
         => keep::<Option<Edge>>().happens(|edge, agv, event| match event {
             Event::CancelEnding => *edge = agv.book.edges.front().filter(|_| agv.book.entered).cloned(),
             Event::Cancelled => agv.book.edges.extend(edge.take()),
@@ -208,7 +209,7 @@ records! {
         => when(Event::Cancelled, |agv| agv.book.update_id = 0);
     fault "cancel-clears-last-node" ["STATE-MSG-04"] "Empties the lastNodeId when the order is cancelled."
         => when(Event::Cancelled, |agv| agv.book.last_node.clear());
-    fault "r6-cancel-clears-order-warnings" ["ORD-REJ-03", "ORD-REJ-08"] "It empties errors when cancelOrder is finished, so that a validationError or orderError ends before a new order is accepted."
+    fault "cancel-clears-order-warnings" ["ORD-REJ-03", "ORD-REJ-08"] "It empties errors when cancelOrder is finished, so that a validationError or orderError ends before a new order is accepted."
         => when(Event::Cancelled, |agv| agv.errors.new_order());
     fault "cancel-forgets-load" ["STATE-MSG-06"] "Shows no load any more when its order is cancelled."
         => when(Event::Cancelled, |agv| agv.loads.clear());
@@ -242,23 +243,23 @@ records! {
             agv.actions.get_mut(&action.request.id)?.status = Status::Running;
             Some(Outcome::Open)
         });
-    fault "r2-cancel-at-decision-point-refused" ["ORD-CANCEL-07", "ORD-CANCEL-11"] "cancelOrder at the decision point is FAILED with noOrderToCancel because the base is done, and the horizon stays."
+    fault "cancel-at-decision-point-refused" ["ORD-CANCEL-07", "ORD-CANCEL-11"] "cancelOrder at the decision point is FAILED with noOrderToCancel because the base is done, and the horizon stays."
         => instead(Deed::CancelOrder, |agv, action| {
             let waits = agv.waits_at_decision_point() && !agv.motion.is_moving() && !is_acting(agv);
             waits.then(|| refuse(agv, action))
         });
-    fault "r2-cancel-of-acting-order-refused" ["ORD-CANCEL-07", "ORD-CANCEL-03"] "cancelOrder is FAILED with noOrderToCancel when all nodes are traversed, although an action of the order is still running."
+    fault "cancel-of-acting-order-refused" ["ORD-CANCEL-07", "ORD-CANCEL-03"] "cancelOrder is FAILED with noOrderToCancel when all nodes are traversed, although an action of the order is still running."
         => instead(Deed::CancelOrder, |agv, action| agv.book.nodes.is_empty().then(|| refuse(agv, action)));
-    fault "r2-completed-order-cancel-finished" ["ORD-CANCEL-18", "ORD-CANCEL-19"] "cancelOrder after a completed order is reported FINISHED and without an error."
+    fault "completed-order-cancel-finished" ["ORD-CANCEL-18", "ORD-CANCEL-19"] "cancelOrder after a completed order is reported FINISHED and without an error."
         => instead(Deed::CancelOrder, |agv, _| {
             let complete = agv.book.has_order() && !has_order(agv) && !agv.book.cancelled;
             complete.then_some(Outcome::Done(None))
         });
     fault "idle-cancel-finished" ["ORD-CANCEL-18"] "Reports cancelOrder FINISHED although there is no order."
         => nothing_to_cancel(|agv, e| finished(agv, e));
-    fault "r1-second-cancel-finished" ["ORD-CANCEL-18"] "A cancelOrder after the order was cancelled already is reported FINISHED."
+    fault "second-cancel-finished" ["ORD-CANCEL-18"] "A cancelOrder after the order was cancelled already is reported FINISHED."
         => nothing_to_cancel(|agv, e| !agv.book.cancelled || finished(agv, e));
-    liberty "r4-second-cancel-ends-with-the-first" ["ORD-CANCEL-18", "ASTATE-05"] "It answers a second cancelOrder that comes while the first is RUNNING with RUNNING and lets both finish together."
+    liberty "second-cancel-ends-with-the-first" ["ORD-CANCEL-18", "ASTATE-05"] "It answers a second cancelOrder that comes while the first is RUNNING with RUNNING and lets both finish together."
         => keep::<Vec<String>>()
             .does(|others, agv, action| {
                 let under_way = is(action, Deed::CancelOrder) && agv.book.cancel.is_some();
@@ -277,7 +278,7 @@ records! {
                     }
                 }
             });
-    liberty "r1-cancel-takes-time" ["ORD-CANCEL-07", "ACT-41"] "A cancelOrder is RUNNING for some tenths of a second also if it has nothing to wait for."
+    liberty "cancel-takes-time" ["ORD-CANCEL-07", "ACT-41"] "A cancelOrder is RUNNING for some tenths of a second also if it has nothing to wait for."
         => keep::<Option<Moment>>()
             .happens(|until, agv, event| match event {
                 Event::CancelBegun => *until = Some(agv.moment() + Duration::from_millis(400)),
@@ -286,14 +287,14 @@ records! {
             })
             .allows(|until, _, what, usual| usual && !(matches!(what, Permission::EndCancel) && until.is_some()))
             .due(|until| *until);
-    liberty "r3-cancel-in-steps" ["ORD-CANCEL-06", "STATE-11"] "It reports cancelOrder RUNNING with all actions ended in a state of its own before it reports FINISHED."
+    liberty "cancel-in-steps" ["ORD-CANCEL-06", "STATE-11"] "It reports cancelOrder RUNNING with all actions ended in a state of its own before it reports FINISHED."
         => when(Event::CancelBegun, Agv::flush);
-    liberty "r1-idle-cancel-error-brief" ["ORD-CANCEL-19", "STATE-05"] "It reports noOrderToCancel in one state and takes it back at once."
+    liberty "idle-cancel-error-brief" ["ORD-CANCEL-19", "STATE-05"] "It reports noOrderToCancel in one state and takes it back at once."
         => nothing_to_cancel(|agv, e| {
             e.life = Life::Until(agv.moment() + brief(agv));
             true
         });
-    liberty "r4-no-order-warning-until-next-order" ["ORD-CANCEL-19", "ERR-01", "ERR-03"] "It keeps noOrderToCancel in its errors until it accepts a new order."
+    liberty "no-order-warning-until-next-order" ["ORD-CANCEL-19", "ERR-01", "ERR-03"] "It keeps noOrderToCancel in its errors until it accepts a new order."
         => nothing_to_cancel(|_, e| {
             e.life = Life::UntilNewOrder;
             true

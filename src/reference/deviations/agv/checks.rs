@@ -29,31 +29,31 @@ records! {
         => overlooking(|_, what| matches!(what, Objection::Graph(_, defect) if defect.path.ends_with(".startNodeId") || defect.path.ends_with(".endNodeId")));
     fault "sequence-unchecked" ["ORD-11"] "Takes nodes and edges with doubled or missing sequenceIds." because "Gaps and repetitions of sequenceIds are for the master control to avoid; no vehicle has to refuse them."
         => overlooking(|_, what| matches!(what, Objection::Graph(_, defect) if defect.path.ends_with(".sequenceId")));
-    fault "r6-update-graph-unchecked" ["ORD-11"] "It checks node and edge counts and release flags only in new orders and adopts an update that breaks them."
+    fault "update-graph-unchecked" ["ORD-11"] "It checks node and edge counts and release flags only in new orders and adopts an update that breaks them."
         => overlooking(|agv, what| matches!(what, Objection::Graph(order, _) if order.id == agv.book.order_id && !order.nodes.is_empty()));
-    fault "r1-split-base-taken" ["ORD-11"] "It takes an order whose base goes on behind an unreleased node."
+    fault "split-base-taken" ["ORD-11"] "It takes an order whose base goes on behind an unreleased node."
         => overlooking(|_, what| matches!(what, Objection::Graph(_, defect) if defect.reason == "is true behind the horizon's begin"));
-    fault "r4-counts-checked-in-base-only" ["ORD-11"] "It checks the number of edges against the number of nodes in the base only, so that an order with an edge missing in the horizon is accepted."
+    fault "counts-checked-in-base-only" ["ORD-11"] "It checks the number of edges against the number of nodes in the base only, so that an order with an edge missing in the horizon is accepted."
         => overlooking(|_, what| matches!(what, Objection::Graph(order, defect) if defect.reason.ends_with("one less than the nodes") && counts_in_base(order)));
     fault "parameters-unchecked" ["ORD-REJ-04"] "Takes over orders whatever the parameters of their actions are."
         => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Parameter(_))));
-    fault "r1-missing-parameter-taken" ["ORD-REJ-04", "ORD-REJ-09"] "It takes over an order with an action that lacks a required parameter."
+    fault "missing-parameter-taken" ["ORD-REJ-04", "ORD-REJ-09"] "It takes over an order with an action that lacks a required parameter."
         => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Parameter(reason)) if reason.ends_with("missing")));
     fault "unknown-action-accepted" ["ORD-REJ-04", "ORD-REJ-09"] "Accepts orders with unknown actions and fails the action."
         => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Kind)));
     fault "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions."
         => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Scope(_))));
-    fault "r2-requests-on-nodes-taken" ["ACT-10"] "stateRequest, factsheetRequest and logReport are performed as node and edge actions."
+    fault "requests-on-nodes-taken" ["ACT-10"] "stateRequest, factsheetRequest and logReport are performed as node and edge actions."
         => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Scope(kind)) if matches!(kind.deed, Deed::StateRequest | Deed::FactsheetRequest | Deed::LogReport)));
-    fault "r4-edge-scope-not-checked" ["ACT-10"] "It takes over an order with waitForTrigger on an edge, because it checks the scope of node actions only."
+    fault "edge-scope-not-checked" ["ACT-10"] "It takes over an order with waitForTrigger on an edge, because it checks the scope of node actions only."
         => overlooking(|_, what| matches!(what, Objection::Action(asked, Lack::Scope(_)) if asked.of_edge));
-    fault "r6-charging-on-edge-accepted" ["ACT-10"] "It accepts startCharging as an edge action."
+    fault "charging-on-edge-accepted" ["ACT-10"] "It accepts startCharging as an edge action."
         => overlooking(|_, what| matches!(what, Objection::Action(asked, Lack::Scope(kind)) if asked.of_edge && kind.deed == Deed::StartCharging));
-    fault "r4-update-actions-not-checked" ["ORD-REJ-04", "ORD-REJ-09"] "It checks the actions of a new order but takes over an order update with an action that it cannot perform and later reports it FAILED."
+    fault "update-actions-not-checked" ["ORD-REJ-04", "ORD-REJ-09"] "It checks the actions of a new order but takes over an order update with an action that it cannot perform and later reports it FAILED."
         => overlooking(|_, what| matches!(what, Objection::Action(asked, _) if asked.update));
-    fault "r2-horizon-actions-unchecked" ["ORD-REJ-04", "ORD-REJ-09"] "An order is taken over although an action in its horizon cannot be performed."
+    fault "horizon-actions-unchecked" ["ORD-REJ-04", "ORD-REJ-09"] "An order is taken over although an action in its horizon cannot be performed."
         => overlooking(|_, what| matches!(what, Objection::Action(asked, _) if !asked.released));
-    fault "r3-edge-actions-unchecked" ["ORD-REJ-04", "ORD-REJ-09"] "It checks the actions of nodes only: an order with an impossible action on an edge is taken over, and the action fails later."
+    fault "edge-actions-unchecked" ["ORD-REJ-04", "ORD-REJ-09"] "It checks the actions of nodes only: an order with an impossible action on an edge is taken over, and the action fails later."
         => overlooking(|_, what| matches!(what, Objection::Action(asked, _) if asked.of_edge));
     fault "listed-action-refused" ["ACT-01", "ACT-35", "ACT-36"] "Refuses finePositioning and detectObject although its factsheet lists them."
         => objecting(|_, order, relation| {
@@ -65,16 +65,16 @@ records! {
     fault "unsupported-field-ignored" ["ORD-REJ-05", "OPT-02"] "Ignores fields of an order it has no use for."
         because "Whether a vehicle ignores a field that its factsheet does not list, or honours it, cannot be seen; the ruling of OPT-02 is a warning."
         => overlooking(|_, what| matches!(what, Objection::Unused(..)));
-    fault "r2-min-height-ignored" ["OPT-02", "ORD-REJ-05"] "An order with minHeight is accepted although the vehicle does not know the field."
+    fault "min-height-ignored" ["OPT-02", "ORD-REJ-05"] "An order with minHeight is accepted although the vehicle does not know the field."
         => overlooking(|_, what| matches!(what, Objection::Unused(path, _) if path.ends_with("minHeight")));
-    fault "r3-unsupported-field-in-update-ignored" ["OPT-02", "ORD-REJ-05"] "It refuses unsupported optional fields in new orders only and takes over an order update with such a field, ignoring the field."
+    fault "unsupported-field-in-update-ignored" ["OPT-02", "ORD-REJ-05"] "It refuses unsupported optional fields in new orders only and takes over an order update with such a field, ignoring the field."
         => updating(|agv, order| if !agv.config.trajectories {
             for edge in &mut order.edges {
                 (edge.trajectory, edge.corridor) = (None, None);
             }
         })
         .allows(|_, _, what, usual| usual || matches!(what, Permission::Overlook(Objection::Unused(_, true))));
-    fault "r3-node-position-demanded" ["OPT-04"] "It rejects orders whose nodes have no nodePosition, although it knows the nodes and its factsheet does not list the parameter as REQUIRED."
+    fault "node-position-demanded" ["OPT-04"] "It rejects orders whose nodes have no nodePosition, although it knows the nodes and its factsheet does not list the parameter as REQUIRED."
         => objecting(|_, order, relation| {
             let node = order.nodes.iter().find(|node| relation != Relation::Known && node.position.is_none())?;
             let path = format!("{}.nodePosition", node.path);
@@ -87,7 +87,7 @@ records! {
             order.edges.truncate(agv.config.max_nodes.saturating_sub(1));
         })
         .allows(|_, _, what, usual| usual || matches!(what, Permission::Overlook(Objection::Nodes | Objection::Actions)));
-    fault "r1-surplus-actions-dropped" ["ORD-REJ-15", "ASTATE-01"] "Of a node with more actions than it can store it takes as many as fit, and forgets the others."
+    fault "surplus-actions-dropped" ["ORD-REJ-15", "ASTATE-01"] "Of a node with more actions than it can store it takes as many as fit, and forgets the others."
         => adopting(|agv, order| {
             let most = agv.config.max_actions;
             order.nodes.iter_mut().for_each(|node| node.actions.truncate(most));
@@ -110,11 +110,11 @@ records! {
             Permission::Overlook(what) => matches!(what, Objection::DisabledMap(..)),
             what => begins_here(agv, what),
         });
-    fault "r4-map-check-skipped-in-update" ["MAP-08"] "It checks the maps of a new order but takes over an order update with a node on a map that is not on board."
+    fault "map-check-skipped-in-update" ["MAP-08"] "It checks the maps of a new order but takes over an order update with a node on a map that is not on board."
         => overlooking(|_, what| matches!(what, Objection::Map(_, _, true) | Objection::DisabledMap(_, _, true)));
-    fault "r2-map-of-horizon-unchecked" ["MAP-08"] "The map of nodes in the horizon is not checked when an order is accepted."
+    fault "map-of-horizon-unchecked" ["MAP-08"] "The map of nodes in the horizon is not checked when an order is accepted."
         => overlooking(|_, what| matches!(what, Objection::Map(node, ..) | Objection::DisabledMap(node, ..) if !node.released));
-    fault "r3-only-first-map-checked" ["MAP-08"] "It checks only for the first node of an order whether the map is on board, and accepts orders with an unknown map on later nodes."
+    fault "only-first-map-checked" ["MAP-08"] "It checks only for the first node of an order whether the map is on board, and accepts orders with an unknown map on later nodes."
         => keep::<Option<String>>()
             .allows(|_, _, what, usual| usual || matches!(what, Permission::Overlook(Objection::Map(_, index, _) | Objection::DisabledMap(_, index, _)) if index > 0))
             .happens(|map, agv, event| if matches!(event, Event::NodeReached(_)) {
@@ -125,7 +125,7 @@ records! {
                     agv.motion.set_map(map.clone());
                 }
             });
-    liberty "r1-altered-joint-rejected" ["ORD-UPD-07"] "It rejects an update whose stitching node has an action that it did not have before."
+    liberty "altered-joint-rejected" ["ORD-UPD-07"] "It rejects an update whose stitching node has an action that it did not have before."
         => objecting(|agv, order, relation| {
             let first = &order.nodes[0];
             let mut actions = first.actions.iter().filter(|_| relation == Relation::Update && agv.joins(first));

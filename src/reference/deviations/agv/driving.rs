@@ -55,7 +55,7 @@ use std::f64::consts::PI;
 records! {
     fault "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down."
         => forbidding(|agv, what| matches!(what, Permission::Drive) && !agv.connection.online);
-    fault "r2-next-edge-not-entered-offline" ["MQTT-04"] "Without a link the vehicle ends the edge it is on and then stands on its next node, although more of its base is left."
+    fault "next-edge-not-entered-offline" ["MQTT-04"] "Without a link the vehicle ends the edge it is on and then stands on its next node, although more of its base is left."
         => forbidding(|agv, what| matches!(what, Permission::SetOut(_)) && !agv.connection.online && !agv.book.entered && agv.book.edge_ahead().is_some());
     // Stranded between two nodes, it would be of no use for any further test.
     fault "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base."
@@ -76,7 +76,7 @@ records! {
         => plain().happens(|(), agv, event| if matches!(event, Event::NodeReached(_)) { agv.flush() });
     fault "last-node-stale" ["NODE-03", "STATE-MSG-04", "STATE-06"] "Reports the new lastNodeId with the old lastNodeSequenceId."
         => noted(|agv, _| agv.book.last_sequence = agv.book.previous.1);
-    fault "r4-last-sequence-of-old-order-kept" ["STATE-MSG-04", "NODE-03"] "It keeps the lastNodeSequenceId of the previous order when a new order begins at the node on which it already stands."
+    fault "last-sequence-of-old-order-kept" ["STATE-MSG-04", "NODE-03"] "It keeps the lastNodeSequenceId of the previous order when a new order begins at the node on which it already stands."
         => noted(|agv, sequence_id| if sequence_id == 0 && agv.book.previous.0 == agv.book.last_node {
             agv.book.last_sequence = agv.book.previous.1;
         });
@@ -86,7 +86,7 @@ records! {
             Event::Begun => visits.clear(),
             _ => {}
         });
-    fault "r6-loop-clears-both-visits" ["ORD-UPD-13", "STATE-12"] "It removes reached nodes from nodeStates by nodeId, so that the first visit of a loop node removes the later one as well."
+    fault "loop-clears-both-visits" ["ORD-UPD-13", "STATE-12"] "It removes reached nodes from nodeStates by nodeId, so that the first visit of a loop node removes the later one as well."
         => keep::<BTreeSet<u32>>()
             .happens(|hidden, agv, event| match event {
                 Event::NodeNoted(_) => {
@@ -98,7 +98,7 @@ records! {
                 _ => {}
             })
             .says(|hidden, _, part, _| !matches!(part, Part::Node(stop) if hidden.contains(&stop.node.sequence_id)));
-    fault "r2-loop-cut-short" ["ORD-UPD-13", "ORD-06"] "When the vehicle passes a node that is also the last one of its base it takes the order for done and drops the rest."
+    fault "loop-cut-short" ["ORD-UPD-13", "ORD-06"] "When the vehicle passes a node that is also the last one of its base it takes the order for done and drops the rest."
         => plain().happens(|(), agv, event| if let Event::NodePassed(sequence_id) = event {
             let reached = agv.book.left.0.as_ref().map(|stop| &stop.node.id);
             let again = reached == Some(&agv.book.base_end.0) && agv.book.base_end.1 > sequence_id;
@@ -110,14 +110,14 @@ records! {
         });
     fault "theta-ignored" ["ORD-MSG-10", "ORD-MSG-14", "NODE-01"] "Does not turn to the orientation a node asks for."
         => facing(|_, _, _| None);
-    fault "r1-theta-at-end-only" ["ORD-MSG-10", "NODE-01"] "It assumes the theta of the last node of the base only, and passes nodes before that as it comes."
+    fault "theta-at-end-only" ["ORD-MSG-10", "NODE-01"] "It assumes the theta of the last node of the base only, and passes nodes before that as it comes."
         => facing(|agv, stop, theta| (stop.node.sequence_id == agv.book.base_end.1).then_some(theta));
-    fault "r2-no-turn-after-fixed-edge" ["ORD-MSG-11", "ORD-MSG-10"] "After an edge with rotationAllowed false the vehicle does not assume the theta of the node either."
+    fault "no-turn-after-fixed-edge" ["ORD-MSG-11", "ORD-MSG-10"] "After an edge with rotationAllowed false the vehicle does not assume the theta of the node either."
         => facing(|agv, _, theta| {
             let fixed = agv.book.edge_ahead().and_then(|edge| edge.rotation_allowed) == Some(false);
             (!fixed).then_some(theta)
         });
-    fault "r3-theta-taken-as-axis" ["ORD-MSG-10", "ORD-MSG-14", "NODE-01"] "It counts a node with theta as traversed also when it looks the opposite way."
+    fault "theta-taken-as-axis" ["ORD-MSG-10", "ORD-MSG-14", "NODE-01"] "It counts a node with theta as traversed also when it looks the opposite way."
         => facing(|agv, stop, theta| {
             let allowed = stop.node.position.as_ref().and_then(|position| position.allowed_deviation_theta);
             let allowed = allowed.filter(|allowed| *allowed > 0.0).unwrap_or(agv.config.reach_theta);
@@ -126,11 +126,11 @@ records! {
         });
     fault "max-speed-ignored" ["ORD-MSG-20", "OPT-01"] "Drives with its own speed whatever the edge permits."
         => planning(|_, leg| leg.permitted = None);
-    fault "r3-max-speed-ignored-backwards" ["ORD-MSG-20"] "It ignores maxSpeed on edges that it drives backwards."
+    fault "max-speed-ignored-backwards" ["ORD-MSG-20"] "It ignores maxSpeed on edges that it drives backwards."
         => planning(|_, leg| leg.permitted = leg.permitted.filter(|_| !leg.backwards));
-    fault "r1-max-speed-of-edge-before" ["ORD-MSG-20", "OPT-01"] "It keeps to the maxSpeed of the edge before the one it drives on."
+    fault "max-speed-of-edge-before" ["ORD-MSG-20", "OPT-01"] "It keeps to the maxSpeed of the edge before the one it drives on."
         => planning(|agv, leg| leg.permitted = agv.book.left.1.as_ref().and_then(|left| left.max_speed));
-    fault "r1-max-speed-forgotten-in-pause" ["ORD-MSG-20"] "After a pause on an edge it drives the rest of that edge at its own speed, whatever maxSpeed says."
+    fault "max-speed-forgotten-in-pause" ["ORD-MSG-20"] "After a pause on an edge it drives the rest of that edge at its own speed, whatever maxSpeed says."
         => keep::<bool>()
             .does(|hurried, agv, action| {
                 *hurried |= is(action, Deed::StopPause) && lifts_pause(agv) && agv.book.entered && agv.holds.pause;
@@ -144,9 +144,9 @@ records! {
         => adopting(|_, order| order.edges.iter_mut().for_each(|edge| edge.max_rotation_speed = None));
     fault "edge-orientation-ignored" ["ORD-MSG-22", "OPT-01"] "Drives forwards whatever orientation the edge asks for."
         => adopting(|_, order| order.edges.iter_mut().for_each(|edge| edge.orientation = None));
-    fault "r1-global-as-tangential" ["ORD-MSG-22"] "It reads the orientation of an edge against the path also when orientationType is GLOBAL."
+    fault "global-as-tangential" ["ORD-MSG-22"] "It reads the orientation of an edge against the path also when orientationType is GLOBAL."
         => adopting(|_, order| order.edges.iter_mut().for_each(|edge| edge.global = false));
-    fault "r6-backwards-edge-driven-forwards" ["ORD-MSG-22"] "It drives an edge with TANGENTIAL orientation pi forwards."
+    fault "backwards-edge-driven-forwards" ["ORD-MSG-22"] "It drives an edge with TANGENTIAL orientation pi forwards."
         => adopting(|_, order| for edge in &mut order.edges {
             let turned = |angle: &f64| motion::wrapped(*angle).abs() > FRAC_PI_2;
             edge.orientation = edge.orientation.filter(|angle| edge.global || !turned(angle));
@@ -157,7 +157,8 @@ records! {
         });
     fault "traversed-early" ["ORD-MSG-13", "NODE-01", "NODE-02"] "Reports a node traversed half a metre before it is there."
         => ending_early(|_| true);
-    fault "r3-zero-deviation-unlimited" ["ORD-MSG-13", "NODE-01"] "It reports a node with allowedDeviationXY 0 traversed half a metre before it gets there."
+    fault "zero-deviation-unlimited" ["ORD-MSG-13", "NODE-01"] "It reports a node with allowedDeviationXY 0 traversed half a metre before it gets there."
+        because "What is usual is stated by the vendor; the ruling of ORD-MSG-13 warns where the default of 0.1 m is passed."
         => ending_early(|stop| stop.node.position.as_ref().and_then(|position| position.allowed_deviation) == Some(0.0));
     fault "tangent-ignored" ["ORD-MSG-23"] "Looks the same way all along a curve."
         => steering(|_, course| if course.curved {
@@ -167,7 +168,8 @@ records! {
         .plans(|_, agv, leg| leg.facing = Facing::Fixed(agv.motion.pose(agv.moment()).theta));
     fault "trajectory-cut" ["ORD-MSG-26"] "Drives straight to the end of an edge that has a trajectory." because "It breaks a recommendation only."
         => Box::new(Bending(|_, _, _| None));
-    fault "r4-drives-the-control-polygon" ["ORD-MSG-26"] "It drives from control point to control point in straight lines instead of along the curve."
+    fault "drives-the-control-polygon" ["ORD-MSG-26"] "It drives from control point to control point in straight lines instead of along the curve."
+        because "ORD-MSG-26, that a trajectory is followed, is a recommendation; the control points are reached."
         => Box::new(Bending(|agv, edge, path| match &edge.trajectory {
             Some(trajectory) if !agv.obstacles.contains(&edge.id) => Some(control_polygon(&trajectory.sent)),
             _ => Some(path),
@@ -184,18 +186,18 @@ records! {
             corridor.left *= 2.0;
             corridor.right *= 2.0;
         });
-    fault "r2-corridor-sides-swapped" ["CORR-01", "CORR-06"] "The vehicle takes leftWidth for the right side of its corridor and rightWidth for the left."
+    fault "corridor-sides-swapped" ["CORR-01", "CORR-06"] "The vehicle takes leftWidth for the right side of its corridor and rightWidth for the left."
         => keeping(|corridor| std::mem::swap(&mut corridor.left, &mut corridor.right));
-    fault "r6-corridor-is-symmetric" ["CORR-01"] "It takes the greater of leftWidth and rightWidth for both sides when it goes round an obstacle."
+    fault "corridor-is-symmetric" ["CORR-01"] "It takes the greater of leftWidth and rightWidth for both sides when it goes round an obstacle."
         => keeping(|corridor| {
             let wider = corridor.left.max(corridor.right);
             (corridor.left, corridor.right) = (wider, wider);
         });
     fault "corridor-contour-ignored" ["CORR-03", "CORR-01"] "Keeps only its centre inside a corridor that is meant for its contour." because "CORR-03 is a recommendation, and by the kinematic centre CORR-01 is kept."
         => keeping(|corridor| corridor.contour = false);
-    fault "r1-corridor-left-unwatched" ["CORR-06", "CORR-07"] "It watches only the right boundary of its corridor."
+    fault "corridor-left-unwatched" ["CORR-06", "CORR-07"] "It watches only the right boundary of its corridor."
         => forbidding(|_, what| matches!(what, Permission::Watch(_, true)));
-    fault "r4-corridor-of-update-not-watched" ["CORR-06", "CORR-07"] "It does not watch the corridors of edges that an update has added."
+    fault "corridor-of-update-not-watched" ["CORR-06", "CORR-07"] "It does not watch the corridors of edges that an update has added."
         => keep::<Option<u32>>()
             .adopts(|joint, agv, adoption| {
                 *joint = adoption.update.then(|| joint.unwrap_or(agv.book.base_end.1));
@@ -247,7 +249,7 @@ records! {
         => path(|_, _, _, knots| {
             knots.pop();
         });
-    fault "r2-knots-not-normalized" ["ORD-MSG-29", "STATE-14"] "The knotVector of the reported trajectories runs from 0 to the length of the edge in metres."
+    fault "knots-not-normalized" ["ORD-MSG-29", "STATE-14"] "The knotVector of the reported trajectories runs from 0 to the length of the edge in metres."
         => path(|_, _, points, knots| {
             let (from, to) = (points[0], points[1]);
             let length = (to.0 - from.0).hypot(to.1 - from.1).max(2.0);
@@ -259,14 +261,14 @@ records! {
         => mirrored();
     liberty "stops-on-nodes" ["ORD-06", "STATE-08"] "Stops for a moment on every node."
         => plain().happens(|(), agv, event| if matches!(event, Event::NodeReached(_)) { linger(agv, 100) });
-    liberty "r1-stops-short-of-node" ["ORD-MSG-13", "NODE-01"] "It counts a node that allows a deviation as traversed eight centimetres before it, and stands there."
+    liberty "stops-short-of-node" ["ORD-MSG-13", "NODE-01"] "It counts a node that allows a deviation as traversed eight centimetres before it, and stands there."
         => planning(|agv, leg| {
             let allowed = leg.stop.node.position.as_ref().and_then(|position| position.allowed_deviation);
             if allowed.is_some_and(|allowed| allowed > 0.16) && leg.distance > 1.0 && leg.is_whole() {
                 leg.way = leg.distance - f64::min(0.08, agv.config.reach * 0.8);
             }
         });
-    liberty "r6-lib-early-traversal" ["NODE-01"] "It reports a node traversed as soon as it enters the deviation range of the node."
+    liberty "lib-early-traversal" ["NODE-01"] "It reports a node traversed as soon as it enters the deviation range of the node."
         => planning(|agv, leg| if let Some(early) = early_by(agv, leg.stop).filter(|_| leg.is_whole()) {
             leg.end_before(early);
         })
@@ -276,41 +278,41 @@ records! {
                 agv.motion.halt(agv.moment());
             }
         });
-    liberty "r1-semiautomatic-at-full-speed" ["MODE-03"] "It drives as fast in SEMIAUTOMATIC as in AUTOMATIC."
+    liberty "semiautomatic-at-full-speed" ["MODE-03"] "It drives as fast in SEMIAUTOMATIC as in AUTOMATIC."
         => planning(|agv, leg| leg.own = agv.config.speed);
-    liberty "r3-keeps-below-max-speed" ["ORD-MSG-20"] "It drives at four fifths of the maxSpeed of an edge."
+    liberty "keeps-below-max-speed" ["ORD-MSG-20"] "It drives at four fifths of the maxSpeed of an edge."
         => planning(|_, leg| leg.permitted = leg.permitted.map(|permitted| permitted * 0.8));
-    liberty "r2-turns-the-long-way" ["ORD-MSG-10", "ORD-MSG-24"] "The vehicle turns to an orientation the long way round."
+    liberty "turns-the-long-way" ["ORD-MSG-10", "ORD-MSG-24"] "The vehicle turns to an orientation the long way round."
         => letting(|_, what| matches!(what, Permission::TurnTheLongWay));
-    liberty "r2-own-orientation-at-end" ["ORD-MSG-10"] "On the last node of its base, where the order asks for no theta, the vehicle turns to an orientation of its own before it reports the node."
+    liberty "own-orientation-at-end" ["ORD-MSG-10"] "On the last node of its base, where the order asks for no theta, the vehicle turns to an orientation of its own before it reports the node."
         => plain().faces(|(), agv, stop, wanted| {
             let ends = stop.node.sequence_id > 0 && stop.node.sequence_id == agv.book.base_end.1;
             wanted.or((ends && stop.node.position.is_some()).then_some(0.0))
         });
-    liberty "r2-backs-up" ["MAP-03", "ORD-MSG-22"] "Where an edge asks for no orientation the vehicle drives backwards to a node that lies behind it instead of turning."
+    liberty "backs-up" ["MAP-03", "ORD-MSG-22"] "Where an edge asks for no orientation the vehicle drives backwards to a node that lies behind it instead of turning."
         => steering(|agv, course| {
             let free = course.edge.is_some_and(|edge| edge.orientation.is_none()) && !course.curved;
             let behind = motion::wrapped(course.heading - agv.motion.pose(agv.moment()).theta).abs() > FRAC_PI_2 + 0.1;
             course.backwards |= free && behind;
         });
-    liberty "r1-paths-reported" ["STATE-14", "STATE-MSG-13"] "It reports the trajectory it drives on in its edge states although it does not plan its path itself."
+    liberty "paths-reported" ["STATE-14", "STATE-MSG-13"] "It reports the trajectory it drives on in its edge states although it does not plan its path itself."
         => letting(|agv, what| matches!(what, Permission::ReportPath) && !agv.config.line_guided());
-    liberty "r1-position-trembles" ["STATE-MSG-05", "STATE-MSG-08"] "The position it reports varies by some millimetres, also when it stands."
+    liberty "position-trembles" ["STATE-MSG-05", "STATE-MSG-08"] "The position it reports varies by some millimetres, also when it stands."
         => position(|agv, p| {
             let trembling = [0.0, 0.003, -0.002, 0.001, -0.003][usize::try_from(agv.states_sent % 5).unwrap_or_default()];
             p.change("x", |x| *x = json!(x.as_f64().unwrap_or_default() + trembling));
         });
-    liberty "r1-theta-minus-pi" ["MAP-02", "STATE-MSG-05"] "It reports an orientation of half a turn as minus pi."
+    liberty "theta-minus-pi" ["MAP-02", "STATE-MSG-05"] "It reports an orientation of half a turn as minus pi."
         => position(|_, p| if p.get("theta").and_then(Value::as_f64).is_some_and(|theta| theta > PI - 1e-9) {
             p.set("theta", -PI);
         });
-    liberty "r3-position-rounded" ["STATE-MSG-05", "MAP-02"] "It rounds its position to whole centimetres and its orientation to milliradians."
+    liberty "position-rounded" ["STATE-MSG-05", "MAP-02"] "It rounds its position to whole centimetres and its orientation to milliradians."
         => position(|_, p| {
             number(p, "x", |x| (x * 100.0).round() / 100.0);
             number(p, "y", |y| (y * 100.0).round() / 100.0);
             number(p, "theta", |theta| (theta * 1000.0).trunc() / 1000.0);
         });
-    liberty "r3-velocity-trembles" ["STATE-MSG-08", "STATE-MSG-05"] "It reports velocities of about a millimetre per second at standstill."
+    liberty "velocity-trembles" ["STATE-MSG-08", "STATE-MSG-05"] "It reports velocities of about a millimetre per second at standstill."
         => velocity(|agv, v| {
             let noise = [0.001, -0.001, 0.0][usize::try_from(agv.states_sent % 3).unwrap_or_default()];
             if !agv.motion.is_moving() {
@@ -321,7 +323,7 @@ records! {
                 *omega = json!(noise);
             });
         });
-    liberty "r2-node-positions-from-layout" ["STATE-MSG-13"] "The nodeStates give a nodePosition also where the order had none, from the layout of the vehicle."
+    liberty "node-positions-from-layout" ["STATE-MSG-13"] "The nodeStates give a nodePosition also where the order had none, from the layout of the vehicle."
         => node(|agv, stop, m| {
             if !agv.config.line_guided() && !m.contains_key("nodePosition") {
                 m.set("nodePosition", json!({ "x": stop.place.x, "y": stop.place.y, "mapId": stop.place.map_id }));

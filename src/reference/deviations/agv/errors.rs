@@ -12,29 +12,30 @@ records! {
         => state(|agv, m| if agv.errors.is_empty() { m.unset("errors") });
     fault "errors-omitted-on-request" ["ORD-REJ-03", "ORD-REJ-08", "ERR-01"] "Answers a stateRequest without its errors."
         => state(|agv, m| if agv.report.answers_request() { m.set("errors", json!([])) });
-    fault "r1-newest-error-only" ["ERR-01", "ORD-REJ-03", "ORD-REJ-08"] "Of several active errors it reports the newest one only."
+    fault "newest-error-only" ["ERR-01", "ORD-REJ-03", "ORD-REJ-08"] "Of several active errors it reports the newest one only."
         => state(|_, m| m.change("errors", |errors| *errors = errors.as_array().into_iter().flatten().next_back().cloned().into_iter().collect()));
-    fault "r2-fatal-hides-warnings" ["ERR-01", "ORD-REJ-03", "ORD-REJ-08"] "As long as a FATAL error is active the warnings are left out of errors."
+    fault "fatal-hides-warnings" ["ERR-01", "ORD-REJ-03", "ORD-REJ-08"] "As long as a FATAL error is active the warnings are left out of errors."
+        because "ERR-01, that every active error is listed, is a recommendation; the worst of them is."
         => state(|agv, m| if agv.errors.active.iter().any(|error| error.fatal) { m.keep("errors", |error| error.says("errorLevel", "FATAL")) });
     fault "error-level-unknown" ["ERR-02", "ORD-CANCEL-19"] "Reports warnings with the level ERROR."
         => error(|_, error, m| if !error.fatal { m.set("errorLevel", "ERROR") });
-    fault "r3-map-error-level-critical" ["ERR-02"] "It reports failed map actions with the errorLevel CRITICAL."
+    fault "map-error-level-critical" ["ERR-02"] "It reports failed map actions with the errorLevel CRITICAL."
         => error(|_, error, m| if !error.fatal && refers(error, "mapVersion") { m.set("errorLevel", "CRITICAL") });
-    fault "r6-failed-action-error-level-error" ["ERR-02"] "It reports the error of a failed action with errorLevel ERROR."
+    fault "failed-action-error-level-error" ["ERR-02"] "It reports the error of a failed action with errorLevel ERROR."
         => error(|_, error, m| {
             // That of a refusal does not name the type of an action, or names the message too.
             if !error.fatal && refers(error, "actionType") && !refers(error, "topic") {
                 m.set("errorLevel", "ERROR");
             }
         });
-    fault "r2-own-error-level-missing" ["ERR-02"] "Errors of the vehicle itself have no errorLevel."
+    fault "own-error-level-missing" ["ERR-02"] "Errors of the vehicle itself have no errorLevel."
         => error(|_, error, m| if error.life == Life::WhileDefective { m.unset("errorLevel") });
     fault "references-as-map" ["BP-04", "ERR-05", "ORD-CANCEL-20"] "Gives the references of errors as one object."
         => error(|_, error, m| {
             let map = error.references.iter().map(|(key, value)| (key.clone(), json!(value)));
             m.set("errorReferences", Value::Object(map.collect()));
         });
-    fault "r1-references-named-key-value" ["BP-04", "ERR-05"] "The members of its error references are called key and value."
+    fault "references-named-key-value" ["BP-04", "ERR-05"] "The members of its error references are called key and value."
         => error(|_, _, m| m.each("errorReferences", |reference| {
             reference.rename("referenceKey", "key");
             reference.rename("referenceValue", "value");

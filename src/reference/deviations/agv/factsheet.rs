@@ -10,13 +10,13 @@ use serde_json::{Value, json};
 records! {
     fault "factsheet-without-limits" ["FACT-02", "FACT-05"] "Leaves protocolLimits out of the factsheet."
         => sending(|_, out| if out.name == "factsheet" { out.message.unset("protocolLimits") });
-    fault "r2-factsheet-without-geometry" ["FACT-02"] "The factsheet has no agvGeometry."
+    fault "factsheet-without-geometry" ["FACT-02"] "The factsheet has no agvGeometry."
         => sending(|_, out| if out.name == "factsheet" { out.message.unset("agvGeometry") });
     fault "factsheet-kinematics-unknown" ["FACT-03", "JSON-02"] "Gives DIFFERENTIAL as its kinematics."
         => factsheet(|_, m| m.part("typeSpecification", |t| t.set("agvKinematic", "DIFFERENTIAL")));
-    fault "r1-class-unknown" ["FACT-03"] "Its factsheet gives its agvClass as AMR."
+    fault "class-unknown" ["FACT-03"] "Its factsheet gives its agvClass as AMR."
         => factsheet(|_, m| m.part("typeSpecification", |t| t.set("agvClass", "AMR")));
-    fault "r3-localization-types-as-text" ["FACT-03"] "It gives localizationTypes in the factsheet as a single string instead of an array."
+    fault "localization-types-as-text" ["FACT-03"] "It gives localizationTypes in the factsheet as a single string instead of an array."
         => factsheet(|_, m| m.part("typeSpecification", |t| t.set("localizationTypes", "NATURAL")));
     fault "factsheet-without-size" ["FACT-04", "JSON-10"] "Leaves width and length out of the factsheet."
         => factsheet(|_, m| m.part("physicalParameters", |p| {
@@ -29,7 +29,8 @@ records! {
         => factsheet(|_, m| m.part("protocolLimits", |l| l.unset("timing")));
     fault "min-state-interval-ignored" ["FACT-14"] "States a minimum interval of five seconds and does not keep it." because "FACT-14 contradicts the sending on events; its ruling leaves a warning."
         => factsheet(|_, m| timing(m, |t| t.set("minStateInterval", 5.0)));
-    fault "r6-factsheet-times-in-milliseconds" ["FACT-14", "FACT-05"] "It gives minOrderInterval and minStateInterval in milliseconds, so that its states come far more often than it promises."
+    fault "factsheet-times-in-milliseconds" ["FACT-14", "FACT-05"] "It gives minOrderInterval and minStateInterval in milliseconds, so that its states come far more often than it promises."
+        because "FACT-14 contradicts the sending on events, so that its ruling leaves a warning."
         => factsheet(|_, m| timing(m, |t| {
             // Never 0: that would promise nothing.
             let state = t.get("minStateInterval").and_then(Value::as_f64).unwrap_or_default();
@@ -39,7 +40,7 @@ records! {
         }));
     fault "own-limit-exceeded" ["FACT-11"] "States room for one action in its states and sends more."
         => factsheet(|_, m| one_action_state(m));
-    fault "r1-array-limits-nested" ["FACT-05", "JSON-10"] "Its factsheet gives the array limits of orders as nested objects and not under names with a dot."
+    fault "array-limits-nested" ["FACT-05", "JSON-10"] "Its factsheet gives the array limits of orders as nested objects and not under names with a dot."
         => factsheet(|agv, m| {
             let nodes = agv.config.max_nodes;
             let nested = json!({
@@ -53,7 +54,7 @@ records! {
         => factsheet(|_, m| m.part("protocolFeatures", |f| f.unset("optionalParameters")));
     fault "factsheet-support-yes" ["FACT-06"] "Says YES where the support of a parameter is asked for."
         => factsheet(|_, m| m.part("protocolFeatures", |f| f.each("optionalParameters", |p| p.set("support", "YES"))));
-    fault "r2-optional-parameters-as-names" ["FACT-06"] "optionalParameters of the factsheet is a plain list of names."
+    fault "optional-parameters-as-names" ["FACT-06"] "optionalParameters of the factsheet is a plain list of names."
         => factsheet(|_, m| m.part("protocolFeatures", |f| {
             f.list("optionalParameters").iter_mut().for_each(|parameter| *parameter = parameter["parameter"].take());
         }));
@@ -73,17 +74,17 @@ records! {
         => factsheet(|_, m| offer(m, "finePositioning", "INSTANT"));
     fault "charging-on-edges" ["ACT-09"] "Declares startCharging as an action for edges."
         => factsheet(|_, m| offer(m, "startCharging", "EDGE"));
-    fault "r6-factsheet-all-scopes-for-all" ["ACT-09"] "It lists every action in the factsheet with the scopes INSTANT, NODE and EDGE."
+    fault "factsheet-all-scopes-for-all" ["ACT-09"] "It lists every action in the factsheet with the scopes INSTANT, NODE and EDGE."
         => factsheet(|_, m| actions(m, |a| a.set("actionScopes", json!(["INSTANT", "NODE", "EDGE"]))));
     fault "factsheet-scope-lower-case" ["FACT-07", "JSON-02"] "Spells the scopes of its actions in lower case."
         => factsheet(|_, m| actions(m, |a| a.list("actionScopes").iter_mut().for_each(lower_case)));
-    fault "r1-scopes-in-one-text" ["FACT-07", "JSON-06"] "Its factsheet gives the scopes of an action as one text with commas."
+    fault "scopes-in-one-text" ["FACT-07", "JSON-06"] "Its factsheet gives the scopes of an action as one text with commas."
         => factsheet(|_, m| actions(m, |a| {
             let scopes: Vec<&str> = a.get("actionScopes").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
             let scopes = scopes.join(",");
             a.set("actionScopes", scopes);
         }));
-    fault "r2-blocking-types-lower-case" ["FACT-07", "JSON-02"] "The factsheet gives the blockingTypes of the actions in lower case."
+    fault "blocking-types-lower-case" ["FACT-07", "JSON-02"] "The factsheet gives the blockingTypes of the actions in lower case."
         => factsheet(|_, m| actions(m, |a| a.list("blockingTypes").iter_mut().for_each(lower_case)));
     fault "pick-parameter-renamed" ["ACT-06"] "Calls the station type of a pick station_type in its factsheet."
         => factsheet(|_, m| actions(m, |a| if a.text("actionType") == "pick" {
@@ -91,7 +92,7 @@ records! {
         }));
     fault "parameter-type-unknown" ["BP-05", "FACT-07", "JSON-02"] "Calls the type of its parameters DOUBLE."
         => factsheet(|_, m| actions(m, |a| a.each("actionParameters", |p| p.set("valueDataType", "DOUBLE"))));
-    fault "r6-factsheet-parameter-type-float" ["FACT-07"] "It gives the numeric parameters in the factsheet the valueDataType FLOAT64."
+    fault "factsheet-parameter-type-float" ["FACT-07"] "It gives the numeric parameters in the factsheet the valueDataType FLOAT64."
         => factsheet(|_, m| actions(m, |a| a.each("actionParameters", |p| if matches!(p.text("valueDataType"), "FLOAT" | "NUMBER") {
             p.set("valueDataType", "FLOAT64");
         })));
@@ -104,7 +105,7 @@ records! {
                 std::mem::swap(second, third);
             }
         })));
-    fault "r1-envelope-unnamed" ["FACT-08"] "The envelope in its factsheet has no name of its set."
+    fault "envelope-unnamed" ["FACT-08"] "The envelope in its factsheet has no name of its set."
         => factsheet(|_, m| m.part("agvGeometry", |g| g.each("envelopes2d", |envelope| envelope.unset("set"))));
     fault "load-set-without-type" ["FACT-09", "JSON-10"] "Leaves the type of the load out of its load sets."
         => factsheet(|_, m| m.part("loadSpecification", |l| l.each("loadSets", |set| set.unset("loadType"))));
@@ -113,11 +114,11 @@ records! {
 
     fault "versions-numeric" ["FACT-10", "JSON-06"] "Gives its software version as a number."
         => factsheet(|_, m| m.part("vehicleConfig", |c| c.each("versions", |version| version.set("value", 1.0))));
-    fault "r1-versions-as-map" ["FACT-10"] "Its factsheet gives its versions as one object and not as a list of keys and values."
+    fault "versions-as-map" ["FACT-10"] "Its factsheet gives its versions as one object and not as a list of keys and values."
         => factsheet(|_, m| m.part("vehicleConfig", |c| c.change("versions", |versions| {
             *versions = json!({ "softwareVersion": versions[0]["value"] });
         })));
-    fault "r3-address-changes" ["FACT-10"] "It states another localIpAddress in each factsheet although it stays in operation."
+    fault "address-changes" ["FACT-10"] "It states another localIpAddress in each factsheet although it stays in operation."
         => factsheet(|agv, m| {
             let address = format!("10.1.0.{}", 20 + agv.states_sent % 200);
             m.part("vehicleConfig", |c| c.set("network", json!({

@@ -39,27 +39,26 @@ use std::time::Duration;
 records! {
     fault "state-request-listed-refused" ["FACT-07", "ACT-26"] "Does not understand stateRequest although its factsheet lists it."
         => forbidding(|_, what| matches!(what, Permission::Fit(kind) if kind.deed == Deed::StateRequest));
-    fault "r2-log-report-listed-refused" ["FACT-07", "ACT-01"] "logReport is listed in the factsheet and FAILED as unknown when it is sent."
+    fault "log-report-listed-refused" ["FACT-07", "ACT-01"] "logReport is listed in the factsheet and FAILED as unknown when it is sent."
         => forbidding(|_, what| matches!(what, Permission::Fit(kind) if kind.deed == Deed::LogReport));
-    fault "r1-instant-scope-unchecked" ["ACT-10"] "It performs an action as an instant action that is for nodes only, such as pick."
+    fault "instant-scope-unchecked" ["ACT-10"] "It performs an action as an instant action that is for nodes only, such as pick."
         => letting(|_, what| matches!(what, Permission::Fit(_)));
-    fault "r1-semiautomatic-instant-refused" ["MODE-02"] "In SEMIAUTOMATIC it takes orders but reports every instant action FAILED."
+    fault "semiautomatic-instant-refused" ["MODE-02"] "In SEMIAUTOMATIC it takes orders but reports every instant action FAILED."
         => forbidding(|agv, what| matches!(what, Permission::Fit(_)) && agv.mode == Mode::Semiautomatic);
-    fault "r4-warning-blocks-instant-actions" ["ERR-03", "IACT-05"] "It answers every instant action with FAILED as long as a warning is in its errors."
+    fault "warning-blocks-instant-actions" ["ERR-03", "IACT-05"] "It answers every instant action with FAILED as long as a warning is in its errors."
         => forbidding(|agv, what| matches!(what, Permission::Fit(_)) && !agv.errors.is_empty());
-    fault "r2-init-position-without-node-taken" ["ACT-25", "ACT-24"] "initPosition without lastNodeId is FINISHED and clears lastNodeId."
+    fault "init-position-without-node-taken" ["ACT-25", "ACT-24"] "initPosition without lastNodeId is FINISHED and clears lastNodeId."
+        because "The ruling of ACT-25 fails an unknown map and a missing parameter only; that nobody can know the node is warned of."
         => forbidding(|_, what| matches!(what, Permission::RefuseInstant(action) if is(action, Deed::InitPosition) && action.request.parameter("lastNodeId").is_none()));
-    fault "r2-bad-parameter-instant-finished" ["IACT-06", "ACT-25"] "An instant action with a missing or wrong parameter is FINISHED although nothing was done."
+    fault "bad-parameter-instant-finished" ["IACT-06", "ACT-25"] "An instant action with a missing or wrong parameter is FINISHED although nothing was done."
         => unrefused(|agv, action| {
             let fit = action.kind.filter(|kind| kind.scopes.contains(&Scope::Instant));
             fit.is_some_and(|kind| action_kinds::refusal(kind, &action.request, &agv.config, false).is_some())
         });
     fault "unknown-instant-finished" ["IACT-04", "IACT-06"] "Reports an instant action it does not know as FINISHED."
         => unrefused(|_, action| is_unfit(action));
-    fault "unknown-instant-waits" ["IACT-06"] "Leaves an instant action it does not know WAITING for ever."
+    fault "unknown-instant-waits" ["IACT-06", "IACT-04"] "Leaves an instant action it does not know WAITING for ever."
         => waiting(|_, action| is_unfit(action));
-    fault "r1-unknown-instant-waits" ["IACT-06", "IACT-04"] "An instant action that it does not know stays WAITING for ever."
-        => waiting(|_, action| action.kind.is_none());
     fault "malformed-instant-deafens" ["IACT-03"] "Takes no instant actions any more once one of them was malformed."
         => keep::<bool>()
             .happens(|deaf, _, event| *deaf = match event {
@@ -85,7 +84,7 @@ records! {
         => batch(|agv, _| agv.actions.retain(|action| action.of_order() || !action.status.is_terminal()));
     fault "only-first-instant-action" ["IACT-07", "IACT-03"] "Performs only the first action of an instantActions message."
         => batch(|_, actions| actions.truncate(1));
-    fault "r2-same-type-in-message-dropped" ["IACT-07", "IACT-03"] "Of several actions of one type in an instantActions message only the first is taken."
+    fault "same-type-in-message-dropped" ["IACT-07", "IACT-03"] "Of several actions of one type in an instantActions message only the first is taken."
         => batch(|_, actions| {
             let mut types: Vec<&Value> = Vec::new();
             actions.retain(|action| {
@@ -95,23 +94,23 @@ records! {
                 !again
             });
         });
-    fault "r1-batch-ends-at-failure" ["IACT-07", "IACT-03"] "It drops the rest of an instantActions message behind an action that has failed."
+    fault "batch-ends-at-failure" ["IACT-07", "IACT-03"] "It drops the rest of an instantActions message behind an action that has failed."
         => ending_batch(|_| true);
-    fault "r4-unknown-action-ends-the-message" ["IACT-07", "IACT-03"] "It stops reading an instantActions message at an action that it does not know, so that the following ones get no state."
+    fault "unknown-action-ends-the-message" ["IACT-07", "IACT-03"] "It stops reading an instantActions message at an action that it does not know, so that the following ones get no state."
         => ending_batch(|action| action.kind.is_none());
-    fault "r2-rejection-cleared-by-instant-action" ["ORD-REJ-03", "ORD-REJ-08"] "Any instantActions message clears the warnings of rejected orders."
+    fault "rejection-cleared-by-instant-action" ["ORD-REJ-03", "ORD-REJ-08"] "Any instantActions message clears the warnings of rejected orders."
         => batch(|agv, actions| if !actions.is_empty() { agv.errors.forget_refusals() });
-    fault "r2-acknowledges-on-instant-actions" ["TOPIC-15"] "The vehicle answers every instantActions message with an empty message of its own on the same topic."
+    fault "acknowledges-on-instant-actions" ["TOPIC-15"] "The vehicle answers every instantActions message with an empty message of its own on the same topic."
         => batch(|agv, actions| if !actions.is_empty() { acknowledge(agv) });
     fault "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete."
         => deferring(|agv, action| agv.is_busy() && !is(action, Deed::CancelOrder));
-    fault "r1-instant-actions-wait-for-pause" ["IACT-05"] "While it is paused it holds back instant actions until the pause is lifted."
+    fault "instant-actions-wait-for-pause" ["IACT-05"] "While it is paused it holds back instant actions until the pause is lifted."
         => deferring(|agv, action| agv.holds.pause && !is_urgent(action));
-    fault "r2-instant-waits-for-running-action" ["IACT-05"] "As long as an action of the order is under way instant actions wait, except pause and cancelOrder."
+    fault "instant-waits-for-running-action" ["IACT-05"] "As long as an action of the order is under way instant actions wait, except pause and cancelOrder."
         => deferring(|agv, action| is_acting(agv) && !is_urgent(action));
-    fault "r3-instant-waits-for-download" ["IACT-05"] "It leaves instant actions WAITING until a map download under way has ended."
+    fault "instant-waits-for-download" ["IACT-05"] "It leaves instant actions WAITING until a map download under way has ended."
         => deferring(|agv, action| !agv.downloads.is_idle() && !is_urgent(action));
-    fault "r6-instant-action-waits-for-hard-action" ["IACT-05", "IACT-04"] "It holds instant actions back until a running HARD node action has ended."
+    fault "instant-action-waits-for-hard-action" ["IACT-05", "IACT-04"] "It holds instant actions back until a running HARD node action has ended."
         => deferring(|agv, _| {
             let hard = |action: &Action| matches!(action.origin, Origin::Node(_)) && action.request.blocking == Blocking::Hard;
             agv.actions.iter().any(|action| hard(action) && action.status.is_active())
@@ -124,7 +123,7 @@ records! {
                 agv.flush();
             }
         });
-    fault "r4-drops-message-right-after-another" ["IACT-03", "IACT-05"] "It has one receive buffer, so that an instantActions message that comes within 100 ms after an order is lost."
+    fault "drops-message-right-after-another" ["IACT-03", "IACT-05"] "It has one receive buffer, so that an instantActions message that comes within 100 ms after an order is lost."
         => keep::<Option<Moment>>().hears(|before, agv, name, _| {
             if name == "order" {
                 *before = Some(agv.moment());
@@ -147,20 +146,20 @@ records! {
             Outcome::Done(result) if !action.of_order() => stays_running(agv, action, result),
             other => other,
         });
-    liberty "r3-batch-reversed" ["IACT-07"] "It performs the actions of one instantActions message from the last to the first."
+    liberty "batch-reversed" ["IACT-07"] "It performs the actions of one instantActions message from the last to the first."
         => batch(|_, actions| actions.reverse());
-    liberty "r2-unreadable-instant-ignored" ["IACT-03"] "The vehicle ignores an instantActions message that is not JSON or has no array of actions, without an error."
+    liberty "unreadable-instant-ignored" ["IACT-03"] "The vehicle ignores an instantActions message that is not JSON or has no array of actions, without an error."
         => raising(|_, cause, _| !matches!(cause, Cause::Unreadable(reason) if reason.starts_with("the message")));
-    liberty "r1-refused-instant-without-error" ["IACT-06"] "It reports an instant action that it cannot perform FAILED without an error."
+    liberty "refused-instant-without-error" ["IACT-06"] "It reports an instant action that it cannot perform FAILED without an error."
         => keep::<bool>()
             .allows(|_, _, what, usual| usual && !matches!(what, Permission::BeginInstant(action) if is_unfit(action)))
             .raises(|_, agv, cause, _| match cause {
                 Cause::Failure(Some(action)) => action.of_order() || !was_refused(agv, action),
                 _ => true,
             });
-    liberty "r2-init-position-takes-time" ["ACT-23", "ACT-41"] "initPosition is RUNNING for a moment before the pose is taken over."
+    liberty "init-position-takes-time" ["ACT-23", "ACT-41"] "initPosition is RUNNING for a moment before the pose is taken over."
         => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Deed::InitPosition)));
-    liberty "r2-map-actions-take-time" ["MAP-24", "MAP-29", "ACT-41"] "enableMap and deleteMap are RUNNING for a moment before the maps change."
+    liberty "map-actions-take-time" ["MAP-24", "MAP-29", "ACT-41"] "enableMap and deleteMap are RUNNING for a moment before the maps change."
         => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Deed::EnableMap) || is(action, Deed::DeleteMap)));
 }
 

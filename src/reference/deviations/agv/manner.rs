@@ -28,27 +28,27 @@ records! {
         => saying(|_, m| m.add("errors", worn_brush()));
     liberty "warning-comes-and-goes" ["ERR-01", "STATE-05"] "Reports a warning of its own in every other state."
         => saying(|agv, m| if is_even(agv) { m.add("errors", worn_brush()) });
-    liberty "r2-information-comes-and-goes" ["INFO-01"] "An information entry of level DEBUG is in every other state."
+    liberty "information-comes-and-goes" ["INFO-01"] "An information entry of level DEBUG is in every other state."
         => saying(|agv, m| if is_even(agv) {
             let references = json!([{ "referenceKey": "cycle", "referenceValue": "12 ms" }]);
             m.add("information", json!({ "infoType": "load", "infoLevel": "DEBUG", "infoReferences": references, "infoDescription": "the control was busy" }));
         });
-    liberty "r4-information-in-every-state" ["STATE-11", "INFO-01"] "It puts an information entry with changing values into every state."
+    liberty "information-in-every-state" ["STATE-11", "INFO-01"] "It puts an information entry with changing values into every state."
         => saying(|_, m| {
             let count = m.get("headerId").cloned().unwrap_or_default();
             m.add("information", json!({ "infoType": "cycleCounter", "infoLevel": "DEBUG", "infoDescription": format!("cycle {count}") }));
         });
-    liberty "r1-action-states-reversed" ["STATE-MSG-09"] "It lists its action states with the newest first."
+    liberty "action-states-reversed" ["STATE-MSG-09"] "It lists its action states with the newest first."
         => saying(|_, m| m.list("actionStates").reverse());
-    liberty "r1-errors-newest-first" ["ERR-01"] "It lists its errors with the newest first."
+    liberty "errors-newest-first" ["ERR-01"] "It lists its errors with the newest first."
         => saying(|_, m| m.list("errors").reverse());
-    liberty "r1-maps-reversed" ["MAP-12"] "It lists its maps with the newest first."
+    liberty "maps-reversed" ["MAP-12"] "It lists its maps with the newest first."
         => saying(|_, m| m.list("maps").reverse());
-    liberty "r2-errors-in-own-language" ["JSON-03", "ERR-02"] "The errorDescription of every error is in another language, with letters and signs beyond ASCII."
+    liberty "errors-in-own-language" ["JSON-03", "ERR-02"] "The errorDescription of every error is in another language, with letters and signs beyond ASCII."
         => saying(|_, m| m.each("errors", |error| error.set("errorDescription", "Störung – bitte Gerät prüfen (故障)")));
-    liberty "r2-error-hints-given" ["ERR-02"] "Every error has an errorHint."
+    liberty "error-hints-given" ["ERR-02"] "Every error has an errorHint."
         => saying(|_, m| m.each("errors", |error| error.set("errorHint", "see the manual, section 7")));
-    liberty "r2-vendor-references" ["BP-02", "ERR-05"] "Every error begins its errorReferences with a key of the vendor."
+    liberty "vendor-references" ["BP-02", "ERR-05"] "Every error begins its errorReferences with a key of the vendor."
         => saying(|_, m| m.each("errors", |error| {
             let own = json!({ "referenceKey": "vendorCode", "referenceValue": "E-17" });
             match error.get_mut("errorReferences") {
@@ -57,48 +57,48 @@ records! {
                 None => error.set("errorReferences", json!([own])),
             }
         }));
-    liberty "r1-errors-undescribed" ["ERR-02"] "Its errors have no errorDescription."
+    liberty "errors-undescribed" ["ERR-02"] "Its errors have no errorDescription."
         => saying(|_, m| m.each("errors", |error| error.unset("errorDescription")));
-    liberty "r1-references-reversed" ["ERR-05", "BP-02"] "It lists what is wrong before the message in its error references."
+    liberty "references-reversed" ["ERR-05", "BP-02"] "It lists what is wrong before the message in its error references."
         => saying(|_, m| m.each("errors", |error| error.list("errorReferences").reverse()));
-    liberty "r1-empty-references-omitted" ["ERR-05", "ERR-02"] "Errors without references have no errorReferences."
+    liberty "empty-references-omitted" ["ERR-05", "ERR-02"] "Errors without references have no errorReferences."
         => saying(|_, m| m.each("errors", |error| if error.says("errorReferences", json!([])) {
             error.unset("errorReferences");
         }));
-    liberty "r1-action-type-omitted" ["STATE-MSG-14"] "Its action states have no actionType."
+    liberty "action-type-omitted" ["STATE-MSG-14"] "Its action states have no actionType."
         => saying(|_, m| m.each("actionStates", |action| action.unset("actionType")));
-    liberty "r3-results-empty" ["STATE-MSG-12"] "It gives every action state without a result an empty resultDescription."
+    liberty "results-empty" ["STATE-MSG-12"] "It gives every action state without a result an empty resultDescription."
         => saying(|_, m| m.each("actionStates", |action| {
             action.entry("resultDescription").or_insert_with(|| json!(""));
         }));
-    liberty "r1-results-everywhere" ["STATE-MSG-12"] "Every finished action has a resultDescription."
+    liberty "results-everywhere" ["STATE-MSG-12"] "Every finished action has a resultDescription."
         => saying(|_, m| m.each("actionStates", |action| if action.says("actionStatus", "FINISHED") {
             action.entry("resultDescription").or_insert_with(|| json!("done"));
         }));
-    liberty "r1-node-position-omitted" ["STATE-MSG-13"] "It does not repeat the nodePosition of the order in its node states."
+    liberty "node-position-omitted" ["STATE-MSG-13"] "It does not repeat the nodePosition of the order in its node states."
         => saying(|_, m| m.each("nodeStates", |node| node.unset("nodePosition")));
-    liberty "r1-route-described" ["STATE-MSG-13"] "Its node and edge states have descriptions."
+    liberty "route-described" ["STATE-MSG-13"] "Its node and edge states have descriptions."
         => saying(|_, m| {
             m.each("nodeStates", |node| node.set("nodeDescription", "as it is called in the vehicle"));
             m.each("edgeStates", |edge| edge.set("edgeDescription", "as it is called in the vehicle"));
         });
-    liberty "r3-maps-described" ["MAP-12"] "It gives every entry of maps a mapDescription."
+    liberty "maps-described" ["MAP-12"] "It gives every entry of maps a mapDescription."
         => saying(|_, m| m.each("maps", |map| map.set("mapDescription", "as drawn in spring")));
-    liberty "r3-new-base-only-when-wanted" ["STATE-16"] "It sends newBaseRequest only when it is true."
+    liberty "new-base-only-when-wanted" ["STATE-16"] "It sends newBaseRequest only when it is true."
         => saying(|_, m| if m.says("newBaseRequest", false) {
             m.unset("newBaseRequest");
         });
-    liberty "r4-optional-state-fields-left-out" ["STATE-MSG-01", "STATE-MSG-06"] "It leaves out the optional fields velocity, loads, information and newBaseRequest in all states."
+    liberty "optional-state-fields-left-out" ["STATE-MSG-01", "STATE-MSG-06"] "It leaves out the optional fields velocity, loads, information and newBaseRequest in all states."
         => saying(|_, m| ["velocity", "loads", "information", "newBaseRequest"].into_iter().for_each(|key| m.unset(key)));
-    liberty "r1-battery-minimal" ["STATE-MSG-15"] "Its batteryState consists of batteryCharge and charging."
+    liberty "battery-minimal" ["STATE-MSG-15"] "Its batteryState consists of batteryCharge and charging."
         => saying(|_, m| m.part("batteryState", |battery| battery.retain(|key, _| key == "batteryCharge" || key == "charging")));
-    liberty "r1-information-omitted" ["INFO-01", "STATE-MSG-01"] "It sends no information at all."
+    liberty "information-omitted" ["INFO-01", "STATE-MSG-01"] "It sends no information at all."
         => saying(|_, m| m.unset("information"));
-    liberty "r1-new-base-never-requested" ["STATE-16"] "It does not send newBaseRequest."
+    liberty "new-base-never-requested" ["STATE-16"] "It does not send newBaseRequest."
         => saying(|_, m| m.unset("newBaseRequest"));
-    liberty "r1-loads-undetermined" ["STATE-MSG-06"] "It cannot determine its load and never sends loads."
+    liberty "loads-undetermined" ["STATE-MSG-06"] "It cannot determine its load and never sends loads."
         => saying(|_, m| m.unset("loads"));
-    liberty "r2-loads-minimal" ["STATE-MSG-07"] "The loads name only loadId and loadType; the only load position, the dimensions and the weight are left out."
+    liberty "loads-minimal" ["STATE-MSG-07"] "The loads name only loadId and loadType; the only load position, the dimensions and the weight are left out."
         => saying(|_, m| m.each("loads", |load| load.retain(|key, _| key == "loadId" || key == "loadType")));
     liberty "descriptions-everywhere" ["STATE-MSG-14"] "Describes every action in its states."
         => saying(|_, m| m.each("actionStates", |action| action.set("actionDescription", "as the vehicle understands it")));
@@ -117,11 +117,11 @@ records! {
         });
     liberty "optional-omitted" ["OPT-03"] "Leaves what it need not say out of its states."
         => saying(|_, m| ["velocity", "distanceSinceLastNode"].into_iter().for_each(|key| m.unset(key)));
-    liberty "r2-position-minimal" ["STATE-MSG-05"] "agvPosition holds only what it must hold, no localizationScore."
+    liberty "position-minimal" ["STATE-MSG-05"] "agvPosition holds only what it must hold, no localizationScore."
         => wording(|_, m| m.part("agvPosition", |pose| {
             pose.retain(|key, _| matches!(key.as_str(), "positionInitialized" | "x" | "y" | "theta" | "mapId"));
         }));
-    liberty "r2-visualization-without-velocity" ["VIS-01"] "The visualization tells the position but no velocity."
+    liberty "visualization-without-velocity" ["VIS-01"] "The visualization tells the position but no velocity."
         => wording(|name, m| if name == "visualization" { m.unset("velocity") });
     liberty "angles-rounded" ["JSON-06", "MAP-02"] "Writes its angles with four digits behind the point."
         => wording(|_, m| m.part("agvPosition", |pose| number(pose, "theta", |angle| (angle * 10_000.0).round() / 10_000.0)));
@@ -148,13 +148,13 @@ records! {
         => plain().writes(|_, _, text| written(text, Hand::Exponents));
     liberty "many-digits" ["JSON-06"] "Writes its coordinates with all the digits it computes."
         => plain().writes(|_, _, text| written(text, Hand::ManyDigits));
-    liberty "r3-states-retained" ["MQTT-07", "STATE-01"] "It publishes its states with the retain flag."
+    liberty "states-retained" ["MQTT-07", "STATE-01"] "It publishes its states with the retain flag."
         => sending(|_, outgoing| outgoing.retain |= outgoing.name == "state");
-    liberty "r3-header-id-wraps" ["HDR-02"] "It starts its headerIds a little below 4294967295 and goes on with 0 behind it."
+    liberty "header-id-wraps" ["HDR-02"] "It starts its headerIds a little below 4294967295 and goes on with 0 behind it."
         => header(|_, _, m| begin_at(m, u32::MAX - 12));
-    liberty "r1-header-id-starts-high" ["HDR-02"] "Its headerIds begin at 70000 on every topic."
+    liberty "header-id-starts-high" ["HDR-02"] "Its headerIds begin at 70000 on every topic."
         => header(|_, _, m| begin_at(m, 70_000));
-    liberty "r3-clock-ahead" ["HDR-03"] "Its clock is one and a half seconds ahead."
+    liberty "clock-ahead" ["HDR-03"] "Its clock is one and a half seconds ahead."
         => header(|agv, _, m| {
             let ahead = agv.now.utc.checked_add(jiff::SignedDuration::from_millis(1_500));
             m.set("timestamp", format!("{:.2}", ahead.unwrap_or(agv.now.utc)));

@@ -17,7 +17,7 @@ records! {
         => failed(Deed::EnableMap, |agv, _| agv.maps.all.iter_mut().for_each(|map| map.enabled = false));
     fault "enable-unknown-finished" ["MAP-25"] "Reports enableMap FINISHED for a map it does not have."
         => fails_unseen(Deed::EnableMap);
-    fault "r4-enable-unknown-version-takes-latest" ["MAP-25"] "It enables the latest version on board and reports FINISHED when enableMap names a version that does not exist."
+    fault "enable-unknown-version-takes-latest" ["MAP-25"] "It enables the latest version on board and reports FINISHED when enableMap names a version that does not exist."
         => instead(Deed::EnableMap, |agv, action| {
             let latest = agv.maps.all.iter().rev().find(|map| map.map_id == action.text("mapId"));
             let latest = latest.filter(|_| !known(agv, action)).map(|map| map.map_version.clone())?;
@@ -31,16 +31,16 @@ records! {
         });
     fault "enable-without-effect" ["MAP-24"] "Reports enableMap FINISHED and enables nothing."
         => instead(Deed::EnableMap, |agv, action| known(agv, action).then_some(Outcome::Done(None)));
-    fault "r3-enable-on-node-without-effect" ["MAP-24", "ACT-01"] "It reports enableMap on a node of an order FINISHED without enabling the map."
+    fault "enable-on-node-without-effect" ["MAP-24", "ACT-01"] "It reports enableMap on a node of an order FINISHED without enabling the map."
         => instead(Deed::EnableMap, |agv, action| (action.of_order() && known(agv, action)).then_some(Outcome::Done(None)));
-    fault "r2-enable-ignored-mid-order" ["MAP-24"] "enableMap during an order is FINISHED without any effect on the maps."
+    fault "enable-ignored-mid-order" ["MAP-24"] "enableMap during an order is FINISHED without any effect on the maps."
         => instead(Deed::EnableMap, |agv, action| (known(agv, action) && has_work(agv)).then_some(Outcome::Done(None)));
-    fault "r3-enable-twice-fails" ["ACT-11"] "It reports enableMap FAILED when the map is enabled already."
+    fault "enable-twice-fails" ["ACT-11"] "It reports enableMap FAILED when the map is enabled already."
         => instead(Deed::EnableMap, |agv, action| {
             let enabled = agv.maps.is_enabled(action.text("mapId"), action.text("mapVersion"));
             enabled.then(|| Outcome::Failed(Problem::map(action, "the map is enabled already")))
         });
-    fault "r1-enable-in-two-states" ["MAP-24"] "On enableMap it first disables all versions of the map, reports that, and enables the wanted one in the next state."
+    fault "enable-in-two-states" ["MAP-24"] "On enableMap it first disables all versions of the map, reports that, and enables the wanted one in the next state."
         => instead(Deed::EnableMap, |agv, action| {
             if known(agv, action) {
                 agv.maps.all.iter_mut().filter(|map| is_of(map, action)).for_each(|map| map.enabled = false);
@@ -66,9 +66,9 @@ records! {
         => succeeded(Deed::EnableMap, |agv, action| {
             agv.maps.all.iter_mut().filter(|map| !is_of(map, action)).for_each(|map| map.enabled = false);
         });
-    fault "r2-enable-removes-old-version" ["MAP-31", "MAP-24"] "Enabling a version removes the other versions of that map."
+    fault "enable-removes-old-version" ["MAP-31", "MAP-24"] "Enabling a version removes the other versions of that map."
         => succeeded(Deed::EnableMap, purge);
-    fault "r4-map-enabled-during-drive-changes-nothing-until-idle" ["MAP-24", "STATE-10"] "It reports enableMap FINISHED during an order, but changes the maps only after the order has ended."
+    fault "map-enabled-during-drive-changes-nothing-until-idle" ["MAP-24", "STATE-10"] "It reports enableMap FINISHED during an order, but changes the maps only after the order has ended."
         => keep::<Option<(String, String)>>()
             .does(|later, agv, action| {
                 let waits = is(action, Deed::EnableMap) && known(agv, action) && has_work(agv);
@@ -92,7 +92,7 @@ records! {
             Outcome::Failed(problem) if problem.reason == "the map is not on board" => Outcome::Done(None),
             other => other,
         });
-    fault "r3-used-map-deletion-finished" ["MAP-32"] "It reports deleteMap FINISHED for the map in use, although it keeps the map."
+    fault "used-map-deletion-finished" ["MAP-32"] "It reports deleteMap FINISHED for the map in use, although it keeps the map."
         => after(Deed::DeleteMap, |_, _, outcome| match outcome {
             Outcome::Failed(problem) if problem.reason == "the map is in use" => Outcome::Done(None),
             other => other,
@@ -104,9 +104,9 @@ records! {
         });
     fault "used-map-deleted" ["MAP-32"] "Deletes the map it drives on."
         => instead(Deed::DeleteMap, |agv, action| Some(delete(agv, action, |_, _| false)));
-    fault "r1-map-of-order-deleted" ["MAP-32"] "It deletes an enabled map that the rest of its order needs, as it stands on another one."
+    fault "map-of-order-deleted" ["MAP-32"] "It deletes an enabled map that the rest of its order needs, as it stands on another one."
         => instead(Deed::DeleteMap, |agv, action| Some(delete(agv, action, |agv, id| here(agv) == id)));
-    fault "r2-current-map-deleted-when-idle" ["MAP-32", "MAP-11"] "Without an order the vehicle deletes the very map it stands on."
+    fault "current-map-deleted-when-idle" ["MAP-32", "MAP-11"] "Without an order the vehicle deletes the very map it stands on."
         => instead(Deed::DeleteMap, |agv, action| {
             let idle = !has_work(agv);
             idle.then(|| delete(agv, action, |_, _| false))
@@ -123,18 +123,18 @@ records! {
                 }
                 outcome
             });
-    fault "r1-delete-takes-newest" ["MAP-31", "MAP-33"] "A deleteMap for a version it does not have removes the newest disabled version of that map."
+    fault "delete-takes-newest" ["MAP-31", "MAP-33"] "A deleteMap for a version it does not have removes the newest disabled version of that map."
         => instead(Deed::DeleteMap, |agv, action| {
             let newest = agv.maps.all.iter().rposition(|map| is_of(map, action) && !map.enabled);
             let newest = newest.filter(|_| !known(agv, action))?;
             agv.maps.all.remove(newest);
             Some(Outcome::Done(None))
         });
-    fault "r1-delete-takes-all-versions" ["MAP-31", "MAP-29"] "A deleteMap removes all disabled versions of the mapId and not only the one it names."
+    fault "delete-takes-disabled-versions" ["MAP-31", "MAP-29"] "A deleteMap removes all disabled versions of the mapId and not only the one it names."
         => succeeded(Deed::DeleteMap, purge);
     fault "delete-takes-all-versions" ["MAP-31", "MAP-29"] "Deletes every version of a map when one is to be deleted."
         => succeeded(Deed::DeleteMap, |agv, action| agv.maps.all.retain(|map| !is_of(map, action)));
-    fault "r3-deleted-map-back-after-reconnect" ["MAP-29"] "It lists a deleted map again after the connection was broken and restored."
+    fault "deleted-map-back-after-reconnect" ["MAP-29"] "It lists a deleted map again after the connection was broken and restored."
         => keep::<Vec<(String, String)>>()
             .ends(|deleted, _, action, outcome| {
                 if is(action, Deed::DeleteMap) && matches!(outcome, Outcome::Done(_)) {
@@ -158,7 +158,7 @@ records! {
         });
     fault "duplicate-map-accepted" ["MAP-23"] "Downloads a map again that it has."
         => plain().allows(|(), _, what, usual| usual || matches!(what, Permission::DownloadAgain));
-    fault "r1-other-version-refused" ["MAP-18", "MAP-07"] "It refuses to download a new version of a map as a duplicate because it has another version."
+    fault "other-version-refused" ["MAP-18", "MAP-07"] "It refuses to download a new version of a map as a duplicate because it has another version."
         => instead(Deed::DownloadMap, |agv, action| {
             let other = agv.maps.on_board(action.text("mapId"));
             other.then(|| Outcome::Failed(Problem::map(action, "the map is on board already")))
@@ -189,7 +189,7 @@ records! {
             let brought = agv.maps.all.iter_mut().filter(|map| is_of(map, action) && map.map_version == action.text("mapVersion"));
             brought.for_each(|map| map.enabled = true);
         });
-    fault "r6-first-version-enabled-at-once" ["MAP-20"] "It enables a downloaded map at once when no other version of this mapId is on board."
+    fault "first-version-enabled-at-once" ["MAP-20"] "It enables a downloaded map at once when no other version of this mapId is on board."
         => succeeded(Deed::DownloadMap, |agv, action| {
             if agv.maps.all.iter().filter(|map| is_of(map, action)).count() == 1 {
                 agv.maps.all.iter_mut().filter(|map| is_of(map, action)).for_each(|map| map.enabled = true);
@@ -227,7 +227,7 @@ records! {
             }
             other => other,
         });
-    fault "r1-download-failure-hangs" ["MAP-19", "IACT-04"] "A downloadMap that did not succeed keeps its status for ever."
+    fault "download-failure-hangs" ["MAP-19", "IACT-04"] "A downloadMap that did not succeed keeps its status for ever."
         => after(Deed::DownloadMap, |agv, action, outcome| match outcome {
             Outcome::Failed(_) if under_way(action) => {
                 if let Some(action) = agv.actions.get_mut(&action.request.id) {
@@ -237,13 +237,13 @@ records! {
             }
             other => other,
         });
-    fault "r2-broken-download-listed" ["MAP-19", "MAP-21"] "A map whose download failed is listed in maps all the same."
+    fault "broken-download-listed" ["MAP-19", "MAP-21"] "A map whose download failed is listed in maps all the same."
         => failed(Deed::DownloadMap, |agv, action| if under_way(action) {
             agv.maps.store(action.text("mapId"), action.text("mapVersion"));
         });
-    fault "r1-failed-download-purges" ["MAP-22", "MAP-31", "MAP-19"] "A download that fails removes the disabled versions of that map which it had before."
+    fault "failed-download-purges" ["MAP-22", "MAP-31", "MAP-19"] "A download that fails removes the disabled versions of that map which it had before."
         => failed(Deed::DownloadMap, |agv, action| if under_way(action) { purge(agv, action) });
-    fault "r3-failed-download-blocks-retry" ["MAP-18"] "It refuses to download a map once more whose download has failed before."
+    fault "failed-download-blocks-retry" ["MAP-18"] "It refuses to download a map once more whose download has failed before."
         => keep::<Vec<(String, String)>>()
             .does(|lost, _, action| {
                 let again = is(action, Deed::DownloadMap) && lost.contains(&(action.text("mapId").to_owned(), action.text("mapVersion").to_owned()));
@@ -258,7 +258,8 @@ records! {
 
     fault "state-request-unanswered" ["ACT-26"] "Reports stateRequest FINISHED only with the next periodic state." because "The next periodic state comes within the hard limit; what needs many states is not reached."
         => succeeded(Deed::StateRequest, |agv, _| unanswered(agv));
-    fault "r1-state-request-unanswered-in-pause" ["ACT-26", "IACT-05"] "While it is paused a stateRequest brings no state before the next periodic one."
+    fault "state-request-unanswered-in-pause" ["ACT-26", "IACT-05"] "While it is paused a stateRequest brings no state before the next periodic one."
+        because "The next periodic state answers within the hard limit; ACT-26 names no time."
         => succeeded(Deed::StateRequest, |agv, _| {
             agv.report.silenced = false;
             if agv.holds.pause {
@@ -267,9 +268,9 @@ records! {
         });
     fault "factsheet-request-unanswered" ["ACT-40"] "Reports factsheetRequest FINISHED and sends no factsheet."
         => instead(Deed::FactsheetRequest, |_, _| Some(Outcome::Done(None)));
-    fault "r1-factsheet-not-mid-order" ["ACT-40"] "It reports a factsheetRequest FINISHED during an order but publishes no factsheet then."
+    fault "factsheet-not-mid-order" ["ACT-40"] "It reports a factsheetRequest FINISHED during an order but publishes no factsheet then."
         => instead(Deed::FactsheetRequest, |agv, _| agv.is_busy().then_some(Outcome::Done(None)));
-    fault "r2-factsheet-only-once" ["ACT-40"] "Only the first factsheetRequest is answered; every further one is reported FINISHED without a factsheet."
+    fault "factsheet-only-once" ["ACT-40"] "Only the first factsheetRequest is answered; every further one is reported FINISHED without a factsheet."
         => keep::<bool>().does(|given, _, action| {
             let again = is(action, Deed::FactsheetRequest) && std::mem::replace(given, true);
             again.then_some(Outcome::Done(None))
@@ -306,13 +307,13 @@ records! {
             });
     fault "init-position-uninitialized" ["ACT-23"] "Reports initPosition FINISHED before it has found its pose."
         => lost(|outcome| matches!(outcome, Outcome::Done(_)));
-    fault "r3-refused-pose-loses-position" ["ACT-25"] "It reports positionInitialized false after an initPosition that it refused."
+    fault "refused-pose-loses-position" ["ACT-25"] "It reports positionInitialized false after an initPosition that it refused."
         => lost(|outcome| matches!(outcome, Outcome::Failed(_)));
-    fault "r1-init-position-enables-all" ["MAP-14"] "An initPosition enables all versions of the map it names."
+    fault "init-position-enables-all" ["MAP-14"] "An initPosition enables all versions of the map it names."
         => succeeded(Deed::InitPosition, |agv, action| {
             agv.maps.all.iter_mut().filter(|map| is_of(map, action)).for_each(|map| map.enabled = true);
         });
-    fault "r4-init-position-onto-disabled-map" ["MAP-11", "MAP-13"] "It accepts initPosition onto a map of which only a DISABLED version is on board and reports it as its mapId."
+    fault "init-position-onto-disabled-map" ["MAP-11", "MAP-13"] "It accepts initPosition onto a map of which only a DISABLED version is on board and reports it as its mapId."
         => keep::<Vec<OnboardMap>>()
             .does(|before, agv, _| {
                 before.clone_from(&agv.maps.all);
@@ -336,12 +337,12 @@ records! {
                 }
                 outcome
             });
-    fault "r1-init-position-theta-lost" ["ACT-23"] "An initPosition sets its orientation to 0, whatever theta says."
+    fault "init-position-theta-lost" ["ACT-23"] "An initPosition sets its orientation to 0, whatever theta says."
         => posed(|agv, _, _, mut pose| {
             pose.theta = 0.0;
             agv.motion.place(pose);
         });
-    fault "r3-init-position-snaps-to-node" ["ACT-23"] "It takes the position of the node lastNodeId from its layout after initPosition instead of the given x and y."
+    fault "init-position-snaps-to-node" ["ACT-23"] "It takes the position of the node lastNodeId from its layout after initPosition instead of the given x and y."
         => posed(|agv, action, _, mut pose| {
             let node = agv.config.node(action.text("lastNodeId")).filter(|node| node.map_id == pose.map_id);
             if let Some(node) = node {
@@ -349,7 +350,7 @@ records! {
                 agv.motion.place(pose);
             }
         });
-    fault "r6-init-position-keeps-map" ["ACT-23"] "It takes x, y and theta from initPosition but keeps the old mapId in agvPosition."
+    fault "init-position-keeps-map" ["ACT-23"] "It takes x, y and theta from initPosition but keeps the old mapId in agvPosition."
         => posed(|agv, _, before, mut pose| {
             pose.map_id = before.map_id;
             agv.motion.place(pose);

@@ -90,25 +90,16 @@ fn find(name: &str) -> Option<&'static Record<dyn Deviation>> {
     records().find(|record| record.name == name)
 }
 
-/// Written by somebody who has not seen the suites; they need not be found yet.
-fn is_blind(name: &str) -> bool {
-    name.as_bytes().first() == Some(&b'r') && name.as_bytes().get(2) == Some(&b'-')
-}
-
-fn faults(blind: bool) -> impl Iterator<Item = Fault> {
-    let some = records().filter(move |record| record.is_fault() && is_blind(record.name) == blind);
-    some.map(|record| Fault {
+/// Its faults and lapses.
+pub static FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| {
+    let faults = records().filter(|record| record.is_fault());
+    let faults = faults.map(|record| Fault {
         name: record.name,
         breaks: record.requirements,
         wrong: record.does,
-    })
-}
-
-/// Its faults and lapses.
-pub static FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| faults(false).collect());
-
-/// Its faults of blind rounds, which the suites need not find yet.
-pub static BLIND_FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| faults(true).collect());
+    });
+    faults.collect()
+});
 
 /// One switchable liberty of a reference device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -121,20 +112,16 @@ pub struct Tolerance {
     pub does: &'static str,
 }
 
-fn liberties(blind: bool) -> impl Iterator<Item = Tolerance> {
-    let some = records().filter(move |record| record.is_liberty() && is_blind(record.name) == blind);
-    some.map(|record| Tolerance {
+/// What it may do otherwise without breaking anything: with each, and with all that go together, no test may fail.
+pub static TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| {
+    let liberties = records().filter(|record| record.is_liberty());
+    let liberties = liberties.map(|record| Tolerance {
         name: record.name,
         under: record.requirements,
         does: record.does,
-    })
-}
-
-/// What it may do otherwise without breaking anything: with each, and with all that go together, no test may fail.
-pub static TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| liberties(false).collect());
-
-/// Liberties of blind rounds that are not all read rightly yet.
-pub static BLIND_TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| liberties(true).collect());
+    });
+    liberties.collect()
+});
 
 /// A name that is not in [`TOLERANCES`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -186,5 +173,6 @@ pub fn built(config: AgvConfig, names: &[&str]) -> Result<Agv, UnknownFault> {
     for record in names.iter().copied().chain(liberties).filter_map(find) {
         agv.switch_on((record.make)());
     }
+    agv.switch_on(super::personas::persona());
     Ok(agv)
 }

@@ -81,31 +81,31 @@ records! {
         });
     fault "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL."
         => forbidding(|_, what| matches!(what, Permission::MoveByHand));
-    fault "r3-manual-drops-action-states" ["MODE-05", "STATE-MSG-10"] "It removes the action states of its order when it is switched to MANUAL instead of reporting them FAILED."
+    fault "manual-drops-action-states" ["MODE-05", "STATE-MSG-10"] "It removes the action states of its order when it is switched to MANUAL instead of reporting them FAILED."
         => when(Event::GivenUpForMode(Mode::Manual), |agv| agv.actions.retain(|action| !action.of_order()));
-    fault "r2-offline-in-manual" ["CONN-08", "CONN-10"] "When it leaves the automatic modes the vehicle publishes OFFLINE but stays connected and goes on sending states."
+    fault "offline-in-manual" ["CONN-08", "CONN-10"] "When it leaves the automatic modes the vehicle publishes OFFLINE but stays connected and goes on sending states."
         => plain().happens(|(), agv, event| if let Event::ModeChanging(mode) = event
             && mode.takes_orders() != agv.mode.takes_orders()
         {
             agv.publish_connection(if mode.takes_orders() { "ONLINE" } else { "OFFLINE" });
         });
-    fault "r2-manual-keeps-waiting-order" ["MODE-05"] "Switching to MANUAL does not clear an order whose base is done and that waits at the decision point."
+    fault "manual-keeps-waiting-order" ["MODE-05"] "Switching to MANUAL does not clear an order whose base is done and that waits at the decision point."
         => letting(|agv, what| {
             let waits = agv.waits_at_decision_point() && !agv.motion.is_moving() && !is_acting(agv);
             matches!(what, Permission::KeepOrder(Mode::Manual)) && waits
         });
-    fault "r2-mode-switch-parks" ["MODE-02"] "When the mode switches between AUTOMATIC and SEMIAUTOMATIC during an order the order stays but the vehicle stands for good."
+    fault "mode-switch-parks" ["MODE-02"] "When the mode switches between AUTOMATIC and SEMIAUTOMATIC during an order the order stays but the vehicle stands for good."
         => parked().happens(|parked, agv, event| *parked = match event {
             Event::Begun => false,
             Event::ModeChanging(mode) => *parked || mode != agv.mode && mode.takes_orders() && agv.mode.takes_orders() && agv.is_occupied(),
             _ => *parked,
         });
-    fault "r1-manual-finishes-actions" ["MODE-05"] "The actions that run when it is switched to MANUAL are reported FINISHED."
+    fault "manual-finishes-actions" ["MODE-05"] "The actions that run when it is switched to MANUAL are reported FINISHED."
         => plain().happens(|(), agv, event| if loses_order(agv, event) {
             let active = agv.actions.iter_mut().filter(|action| action.of_order() && action.status.is_active());
             active.for_each(|action| action.end(Status::Finished));
         });
-    fault "r1-manual-keeps-horizon" ["MODE-05", "STATE-13"] "Switched to MANUAL it clears the base of its order and keeps the horizon."
+    fault "manual-keeps-horizon" ["MODE-05", "STATE-13"] "Switched to MANUAL it clears the base of its order and keeps the horizon."
         => keep::<Option<Book>>().happens(|before, agv, event| {
             if loses_order(agv, event) {
                 *before = Some(agv.book.clone());
@@ -117,7 +117,7 @@ records! {
                 agv.book.edges.extend(before.edges.into_iter().filter(|edge| !edge.released));
             }
         });
-    fault "r6-manual-leaves-actions-waiting" ["MODE-05"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING."
+    fault "manual-leaves-actions-waiting" ["MODE-05"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING."
         => keep::<Vec<String>>()
             .happens(|waiting, agv, event| {
                 if loses_order(agv, event) {
@@ -132,7 +132,7 @@ records! {
                 }
             })
             .allows(|_, agv, what, usual| usual && !matches!(what, Permission::Count(action) if agv.book.cancelled && action.status == Status::Waiting));
-    fault "r1-silent-in-manual" ["MODE-06", "STATE-02"] "After the state that reports MANUAL it sends none until it leaves that mode."
+    fault "silent-in-manual" ["MODE-06", "STATE-02"] "After the state that reports MANUAL it sends none until it leaves that mode."
         => forbidding(|agv, what| {
             let last = agv.report.last.as_ref().and_then(|(_, last)| last.get("operatingMode"));
             let told = last.is_some_and(|told| told == "MANUAL");
@@ -143,7 +143,7 @@ records! {
             e.fatal &= !matches!(cause, Cause::EmergencyStop);
             true
         });
-    fault "r1-emergency-stop-untyped" ["ERR-02"] "The error of its emergency stop has an empty errorType."
+    fault "emergency-stop-untyped" ["ERR-02"] "The error of its emergency stop has an empty errorType."
         => raising(|_, cause, e| {
             if matches!(cause, Cause::EmergencyStop) {
                 e.error_type.clear();
@@ -171,14 +171,14 @@ records! {
         });
     fault "fatal-drives" ["ERR-04"] "Drives on with a FATAL error."
         => forbidding(|_, what| matches!(what, Permission::StopForDefect));
-    fault "r3-rejection-gone-when-order-done" ["ORD-REJ-03", "ORD-REJ-08"] "It removes the warnings about refused orders when the order under way is complete, before a new order is accepted."
+    fault "rejection-gone-when-order-done" ["ORD-REJ-03", "ORD-REJ-08"] "It removes the warnings about refused orders when the order under way is complete, before a new order is accepted."
         => keep::<bool>().happens(|busy, agv, event| if event == Event::Settled {
             let before = std::mem::replace(busy, agv.is_busy());
             if before && !*busy && !agv.book.cancelled {
                 agv.errors.forget_refusals();
             }
         });
-    liberty "r1-order-id-survives-power-cycle" ["STATE-MSG-02"] "After it was switched off and on it still reports the orderId and orderUpdateId of its last order."
+    liberty "order-id-survives-power-cycle" ["STATE-MSG-02"] "After it was switched off and on it still reports the orderId and orderUpdateId of its last order."
         => keep::<(String, u32)>().happens(|(id, update_id), agv, event| match event {
             Event::PowerCycled => {
                 (agv.book.order_id, agv.book.update_id) = (id.clone(), *update_id);

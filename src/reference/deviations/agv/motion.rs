@@ -14,7 +14,7 @@ records! {
         });
     fault "degrees-reported" ["MAP-02", "STATE-MSG-05", "ORD-CANCEL-15"] "Reports its orientation in degrees."
         => position(|_, p| number(p, "theta", |theta| theta.to_degrees() + 180.0));
-    fault "r1-theta-never-negative" ["MAP-02", "STATE-MSG-05"] "It reports its orientation between 0 and two pi."
+    fault "theta-never-negative" ["MAP-02", "STATE-MSG-05"] "It reports its orientation between 0 and two pi."
         => position(|_, p| number(p, "theta", |theta| theta.rem_euclid(std::f64::consts::TAU)));
     fault "position-map-stale" ["MAP-11", "ORD-CANCEL-15"] "Names a map in its position that is not on board."
         => position(|_, p| p.set("mapId", "factory-default"));
@@ -26,15 +26,15 @@ records! {
                 p.set(key, value.to_string());
             }
         });
-    fault "r1-localization-score-percent" ["STATE-MSG-05"] "It reports its localizationScore in percent."
+    fault "localization-score-percent" ["STATE-MSG-05"] "It reports its localizationScore in percent."
         => position(|_, p| p.set("localizationScore", 98.0));
     fault "velocity-mirrored" ["MAP-03"] "Reports a negative speed when it drives forwards."
         => velocity(|_, v| number(v, "vx", |vx| -vx));
-    fault "r3-speed-unsigned" ["MAP-03"] "It reports a positive vx also when it drives backwards."
+    fault "speed-unsigned" ["MAP-03"] "It reports a positive vx also when it drives backwards."
         => velocity(|_, v| number(v, "vx", f64::abs));
-    fault "r1-omega-clockwise" ["MAP-01", "MAP-03"] "It reports omega as positive when it turns clockwise."
+    fault "omega-clockwise" ["MAP-01", "MAP-03"] "It reports omega as positive when it turns clockwise."
         => velocity(|_, v| number(v, "omega", |omega| -omega));
-    fault "r1-velocity-in-map-axes" ["MAP-03"] "It reports its velocity along the axes of the map and not along its own."
+    fault "velocity-in-map-axes" ["MAP-03"] "It reports its velocity along the axes of the map and not along its own."
         => velocity(|agv, v| {
             let theta = agv.motion.pose(agv.moment()).theta;
             let speed = agv.motion.velocity().vx;

@@ -38,7 +38,7 @@ records! {
         => being(|config| config.state_interval = Duration::from_secs(28));
     liberty "states-often" ["STATE-02"] "Sends a state ten times a second, whatever happens."
         => being(|config| config.state_interval = Duration::from_millis(100));
-    liberty "r4-state-every-second" ["STATE-02", "STATE-11"] "It sends a state every second even when nothing happens."
+    liberty "state-every-second" ["STATE-02", "STATE-11"] "It sends a state every second even when nothing happens."
         => being(|config| config.state_interval = config.state_interval.min(Duration::from_secs(1)));
     liberty "visualization-off" ["TOPIC-12"] "Publishes no visualization."
         => being(|config| config.visualization_interval = None);
@@ -54,11 +54,11 @@ records! {
             }
             config.action_duration = Duration::ZERO;
         });
-    liberty "r3-reconnects-at-once" ["MQTT-10"] "It connects again after 50 milliseconds when the connection is broken."
+    liberty "reconnects-at-once" ["MQTT-10"] "It connects again after 50 milliseconds when the connection is broken."
         => being(|config| config.reconnect_delay = Duration::from_millis(50));
     liberty "reconnects-late" ["MQTT-10"] "Connects again eight seconds after a broken link."
         => being(|config| config.reconnect_delay = Duration::from_secs(8));
-    liberty "r2-keep-alive-ten" ["CONN-04"] "The keep-alive is 10 s."
+    liberty "keep-alive-ten" ["CONN-04"] "The keep-alive is 10 s."
         => being(|config| config.keep_alive = Duration::from_secs(10));
     liberty "keep-alive-20" ["CONN-04"] "Asks for a keep-alive of 20 s."
         => being(|config| config.keep_alive = Duration::from_secs(20));
@@ -70,7 +70,7 @@ records! {
         });
     liberty "errors-stay" ["ERR-01"] "Keeps the errors of refused instant actions for half a minute."
         => being(|config| config.error_duration = Duration::from_secs(30));
-    liberty "r4-limits-of-zero-in-factsheet" ["FACT-05", "FACT-11"] "It states 0 for all array and string limits in the factsheet because it has none."
+    liberty "limits-of-zero-in-factsheet" ["FACT-05", "FACT-11"] "It states 0 for all array and string limits in the factsheet because it has none."
         => Box::new(Unlimited);
     liberty "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5."
         => joining(|_, options| options.level = 5);
@@ -78,10 +78,10 @@ records! {
         => joining(|_, options| options.clean_session = false);
     liberty "subscribes-with-qos-1" ["MQTT-07"] "Subscribes with QoS 1."
         => joining(|_, options| options.subscriptions.iter_mut().for_each(|(_, qos)| *qos = 1));
-    liberty "r2-client-id-changes" ["MQTT-01", "CONN-11"] "The vehicle takes another MQTT client identifier at every connection."
+    liberty "client-id-changes" ["MQTT-01", "CONN-11"] "The vehicle takes another MQTT client identifier at every connection."
         => joining(|agv, options| options.client_id = format!("{}-{}", agv.config.serial_number, agv.connection.sessions));
     // Its own messages come back to it; it has no use for them.
-    liberty "r2-subscribes-with-wildcard" ["TOPIC-10"] "The vehicle subscribes with one topic filter that ends in a wildcard."
+    liberty "subscribes-with-wildcard" ["TOPIC-10"] "The vehicle subscribes with one topic filter that ends in a wildcard."
         => joining(|_, options| {
             for (topic, _) in &mut options.subscriptions {
                 if let Some((above, _)) = topic.rsplit_once('/') {
@@ -94,21 +94,21 @@ records! {
         => when(Event::Connected, |agv| agv.connection.header_ids.clear());
     liberty "online-twice" ["CONN-05"] "Says ONLINE twice when it connects."
         => when(Event::Connected, |agv| agv.publish_connection("ONLINE"));
-    liberty "r1-factsheet-on-request-only" ["FACT-01", "ACT-40"] "It publishes its factsheet when it is asked for, and not when it connects."
+    liberty "factsheet-on-request-only" ["FACT-01", "ACT-40"] "It publishes its factsheet when it is asked for, and not when it connects."
         => forbidding(|_, what| matches!(what, Permission::SayFactsheet));
-    liberty "r2-factsheet-before-online" ["CONN-05", "TOPIC-11"] "On connecting the vehicle publishes its factsheet before it says ONLINE."
+    liberty "factsheet-before-online" ["CONN-05", "TOPIC-11"] "On connecting the vehicle publishes its factsheet before it says ONLINE."
         => forbidding(|_, what| matches!(what, Permission::SayFactsheet)).happens(|_, agv, event| if event == Event::Connected { agv.publish_factsheet() });
-    liberty "r2-factsheet-after-state" ["TOPIC-11", "FACT-01"] "On connecting the vehicle publishes its factsheet after the first state."
+    liberty "factsheet-after-state" ["TOPIC-11", "FACT-01"] "On connecting the vehicle publishes its factsheet after the first state."
         => forbidding(|_, what| matches!(what, Permission::SayFactsheet)).happens(|_, agv, event| if event == Event::Reporting {
             agv.flush();
             agv.publish_factsheet();
         });
-    liberty "r1-last-state-before-offline" ["CONN-07", "STATE-02"] "It sends a last state right before OFFLINE."
+    liberty "last-state-before-offline" ["CONN-07", "STATE-02"] "It sends a last state right before OFFLINE."
         => when(Event::Leaving, |agv| {
             agv.report.requested = true;
             agv.flush();
         });
-    liberty "r3-network-told" ["FACT-10"] "It states its network data in the factsheet."
+    liberty "network-told" ["FACT-10"] "It states its network data in the factsheet."
         => factsheet(|_, m| m.part("vehicleConfig", |config| config.set("network", json!({
             "dnsServers": ["10.1.0.1"],
             "ntpServers": ["10.1.0.2"],
@@ -116,12 +116,12 @@ records! {
             "netmask": "255.255.255.0",
             "defaultGateway": "10.1.0.1",
         }))));
-    liberty "r1-factsheet-lists-reversed" ["FACT-06", "FACT-07"] "Its factsheet lists its actions and optional parameters in reverse."
+    liberty "factsheet-lists-reversed" ["FACT-06", "FACT-07"] "Its factsheet lists its actions and optional parameters in reverse."
         => factsheet(|_, m| m.part("protocolFeatures", |features| {
             features.list("optionalParameters").reverse();
             features.list("agvActions").reverse();
         }));
-    liberty "r3-optional-flag-omitted" ["FACT-07"] "It leaves isOptional out of the factsheet for parameters that are not optional."
+    liberty "optional-flag-omitted" ["FACT-07"] "It leaves isOptional out of the factsheet for parameters that are not optional."
         => factsheet(|_, m| m.part("protocolFeatures", |features| features.each("agvActions", |action| {
             action.each("actionParameters", |parameter| if parameter.says("isOptional", false) {
                 parameter.unset("isOptional");

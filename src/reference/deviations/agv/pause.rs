@@ -52,7 +52,7 @@ records! {
             }
             None
         });
-    fault "r6-second-start-pause-resumes" ["ACT-11", "ACT-13"] "It treats startPause as a toggle: a second startPause ends the pause."
+    fault "second-start-pause-resumes" ["ACT-11", "ACT-13"] "It treats startPause as a toggle: a second startPause ends the pause."
         => instead(Deed::StartPause, |agv, _| {
             let again = agv.holds.pause && !agv.pause_blocked;
             again.then(|| {
@@ -60,7 +60,7 @@ records! {
                 Outcome::Done(None)
             })
         });
-    fault "r4-pause-fails-without-order" ["ACT-13", "ACT-11"] "It answers startPause with FAILED when it has no order."
+    fault "pause-fails-without-order" ["ACT-13", "ACT-11"] "It answers startPause with FAILED when it has no order."
         => instead(Deed::StartPause, |agv, action| {
             let idle = agv.book.nodes.is_empty() && !agv.actions.order_unfinished();
             idle.then(|| Outcome::Failed(Problem::unable(action, "there is no order to pause")))
@@ -102,7 +102,7 @@ records! {
             }
             None
         });
-    fault "r1-pause-cuts-horizon" ["ACT-14", "STATE-12"] "A startPause makes it throw away the horizon of its order."
+    fault "pause-cuts-horizon" ["ACT-14", "STATE-12"] "A startPause makes it throw away the horizon of its order."
         => instead(Deed::StartPause, |agv, _| {
             if !agv.pause_blocked {
                 let gone = agv.book.drop_horizon();
@@ -113,7 +113,7 @@ records! {
             }
             None
         });
-    fault "r3-pause-finished-before-standing" ["ACT-15", "ACT-12"] "It reports startPause FINISHED while it still rolls for a second."
+    fault "pause-finished-before-standing" ["ACT-15", "ACT-12"] "It reports startPause FINISHED while it still rolls for a second."
         => keep::<Option<Moment>>()
             .does(|braking, agv, action| {
                 if is(action, Deed::StartPause) && !agv.pause_blocked && agv.motion.is_moving() {
@@ -131,7 +131,7 @@ records! {
                 usual || rolls && matches!(what, Permission::DriveAgainst(Hindrance::Hold))
             })
             .due(|braking| *braking);
-    fault "r2-paused-flag-late" ["ACT-13"] "The flag paused becomes true only one and a half seconds after startPause is FINISHED."
+    fault "paused-flag-late" ["ACT-13"] "The flag paused becomes true only one and a half seconds after startPause is FINISHED."
         => keep::<Option<Moment>>()
             .does(|hidden, agv, action| {
                 if is(action, Deed::StartPause) && !agv.pause_blocked && !agv.holds.pause {
@@ -149,21 +149,21 @@ records! {
                 true
             })
             .due(|hidden| *hidden);
-    fault "r2-pause-forgets-queue" ["ACT-14", "ACT-18"] "Actions that wait behind another one on their node are never begun when the vehicle was paused in the meantime."
+    fault "pause-forgets-queue" ["ACT-14", "ACT-18"] "Actions that wait behind another one on their node are never begun when the vehicle was paused in the meantime."
         => instead(Deed::StopPause, |agv, _| {
             if lifts_pause(agv) && agv.holds.pause {
                 agv.actions.drop_lists();
             }
             None
         });
-    fault "r1-horizon-driven-after-pause" ["ORD-UPD-01", "ORD-07"] "A stopPause while it waits at the decision point makes it drive on into the horizon."
+    fault "horizon-driven-after-pause" ["ORD-UPD-01", "ORD-07"] "A stopPause while it waits at the decision point makes it drive on into the horizon."
         => unbound()
             .does(|unbound, agv, action| {
                 *unbound |= ends_pause(agv, action) && agv.waits_at_decision_point();
                 None
             })
             .happens(|unbound, _, event| *unbound &= event != Event::Begun);
-    fault "r2-blocking-forgotten-after-pause" ["BLOCK-04", "BLOCK-03"] "After a pause the vehicle drives on although the SOFT or HARD action it was paused in is still running."
+    fault "blocking-forgotten-after-pause" ["BLOCK-04", "BLOCK-03"] "After a pause the vehicle drives on although the SOFT or HARD action it was paused in is still running."
         => keep::<bool>()
             .does(|unblocked, agv, action| {
                 *unblocked |= ends_pause(agv, action);
@@ -171,7 +171,7 @@ records! {
             })
             .happens(|unblocked, _, event| *unblocked &= !matches!(event, Event::Begun | Event::NodeReached(_)))
             .allows(|unblocked, _, what, usual| usual || *unblocked && matches!(what, Permission::DriveAgainst(Hindrance::Action)));
-    fault "r4-pause-forgotten-after-node-action" ["ACT-12", "ACT-13"] "It drives on although paused when a node action that ran at the time of startPause has ended."
+    fault "pause-forgotten-after-node-action" ["ACT-12", "ACT-13"] "It drives on although paused when a node action that ran at the time of startPause has ended."
         => heedless()
             .ends(|heedless, agv, action, outcome| {
                 let of_node = matches!(action.origin, Origin::Node(_));
@@ -179,7 +179,7 @@ records! {
                 outcome
             })
             .happens(|heedless, _, event| *heedless &= !matches!(event, Event::Begun | Event::Resuming));
-    fault "r1-paused-actions-fail" ["ACT-18", "ACT-34"] "Actions that were held by a pause or a violated field become FAILED when they could go on."
+    fault "paused-actions-fail" ["ACT-18", "ACT-34"] "Actions that were held by a pause or a violated field become FAILED when they could go on."
         => when(Event::Resuming, |agv| {
             let held = agv.actions.iter_mut().filter(|action| action.held.is_some());
             held.for_each(|action| action.end(Status::Failed));
@@ -189,7 +189,7 @@ records! {
             let held = agv.actions.iter_mut().filter(|action| action.status == Status::Paused);
             held.for_each(|action| action.status = Status::Waiting);
         });
-    fault "r6-resumed-action-waits-again" ["ASTATE-05", "ACT-18"] "It sends an action that was PAUSED back to WAITING on stopPause and starts it anew."
+    fault "resumed-action-waits-again" ["ASTATE-05", "ACT-18"] "It sends an action that was PAUSED back to WAITING on stopPause and starts it anew."
         => keep::<(Vec<Origin>, Option<Moment>)>()
             .happens(|(places, due), agv, event| match event {
                 Event::Begun | Event::PowerCycled => {
@@ -213,17 +213,17 @@ records! {
             })
             .allows(|(places, _), _, what, usual| usual && (places.is_empty() || !matches!(what, Permission::Drive)))
             .due(|(_, due)| *due);
-    fault "r3-paused-actions-stay-paused" ["ACT-18"] "It leaves actions PAUSED that were held by a pause after stopPause."
+    fault "paused-actions-stay-paused" ["ACT-18"] "It leaves actions PAUSED that were held by a pause after stopPause."
         => forbidding(|_, what| matches!(what, Permission::ResumeActions(before) if before.pause));
     fault "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated." because "It breaks a recommendation only."
         => forbidding(|agv, what| matches!(what, Permission::HoldActions) && !(agv.holds.pause || agv.holds.button || agv.holds.emergency));
     fault "field-pause-stuck" ["ACT-34", "ASTATE-04"] "Does not go on with its actions when its protective field is free again."
         => forbidding(|_, what| matches!(what, Permission::ResumeActions(before) if before.field));
-    fault "r1-e-stop-latched" ["STATE-MSG-17"] "After the emergency stop is released it reports the e-stop as active until the next order."
+    fault "e-stop-latched" ["STATE-MSG-17"] "After the emergency stop is released it reports the e-stop as active until the next order."
         => latched(|agv, event| event == Event::Releasing && agv.holds.emergency, |m| m.part("safetyState", |safety| safety.set("eStop", "MANUAL")));
-    fault "r2-field-violation-latched" ["STATE-MSG-17"] "After the safety field is free again fieldViolation stays true until the next order."
+    fault "field-violation-latched" ["STATE-MSG-17"] "After the safety field is free again fieldViolation stays true until the next order."
         => latched(|agv, event| event == Event::FieldFreed && agv.holds.field, |m| m.part("safetyState", |safety| safety.set("fieldViolation", true)));
-    liberty "r1-actions-run-on-in-pause" ["ACT-15", "ACT-18"] "Running actions go on while it is paused by startPause."
+    liberty "actions-run-on-in-pause" ["ACT-15", "ACT-18"] "Running actions go on while it is paused by startPause."
         => forbidding(|agv, what| matches!(what, Permission::HoldActions) && agv.holds.pause && !agv.holds.button && !agv.holds.emergency && !agv.holds.field);
     liberty "resumes-in-a-moment" ["ASTATE-04", "ACT-18"] "Lets held actions go on half a second after the pause has ended."
         => keep::<Option<Moment>>()
@@ -234,7 +234,7 @@ records! {
             })
             .allows(|_, _, what, usual| usual && !matches!(what, Permission::ResumeActions(_)))
             .due(|due| *due);
-    liberty "r4-brakes-long-on-pause" ["ACT-12", "ACT-13"] "It needs two seconds to come to a stop after startPause and reports it RUNNING meanwhile."
+    liberty "brakes-long-on-pause" ["ACT-12", "ACT-13"] "It needs two seconds to come to a stop after startPause and reports it RUNNING meanwhile."
         => keep::<bool>()
             .allows(|_, agv, what, usual| usual || matches!(what, Permission::TakeTime(action) if is(action, Deed::StartPause) && agv.motion.is_moving()))
             .happens(|braking, agv, event| match event {
@@ -258,7 +258,7 @@ records! {
                 Span::Action(action) if is(action, Deed::StartPause) => Duration::from_secs(2),
                 _ => usual,
             });
-    liberty "r2-pause-takes-time" ["ACT-12", "ACT-15", "ACT-41"] "startPause and stopPause are RUNNING for a moment, in which the vehicle goes on as before, and then FINISHED."
+    liberty "pause-takes-time" ["ACT-12", "ACT-15", "ACT-41"] "startPause and stopPause are RUNNING for a moment, in which the vehicle goes on as before, and then FINISHED."
         => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Deed::StartPause) || is(action, Deed::StopPause)));
 }
 

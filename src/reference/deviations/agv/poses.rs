@@ -59,22 +59,22 @@ records! {
             let idle = action.of_order() || agv.book.nodes.is_empty() && !agv.actions.order_unfinished();
             idle.then(|| take_pose(agv, action)).flatten()
         });
-    fault "r6-init-position-any-map" ["ACT-25"] "It reports initPosition FINISHED for a map that it does not have."
+    fault "init-position-any-map" ["ACT-25"] "It reports initPosition FINISHED for a map that it does not have."
         => instead(Deed::InitPosition, |agv, action| {
             let idle = action.of_order() || agv.book.nodes.is_empty() && !agv.actions.order_unfinished();
             let unknown = !agv.maps.on_board(action.text("mapId"));
             (idle && unknown).then(|| take_pose(agv, action)).flatten()
         });
-    liberty "r1-init-position-resets-sequence" ["ACT-24", "STATE-MSG-04"] "An initPosition sets its lastNodeSequenceId to 0."
+    liberty "init-position-resets-sequence" ["ACT-24", "STATE-MSG-04"] "An initPosition sets its lastNodeSequenceId to 0."
         => succeeded(Deed::InitPosition, |agv, action| if !action.of_order() {
             agv.book.last_sequence = 0;
         });
-    liberty "r4-enabled-unused-map-not-deleted" ["MAP-29", "MAP-32"] "It refuses to delete a map that is enabled though neither its position nor its order needs it."
+    liberty "enabled-unused-map-not-deleted" ["MAP-29", "MAP-32"] "It refuses to delete a map that is enabled though neither its position nor its order needs it."
         => instead(Deed::DeleteMap, |agv, action| {
             let enabled = agv.maps.is_enabled(action.text("mapId"), action.text("mapVersion"));
             enabled.then(|| Outcome::Failed(Problem::map(action, "the map is in use")))
         });
-    liberty "r1-map-delisted-next" ["MAP-29"] "It removes the entry of a deleted map in the state after the one that reports the deleteMap FINISHED."
+    liberty "map-delisted-next" ["MAP-29"] "It removes the entry of a deleted map in the state after the one that reports the deleteMap FINISHED."
         => instead(Deed::DeleteMap, |agv, action| {
             let before = agv.maps.clone();
             match agv.delete_map(action) {
@@ -88,19 +88,19 @@ records! {
                 refused => Some(refused.into()),
             }
         });
-    liberty "r1-map-listed-next" ["MAP-20", "MAP-21"] "It lists a downloaded map in the state after the one that reports the downloadMap FINISHED."
+    liberty "map-listed-next" ["MAP-20", "MAP-21"] "It lists a downloaded map in the state after the one that reports the downloadMap FINISHED."
         => when(Event::Downloaded, |agv| {
             downloads(agv, Status::Finished);
             agv.flush();
         });
-    liberty "r1-download-runs-at-once" ["MAP-17"] "It reports a downloadMap RUNNING as soon as it asks for the file, without INITIALIZING."
+    liberty "download-runs-at-once" ["MAP-17"] "It reports a downloadMap RUNNING as soon as it asks for the file, without INITIALIZING."
         => after(Deed::DownloadMap, |agv, action, outcome| {
             if matches!(outcome, Outcome::Open) && let Some(action) = agv.actions.get_mut(&action.request.id) {
                 action.status = Status::Running;
             }
             outcome
         });
-    liberty "r6-lib-download-queued" ["MAP-17"] "It shows downloadMap INITIALIZING for some seconds before the download starts."
+    liberty "lib-download-queued" ["MAP-17"] "It shows downloadMap INITIALIZING for some seconds before the download starts."
         => keep::<Vec<(Moment, Output)>>()
             .ends(|waiting, agv, action, outcome| {
                 if is(action, Deed::DownloadMap) && matches!(outcome, Outcome::Open) {
@@ -124,7 +124,7 @@ records! {
                 _ => {}
             })
             .due(|waiting| waiting.iter().map(|(due, _)| *due).min());
-    liberty "r3-loads-identified" ["STATE-MSG-07"] "It reads the loadId of a picked load itself where the order does not name one."
+    liberty "loads-identified" ["STATE-MSG-07"] "It reads the loadId of a picked load itself where the order does not name one."
         => keep::<String>()
             .does(|site, agv, action| {
                 *site = agv.site(action);

@@ -67,7 +67,7 @@ records! {
                 *value = json!("NONE");
             }
         }));
-    fault "r1-blocking-type-assumed" ["ORD-REJ-01", "ORD-REJ-02"] "It takes an order with an action without blockingType, and assumes NONE."
+    fault "blocking-type-assumed" ["ORD-REJ-01", "ORD-REJ-02"] "It takes an order with an action without blockingType, and assumes NONE."
         => reading(|_, order| elements(order, |element| element.each("actions", |action| {
             action.entry("blockingType").or_insert(json!("NONE"));
         })));
@@ -86,7 +86,7 @@ records! {
                 *value = json!(wrapped(number));
             }
         }));
-    fault "r1-numbers-read-from-text" ["ORD-REJ-01", "ORD-REJ-02"] "It takes an order in which orderUpdateId or a sequenceId is a number in quotes."
+    fault "numbers-read-from-text" ["ORD-REJ-01", "ORD-REJ-02"] "It takes an order in which orderUpdateId or a sequenceId is a number in quotes."
         => reading(|_, order| {
             order.change("orderUpdateId", number_from_text);
             elements(order, |element| element.change("sequenceId", number_from_text));
@@ -119,22 +119,22 @@ records! {
                 order.set(key, "?");
             }
         });
-    fault "r3-missing-orientation-type-global" ["ORD-MSG-22"] "It takes the orientation of an edge without orientationType for a global one."
+    fault "missing-orientation-type-global" ["ORD-MSG-22"] "It takes the orientation of an edge without orientationType for a global one."
         => reading(|_, order| order.each("edges", |edge| {
             edge.entry("orientationType").or_insert(json!("GLOBAL"));
         }));
-    fault "r2-surplus-edge-dropped" ["ORD-11"] "An order with more edges than fit between its nodes is taken over; the surplus edges are dropped without a word."
+    fault "surplus-edge-dropped" ["ORD-11"] "An order with more edges than fit between its nodes is taken over; the surplus edges are dropped without a word."
         => reading(|_, order| {
             let nodes = order.list("nodes").len();
             order.change("edges", |edges| if let Value::Array(edges) = edges && nodes > 0 { edges.truncate(nodes - 1) });
         });
-    fault "r4-whole-number-coordinates-refused" ["ORD-10", "ORD-FLOW-07"] "It refuses an order whose coordinates are written as whole numbers (5 instead of 5.0) as malformed."
+    fault "whole-number-coordinates-refused" ["ORD-10", "ORD-FLOW-07"] "It refuses an order whose coordinates are written as whole numbers (5 instead of 5.0) as malformed."
         => reading(|_, order| elements(order, |element| element.part("nodePosition", |position| {
             for key in ["x", "y"] {
                 position.change(key, |value| if value.is_i64() || value.is_u64() { *value = json!("no floating-point number") });
             }
         })));
-    fault "r4-non-ascii-description-refused" ["JSON-03", "ORD-10"] "It refuses an order with a non-ASCII character in a description as malformed."
+    fault "non-ascii-description-refused" ["JSON-03", "ORD-10"] "It refuses an order with a non-ASCII character in a description as malformed."
         => reading(|_, order| members(order, &|key, value| {
             let foreign = key.ends_with("Description") && value.as_str().is_some_and(|text| !text.is_ascii());
             if foreign {

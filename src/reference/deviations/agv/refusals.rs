@@ -19,19 +19,19 @@ records! {
         => refusal(|_, _, _, _| false);
     fault "start-refusal-silent" ["ORD-REJ-17"] "Raises no error when the first node of an order is out of reach."
         => refusal(|_, rule, _, _| rule != Rule::StartOutOfRange);
-    fault "r1-unknown-map-silent" ["MAP-08", "ORD-REJ-17"] "It refuses an order on a map it does not have without any error."
+    fault "unknown-map-silent" ["MAP-08", "ORD-REJ-17"] "It refuses an order on a map it does not have without any error."
         => refusal(|_, rule, _, _| rule != Rule::UnknownMap);
-    fault "r1-busy-refusal-silent" ["ORD-FLOW-01", "ORD-REJ-17", "ORD-FLOW-03"] "It refuses a new order while another one is active without any error."
+    fault "busy-refusal-silent" ["ORD-FLOW-01", "ORD-REJ-17", "ORD-FLOW-03"] "It refuses a new order while another one is active without any error."
         => refusal(|_, rule, _, _| rule != Rule::OtherOrderActive);
-    fault "r1-outdated-update-silent" ["ORD-REJ-12", "ORD-REJ-17"] "It drops an outdated order update without an error."
+    fault "outdated-update-silent" ["ORD-REJ-12", "ORD-REJ-17"] "It drops an outdated order update without an error."
         => refusal(|_, rule, _, _| rule != Rule::Outdated);
-    fault "r3-refusal-silent-in-pause" ["ORD-REJ-17"] "It refuses orders and updates without any error while it is paused."
+    fault "refusal-silent-in-pause" ["ORD-REJ-17"] "It refuses orders and updates without any error while it is paused."
         => refusal(|agv, _, _, _| !agv.holds.pause);
-    fault "r1-unreadable-order-dropped" ["ORD-REJ-02", "ORD-REJ-17"] "It drops an order message that is not JSON without an error."
+    fault "unreadable-order-dropped" ["ORD-REJ-02", "ORD-REJ-17"] "It drops an order message that is not JSON without an error."
         => refusal(|_, rule, message, _| rule != Rule::Malformed || !message.is_null());
     fault "validation-error-misspelled" ["ORD-REJ-02"] "Calls a malformed order validationOrder, as an old figure does."
         => refusal(|_, rule, _, e| said(rule == Rule::Malformed, || "validationOrder".clone_into(&mut e.error_type)));
-    fault "r3-action-defect-as-order-error" ["ORD-REJ-02"] "It reports an order that is malformed within an action as orderError instead of validationError."
+    fault "action-defect-as-order-error" ["ORD-REJ-02"] "It reports an order that is malformed within an action as orderError instead of validationError."
         => refusal(|agv, rule, _, e| {
             let in_action = e.references.iter().any(|(key, path)| key == "field" && path.contains("actions"));
             said(rule == Rule::Malformed && in_action, || e.error_type.clone_from(&agv.config.errors.order))
@@ -63,20 +63,20 @@ records! {
             }
             true
         });
-    fault "r6-outdated-update-names-current-id" ["ORD-REJ-14", "BP-01"] "It puts the orderUpdateId it has, not the rejected one, into the references of the rejection."
+    fault "outdated-update-names-current-id" ["ORD-REJ-14", "BP-01"] "It puts the orderUpdateId it has, not the rejected one, into the references of the rejection."
         => refusal(|agv, _, message, e| {
             let own = agv.book.has_order() && message.get("orderId").and_then(Value::as_str) == Some(agv.book.order_id.as_str());
             let ids = e.references.iter_mut().filter(|(key, _)| own && key == "orderUpdateId");
             ids.for_each(|(_, value)| *value = agv.book.update_id.to_string());
             true
         });
-    fault "r1-culprit-unnamed" ["ORD-REJ-07"] "Its orderError references the message alone and not the field or the action that is wrong."
+    fault "culprit-unnamed" ["ORD-REJ-07"] "Its orderError references the message alone and not the field or the action that is wrong."
         => refusal(|_, rule, message, e| said(rule == Rule::Unable, || e.references.truncate(message_references(message).len())));
-    fault "r4-stitch-rejection-without-update-id" ["ORD-REJ-14"] "It names the orderUpdateId of an outdated update in the error, but not that of an update that does not start at the decision point."
+    fault "stitch-rejection-without-update-id" ["ORD-REJ-14"] "It names the orderUpdateId of an outdated update in the error, but not that of an update that does not start at the decision point."
         => refusal(|_, rule, _, e| said(rule == Rule::BrokenUpdate, || e.references.retain(|(key, _)| key != "orderUpdateId")));
     fault "update-id-unreferenced" ["ORD-REJ-14"] "Does not name the orderUpdateId of a refused update."
         => refusal(|_, _, _, e| said(true, || e.references.retain(|(key, _)| key != "orderUpdateId")));
-    fault "r3-update-id-under-other-key" ["ORD-REJ-14"] "It references the orderUpdateId of a refused update under the key updateId."
+    fault "update-id-under-other-key" ["ORD-REJ-14"] "It references the orderUpdateId of a refused update under the key updateId."
         => refusal(|_, _, _, e| {
             let ids = e.references.iter_mut().filter(|(key, _)| key == "orderUpdateId");
             ids.for_each(|(key, _)| "updateId".clone_into(key));
@@ -84,9 +84,10 @@ records! {
         });
     fault "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform."
         => refusal(|_, rule, _, e| said(rule == Rule::Unable, || e.references.clear()));
-    fault "r2-busy-refusal-unreferenced" ["BP-01"] "The error for a new order while another one is active has no errorReferences at all."
+    fault "busy-refusal-unreferenced" ["BP-01"] "The error for a new order while another one is active has no errorReferences at all."
+        because "BP-01, that an error names what it is about, is a recommendation; the refusal itself is right."
         => refusal(|_, rule, _, e| said(rule == Rule::OtherOrderActive, || e.references.clear()));
-    fault "r4-new-rejection-replaces-old-warning" ["ORD-REJ-08", "ORD-REJ-03", "ERR-01"] "It holds one order error only, so that the next rejection replaces an orderError or validationError that must stay."
+    fault "new-rejection-replaces-old-warning" ["ORD-REJ-08", "ORD-REJ-03", "ERR-01"] "It holds one order error only, so that the next rejection replaces an orderError or validationError that must stay."
         => refusal(|agv, _, _, _| {
             let of_order = |error: &ActiveError| error.references.iter().any(|(key, value)| key == "topic" && value == "order");
             said(true, || agv.errors.active.retain(|error| !of_order(error)))
@@ -104,9 +105,9 @@ records! {
         => nothing_to_cancel(|_, e| said(true, || e.fatal = true));
     fault "idle-cancel-unreferenced" ["ORD-CANCEL-20"] "Does not name the actionId when there is no order to cancel."
         => nothing_to_cancel(|_, e| said(true, || e.references.clear()));
-    fault "r1-idle-cancel-names-type" ["ORD-CANCEL-20"] "The error noOrderToCancel references the actionType of the cancelOrder and not its actionId."
+    fault "idle-cancel-names-type" ["ORD-CANCEL-20"] "The error noOrderToCancel references the actionType of the cancelOrder and not its actionId."
         => nothing_to_cancel(|_, e| said(true, || e.references = vec![("actionType".to_owned(), "cancelOrder".to_owned())]));
-    fault "r6-no-order-to-cancel-keeps-first-id" ["ORD-CANCEL-20"] "It does not raise noOrderToCancel twice: at a second useless cancelOrder the error still names the first actionId."
+    fault "no-order-to-cancel-keeps-first-id" ["ORD-CANCEL-20"] "It does not raise noOrderToCancel twice: at a second useless cancelOrder the error still names the first actionId."
         => nothing_to_cancel(|agv, e| {
             if let Some(first) = agv.errors.active.iter().find(|error| error.error_type == e.error_type) {
                 e.references.clone_from(&first.references);
@@ -119,7 +120,7 @@ records! {
         => refusing(|agv, message, rule| if rule == Rule::Malformed { take_id(agv, message) });
     fault "rejected-id-reported" ["STATE-MSG-02", "ORD-REJ-04"] "Reports the orderId of an order it refused."
         => refusing(|agv, message, rule| if rule != Rule::Outdated { take_id(agv, message) });
-    fault "r1-rejected-update-cuts-horizon" ["ORD-FLOW-12", "STATE-12"] "An order update that it rejects still makes it throw away the horizon of its order."
+    fault "rejected-update-cuts-horizon" ["ORD-FLOW-12", "STATE-12"] "An order update that it rejects still makes it throw away the horizon of its order."
         => refusing(|agv, _, rule| if matches!(rule, Rule::BrokenUpdate | Rule::Outdated) {
             let gone = agv.book.drop_horizon();
             agv.actions.retain(|action| match action.origin {
@@ -127,14 +128,14 @@ records! {
                 Origin::Instant => true,
             });
         });
-    fault "r1-rejected-update-id-adopted" ["ORD-FLOW-08", "ORD-FLOW-10"] "It adopts the orderUpdateId of an update that it rejects because it does not join the order."
+    fault "rejected-update-id-adopted" ["ORD-FLOW-08", "ORD-FLOW-10"] "It adopts the orderUpdateId of an update that it rejects because it does not join the order."
         => refusing(|agv, message, rule| {
             let id = message.get("orderUpdateId").and_then(Value::as_u64).and_then(|id| u32::try_from(id).ok());
             if let Some(id) = id.filter(|_| rule == Rule::BrokenUpdate) {
                 agv.book.update_id = id;
             }
         });
-    fault "r1-outdated-halts-driving" ["ORD-REJ-11", "ORD-FLOW-12"] "An outdated update makes it stand still until there is a new order, though it keeps the order it has."
+    fault "outdated-halts-driving" ["ORD-REJ-11", "ORD-FLOW-12"] "An outdated update makes it stand still until there is a new order, though it keeps the order it has."
         => parked()
             .refuses(|parked, _, _, rule| *parked |= rule == Rule::Outdated)
             .happens(|parked, _, event| *parked &= event != Event::Begun);
@@ -166,7 +167,7 @@ records! {
                 agv.actions.push(action);
             }
         });
-    fault "r6-rejected-update-leaves-actions" ["ORD-REJ-09", "ORD-REJ-04", "ORD-FLOW-12"] "It lists the actions of an update before it checks them, so that the actions of a rejected update stay in actionStates as WAITING."
+    fault "rejected-update-leaves-actions" ["ORD-REJ-09", "ORD-REJ-04", "ORD-FLOW-12"] "It lists the actions of an update before it checks them, so that the actions of a rejected update stay in actionStates as WAITING."
         => refusing(|agv, message, rule| {
             let order = Order::read(message).ok().filter(|order| rule == Rule::Unable && order.id == agv.book.order_id);
             for request in order.iter().flat_map(|order| order.actions().skip(order.nodes.first().map_or(0, |joint| joint.actions.len()))) {
@@ -177,7 +178,7 @@ records! {
                 }
             }
         });
-    fault "r3-busy-refusal-fails-actions" ["ORD-FLOW-12"] "It breaks off the running actions of its order when it refuses another order because it is busy."
+    fault "busy-refusal-fails-actions" ["ORD-FLOW-12"] "It breaks off the running actions of its order when it refuses another order because it is busy."
         => refusing(|agv, _, rule| {
             let running = agv.actions.iter_mut().filter(|action| rule == Rule::OtherOrderActive && action.of_order() && action.status.is_active());
             running.for_each(|action| action.end(Status::Failed));
@@ -186,7 +187,7 @@ records! {
         => keep::<bool>()
             .refuses(|stuck, agv, _, _| *stuck |= agv.holds.pause)
             .does(|stuck, agv, action| super::pause::stays_paused(*stuck, agv, action));
-    fault "r2-rejection-lifts-pause" ["ORD-FLOW-12", "ACT-14"] "Rejecting an order ends the pause of the vehicle, and it drives on with its current order."
+    fault "rejection-lifts-pause" ["ORD-FLOW-12", "ACT-14"] "Rejecting an order ends the pause of the vehicle, and it drives on with its current order."
         => refusing(|agv, _, _| agv.set_holds(|holds| holds.pause = false));
     fault "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12", "ORD-FLOW-03"] "Forgets its horizon when it has to refuse a message."
         => refusing(|agv, _, _| {
@@ -199,8 +200,14 @@ records! {
     fault "outdated-update-drops-order" ["ORD-REJ-11", "ORD-FLOW-12"] "Gives the order up when an outdated update arrives."
         => refusing(|agv, _, rule| if rule == Rule::Outdated { agv.give_up_order() });
     fault "order-error-locks" ["ORD-FLOW-06", "ORD-REJ-08"] "Refuses the order that follows one it could not perform."
-        => super::orders::locking().refuses(|locked, _, _, rule| *locked = rule == Rule::Unable);
-    fault "r2-refused-order-queued" ["ORD-FLOW-01", "ORD-REJ-17"] "A new order that was refused because another one is active is begun all the same as soon as that one has ended."
+        => super::orders::locking()
+            .refuses(|locked, _, _, rule| *locked = match rule {
+                Rule::Unable => true,
+                Rule::OtherOrderActive => false,
+                _ => *locked,
+            })
+            .happens(|locked, _, event| *locked &= event != Event::PowerCycled);
+    fault "refused-order-queued" ["ORD-FLOW-01", "ORD-REJ-17"] "A new order that was refused because another one is active is begun all the same as soon as that one has ended."
         => keep::<Option<Value>>()
             .refuses(|queued, _, message, rule| if rule == Rule::OtherOrderActive { *queued = Some(message.clone()) })
             .happens(|queued, agv, event| if event == Event::Settled && !agv.is_busy() && let Some(message) = queued.take() {

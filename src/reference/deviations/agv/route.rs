@@ -9,12 +9,12 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 records! {
-    fault "r1-route-omitted-when-idle" ["STATE-13", "STATE-MSG-01"] "It leaves nodeStates and edgeStates out when nothing is to be traversed."
+    fault "route-omitted-when-idle" ["STATE-13", "STATE-MSG-01"] "It leaves nodeStates and edgeStates out when nothing is to be traversed."
         => state(|agv, m| if agv.book.nodes.is_empty() {
             m.unset("nodeStates");
             m.unset("edgeStates");
         });
-    fault "r1-cancel-hides-next-node" ["ORD-CANCEL-09"] "While it drives to the next node to end a cancelled order it lists no node at all."
+    fault "cancel-hides-next-node" ["ORD-CANCEL-09"] "While it drives to the next node to end a cancelled order it lists no node at all."
         => state(|agv, m| if agv.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node) { m.set("nodeStates", json!([])) });
     fault "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last."
         => state(|agv, m| if !is_done(agv) { list_last_node(agv, m) });
@@ -33,7 +33,7 @@ records! {
         => state(|agv, m| if agv.report.answers_request() && agv.book.nodes.is_empty() { m.set("nodeStates", agv.last_node_state()) });
     fault "horizon-not-reported" ["ORD-FLOW-06", "STATE-12"] "Leaves the horizon out of its node and edge states."
         => route(|_, _, m| m.says("released", true));
-    fault "r1-horizon-cut-to-one" ["STATE-12", "ORD-FLOW-06"] "Of the horizon it lists only the first node in its node states."
+    fault "horizon-cut-to-one" ["STATE-12", "ORD-FLOW-06"] "Of the horizon it lists only the first node in its node states."
         => state(|_, m| {
             let mut planned = 0;
             m.keep("nodeStates", |node| {
@@ -41,7 +41,7 @@ records! {
                 planned < 2
             });
         });
-    fault "r1-loop-nodes-merged" ["ORD-UPD-13", "STATE-12"] "A node that it has to visit several times appears in its node states only once."
+    fault "loop-nodes-merged" ["ORD-UPD-13", "STATE-12"] "A node that it has to visit several times appears in its node states only once."
         => state(|_, m| {
             let mut listed = Vec::new();
             m.keep("nodeStates", |node| {
@@ -51,13 +51,13 @@ records! {
                 first
             });
         });
-    fault "r2-route-lists-capped" ["STATE-12", "ORD-FLOW-06"] "nodeStates and edgeStates never list more than three elements, however long the order is."
+    fault "route-lists-capped" ["STATE-12", "ORD-FLOW-06"] "nodeStates and edgeStates never list more than three elements, however long the order is."
         => state(|_, m| ["nodeStates", "edgeStates"].into_iter().for_each(|list| cut(m, list, 3)));
-    fault "r4-node-states-show-ten-at-most" ["STATE-12", "ORD-FLOW-06"] "It lists at most the next ten nodes in nodeStates, although the accepted order has more."
+    fault "node-states-show-ten-at-most" ["STATE-12", "ORD-FLOW-06"] "It lists at most the next ten nodes in nodeStates, although the accepted order has more."
         => state(|_, m| cut(m, "nodeStates", 10));
-    fault "r3-edge-states-reversed" ["STATE-12", "ORD-FLOW-06"] "It lists edgeStates from the last edge to the next one."
+    fault "edge-states-reversed" ["STATE-12", "ORD-FLOW-06"] "It lists edgeStates from the last edge to the next one."
         => state(|_, m| m.list("edgeStates").reverse());
-    fault "r1-entered-edge-unlisted" ["STATE-12", "NODE-05"] "It removes the state of an edge as soon as it enters that edge."
+    fault "entered-edge-unlisted" ["STATE-12", "NODE-05"] "It removes the state of an edge as soon as it enters that edge."
         => edge(|agv, edge, _| {
             let ahead = agv.book.edge_ahead().filter(|_| agv.book.entered);
             ahead.is_none_or(|ahead| ahead.sequence_id != edge.sequence_id)
@@ -68,35 +68,35 @@ records! {
             m.set("released", true);
             true
         });
-    fault "r2-released-not-updated" ["STATE-MSG-13"] "Nodes and edges that were in the horizon once are still listed with released false after an update has released them."
+    fault "released-not-updated" ["STATE-MSG-13"] "Nodes and edges that were in the horizon once are still listed with released false after an update has released them."
         => once_planned(true);
-    fault "r4-released-flag-stale-after-update" ["STATE-MSG-13", "ORD-FLOW-09"] "It keeps released false for edges that an update has moved from the horizon into the base."
+    fault "released-flag-stale-after-update" ["STATE-MSG-13", "ORD-FLOW-09"] "It keeps released false for edges that an update has moved from the horizon into the base."
         => once_planned(false);
-    fault "r1-far-edges-unreleased" ["STATE-MSG-13"] "Of its released edges it reports only the next one as released."
+    fault "far-edges-unreleased" ["STATE-MSG-13"] "Of its released edges it reports only the next one as released."
         => edge(|agv, edge, m| {
             if !is_next(agv, edge.sequence_id) {
                 m.set("released", false);
             }
             true
         });
-    fault "r2-released-numeric" ["JSON-07", "STATE-MSG-13"] "The field released of the edgeStates is 1 or 0."
+    fault "released-numeric" ["JSON-07", "STATE-MSG-13"] "The field released of the edgeStates is 1 or 0."
         => edge(|_, _, m| {
             m.change("released", |released| *released = json!(u8::from(*released == true)));
             true
         });
-    fault "r2-edge-id-misspelled" ["JSON-01", "STATE-MSG-13", "JSON-10"] "The edgeStates name their edge in a field edgeID."
+    fault "edge-id-misspelled" ["JSON-01", "STATE-MSG-13", "JSON-10"] "The edgeStates name their edge in a field edgeID."
         => edge(|_, _, m| {
             m.rename("edgeId", "edgeID");
             true
         });
-    fault "r2-planned-path-of-next-edge-only" ["STATE-14"] "A self-planning vehicle reports the trajectory of the next edge only."
+    fault "planned-path-of-next-edge-only" ["STATE-14"] "A self-planning vehicle reports the trajectory of the next edge only."
         => edge(|agv, edge, m| {
             if !is_next(agv, edge.sequence_id) {
                 m.unset("trajectory");
             }
             true
         });
-    fault "r3-sequence-ids-as-text" ["STATE-MSG-13", "JSON-06"] "It writes sequenceId in nodeStates as a string."
+    fault "sequence-ids-as-text" ["STATE-MSG-13", "JSON-06"] "It writes sequenceId in nodeStates as a string."
         => node(|_, _, m| {
             m.change("sequenceId", |id| *id = Value::String(id.to_string()));
             true

@@ -34,9 +34,9 @@ use serde_json::json;
 use std::time::Duration;
 
 records! {
-    fault "r1-actions-held-offline" ["MQTT-04"] "As long as the link is broken it drives on but begins no action of its order."
+    fault "actions-held-offline" ["MQTT-04"] "As long as the link is broken it drives on but begins no action of its order."
         => forbidding(|agv, what| matches!(what, Permission::Act) && !agv.connection.online);
-    fault "r3-semiautomatic-actions-held" ["MODE-02"] "It does not begin the actions of its order in SEMIAUTOMATIC."
+    fault "semiautomatic-actions-held" ["MODE-02"] "It does not begin the actions of its order in SEMIAUTOMATIC."
         => forbidding(|agv, what| matches!(what, Permission::Act) && agv.mode == Mode::Semiautomatic);
     fault "actions-ignored" ["ACT-01", "ORD-FLOW-07", "ORD-06"] "Never begins the actions of an order."
         => forbidding(|_, what| matches!(what, Permission::Act));
@@ -49,13 +49,13 @@ records! {
             let here = agv.book.edge_ahead().map(|edge| Origin::Edge(edge.sequence_id));
             matches!(what, Permission::Drive) && has_stopped_for(agv, here)
         });
-    fault "r3-node-actions-skipped-offline" ["MQTT-04", "NODE-04"] "It never triggers the actions of nodes that it traverses while the link to the broker is down; they stay WAITING."
+    fault "node-actions-skipped-offline" ["MQTT-04", "NODE-04"] "It never triggers the actions of nodes that it traverses while the link to the broker is down; they stay WAITING."
         => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(_))) && !agv.connection.online);
-    fault "r1-first-node-actions-skipped" ["NODE-04", "ACT-01"] "It never begins the actions of the first node of an order with several nodes, as it stands there already."
+    fault "first-node-actions-skipped" ["NODE-04", "ACT-01"] "It never begins the actions of the first node of an order with several nodes, as it stands there already."
         => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(0))) && !agv.book.nodes.is_empty());
-    fault "r4-one-node-order-actions-not-started" ["ORD-13", "NODE-04"] "It never starts the actions of a one-node order, because nothing is traversed, and keeps them WAITING."
+    fault "one-node-order-actions-not-started" ["ORD-13", "NODE-04"] "It never starts the actions of a one-node order, because nothing is traversed, and keeps them WAITING."
         => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(0))) && agv.book.nodes.is_empty());
-    fault "r3-loop-second-visit-without-actions" ["ORD-UPD-13", "NODE-04"] "It triggers the actions of a node only at its first visit; those of a second visit in the same order stay WAITING."
+    fault "loop-second-visit-without-actions" ["ORD-UPD-13", "NODE-04"] "It triggers the actions of a node only at its first visit; those of a second visit in the same order stay WAITING."
         => keep::<(Vec<String>, bool)>()
             .happens(|(visited, again), agv, event| match event {
                 Event::Begun => visited.clear(),
@@ -67,9 +67,9 @@ records! {
                 _ => {}
             })
             .allows(|(_, again), _, what, usual| usual && !(*again && matches!(what, Permission::Trigger(Origin::Node(_)))));
-    fault "r3-single-node-actions-fail" ["ORD-13", "NODE-04"] "It reports the actions of an order with a single node FAILED without having tried them."
+    fault "single-node-actions-fail" ["ORD-13", "NODE-04"] "It reports the actions of an order with a single node FAILED without having tried them."
         => reaching(|agv, sequence_id| if sequence_id == 0 && agv.book.nodes.is_empty() { fail_at(agv, sequence_id) });
-    fault "r3-passing-actions-fail" ["NODE-04", "ACT-01"] "It reports actions with blockingType NONE FAILED, without having tried them, on nodes where nothing makes it stop."
+    fault "passing-actions-fail" ["NODE-04", "ACT-01"] "It reports actions with blockingType NONE FAILED, without having tried them, on nodes where nothing makes it stop."
         => reaching(|agv, sequence_id| {
             let here = Origin::Node(sequence_id);
             let free = |action: &Action| action.request.blocking == Blocking::None;
@@ -93,7 +93,7 @@ records! {
         });
     fault "edge-actions-on-node" ["NODE-07"] "Begins the actions of an edge while it is held on the node before."
         => passing(|agv, _| trigger_next_edge(agv));
-    fault "r6-edge-action-starts-before-leaving" ["NODE-07"] "It starts the edge action on arrival at the start node although a HARD node action still holds it there."
+    fault "edge-action-starts-before-leaving" ["NODE-07"] "It starts the edge action on arrival at the start node although a HARD node action still holds it there."
         => passing(|agv, _| {
             let here = Origin::Node(agv.book.last_sequence);
             let waits = |action: &Action| action.origin == here && action.status == Status::Waiting;
@@ -116,7 +116,7 @@ records! {
             let free = |action: &&mut Action| action.origin == here && action.request.blocking == Blocking::None && action.status.is_active();
             agv.actions.iter_mut().filter(free).for_each(|action| action.end(Status::Failed));
         });
-    fault "r2-first-edge-actions-fail" ["NODE-06", "ACT-01"] "The actions of the first edge of an order are FAILED without having begun."
+    fault "first-edge-actions-fail" ["NODE-06", "ACT-01"] "The actions of the first edge of an order are FAILED without having begun."
         => when(Event::EdgeEntered(1), |agv| {
             let of_edge = agv.actions.iter_mut().filter(|action| action.origin == Origin::Edge(1));
             of_edge.for_each(|action| action.end(Status::Failed));
@@ -146,7 +146,7 @@ records! {
             _ => false,
         })
         .lasts(on_edges_for_ever);
-    fault "r4-edge-action-ends-with-the-order-only" ["NODE-05", "ACT-02"] "It lets an edge action run on over the end node until the vehicle stops."
+    fault "edge-action-ends-with-the-order-only" ["NODE-05", "ACT-02"] "It lets an edge action run on over the end node until the vehicle stops."
         => forbidding(|agv, what| matches!(what, Permission::LeaveEdge) && goes_on(agv)).happens(|_, agv, event| {
             if matches!(event, Event::NodeReached(_)) && !goes_on(agv) {
                 let ahead = agv.book.edge_ahead().map_or(u32::MAX, |edge| edge.sequence_id);
@@ -159,7 +159,7 @@ records! {
                 }
             }
         });
-    fault "r2-edge-actions-forgotten-with-edge" ["STATE-MSG-10", "STATE-MSG-09"] "The states of edge actions are removed when the vehicle leaves the edge."
+    fault "edge-actions-forgotten-with-edge" ["STATE-MSG-10", "STATE-MSG-09"] "The states of edge actions are removed when the vehicle leaves the edge."
         => plain().happens(|(), agv, event| if let Event::EdgeLeft(id) = event {
             agv.actions.retain(|action| action.origin != Origin::Edge(id));
         });
@@ -194,7 +194,7 @@ records! {
         });
     fault "hard-overlaps" ["BLOCK-05"] "Performs HARD actions beside others."
         => queueing(|_, ids| vec![std::mem::take(ids)]);
-    fault "r1-none-joins-hard" ["BLOCK-05", "BLOCK-06"] "A NONE action that follows a HARD one in the list begins together with it."
+    fault "none-joins-hard" ["BLOCK-05", "BLOCK-06"] "A NONE action that follows a HARD one in the list begins together with it."
         => queueing(|agv, ids| {
             let free = |id: &String| agv.actions.get(id).is_some_and(|action| action.request.blocking == Blocking::None);
             let mut phases: Vec<Vec<String>> = Vec::new();
@@ -209,24 +209,26 @@ records! {
             }
             phases
         });
-    fault "r3-hard-starts-beside-none" ["BLOCK-05", "BLOCK-06"] "It starts a HARD action while a NONE action before it is still running."
+    fault "hard-starts-beside-none" ["BLOCK-05", "BLOCK-06"] "It starts a HARD action while a NONE action before it is still running."
+        because "An action that blocks nothing runs beside it; that BLOCK-05 also reaches back to what runs already is a matter of reading."
         => forbidding(|_, what| matches!(what, Permission::Await(action, _) if action.request.blocking == Blocking::None));
-    fault "r2-hard-ignores-earlier-node" ["BLOCK-05"] "A HARD action begins although a NONE action of an earlier node or edge is still running."
+    fault "hard-ignores-earlier-node" ["BLOCK-05"] "A HARD action begins although a NONE action of an earlier node or edge is still running."
+        because "The node of the other action is left behind; that BLOCK-05 reaches so far is a matter of reading."
         => forbidding(|_, what| matches!(what, Permission::Await(action, origin) if action.origin != origin));
-    fault "r1-prepares-while-driving" ["BLOCK-03", "BLOCK-04"] "It drives on while a SOFT or HARD action is INITIALIZING, and stops only when that action runs."
+    fault "prepares-while-driving" ["BLOCK-03", "BLOCK-04"] "It drives on while a SOFT or HARD action is INITIALIZING, and stops only when that action runs."
         => letting(|_, what| matches!(what, Permission::DriveDuring(action) if action.status == Status::Initializing));
-    fault "r6-edge-actions-do-not-block" ["BLOCK-04", "BLOCK-03"] "It goes on driving during SOFT and HARD actions of an edge."
+    fault "edge-actions-do-not-block" ["BLOCK-04", "BLOCK-03"] "It goes on driving during SOFT and HARD actions of an edge."
         => letting(|_, what| match what {
             Permission::DriveDuring(action) => matches!(action.origin, Origin::Edge(_)),
             what => matches!(what, Permission::PassOver(_)),
         });
-    fault "r3-soft-edge-action-drives" ["BLOCK-03"] "It does not stop for SOFT actions of an edge."
+    fault "soft-edge-action-drives" ["BLOCK-03"] "It does not stop for SOFT actions of an edge."
         => letting(|_, what| match what {
             Permission::DriveDuring(action) => is_soft(action) && matches!(action.origin, Origin::Edge(_)),
             Permission::PassOver(action) => is_soft(action),
             _ => false,
         });
-    fault "r6-only-last-action-blocks" ["BLOCK-03", "BLOCK-04"] "It drives on as soon as the last action of the list has ended, although an earlier SOFT action of the same node still runs."
+    fault "only-last-action-blocks" ["BLOCK-03", "BLOCK-04"] "It drives on as soon as the last action of the list has ended, although an earlier SOFT action of the same node still runs."
         => letting(|agv, what| match what {
             Permission::DriveDuring(action) => {
                 let ended = last_of(agv, action.origin).is_some_and(|last| last.status.is_terminal());
@@ -234,7 +236,7 @@ records! {
             }
             _ => false,
         });
-    fault "r4-node-with-none-only-stops-following-soft" ["BLOCK-03"] "It drives on during a SOFT action when a NONE action follows it in the list."
+    fault "node-with-none-only-stops-following-soft" ["BLOCK-03"] "It drives on during a SOFT action when a NONE action follows it in the list."
         => letting(|agv, what| match what {
             Permission::DriveDuring(action) => is_soft(action) && last_of(agv, action.origin).is_some_and(|last| last.request.blocking == Blocking::None),
             _ => false,
@@ -247,7 +249,7 @@ records! {
         => triggered(|| MOMENT);
     fault "trigger-given-up" ["ACT-37"] "Waits for a trigger for a second and a half only."
         => triggered(|| Duration::from_millis(1_500));
-    fault "r1-trigger-times-out" ["ACT-37"] "A waitForTrigger is FINISHED after five seconds also without the trigger."
+    fault "trigger-times-out" ["ACT-37"] "A waitForTrigger is FINISHED after five seconds also without the trigger."
         => triggered(|| Duration::from_secs(5));
     fault "trigger-skipped" ["ACT-37"] "Reports waitForTrigger FINISHED without waiting."
         => triggered(|| Duration::from_millis(1));
@@ -255,12 +257,13 @@ records! {
         => forgetting(|_| true);
     fault "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10"] "Removes instant actions from its states when they are done."
         => forgetting(|action| !action.of_order());
-    fault "r6-action-errors-never-clear" ["ERR-01"] "It never removes the error of a failed action, also not after the next orders were accepted and completed."
+    fault "action-errors-never-clear" ["ERR-01"] "It never removes the error of a failed action, also not after the next orders were accepted and completed."
         => failure(|_, _, e| {
             e.life = Life::Always;
             true
         });
-    fault "r4-result-description-only-in-first-state" ["STATE-MSG-12", "STATE-MSG-10"] "It gives the resultDescription of a finished action in one state only and leaves it out afterwards."
+    fault "result-description-only-in-first-state" ["STATE-MSG-12", "STATE-MSG-10"] "It gives the resultDescription of a finished action in one state only and leaves it out afterwards."
+        because "STATE-MSG-12 asks for a description where it applies; how long it stays is not said."
         => keep::<Vec<String>>()
             .sends(|told, _, outgoing| {
                 if outgoing.name == "state" {
@@ -282,9 +285,9 @@ records! {
         });
     liberty "prepares-everything" ["ASTATE-03"] "Prepares every action of an order, and reports it INITIALIZING."
         => letting(|_, what| matches!(what, Permission::Prepare));
-    liberty "r1-never-prepares" ["ASTATE-03", "ACT-41"] "It reports no action as INITIALIZING when it needs no preparation."
+    liberty "never-prepares" ["ASTATE-03", "ACT-41"] "It reports no action as INITIALIZING when it needs no preparation."
         => forbidding(|_, what| matches!(what, Permission::Prepare));
-    liberty "r3-drives-on-late" ["BLOCK-07"] "It stands for half a second after a blocking action has ended before it drives on."
+    liberty "drives-on-late" ["BLOCK-07"] "It stands for half a second after a blocking action has ended before it drives on."
         => plain().ends(|(), agv, action, outcome| {
             let stops = action.of_order() && action.request.blocking != Blocking::None && !agv.book.nodes.is_empty();
             if stops && matches!(outcome, Outcome::Done(_)) {
@@ -292,35 +295,35 @@ records! {
             }
             outcome
         });
-    liberty "r3-node-actions-in-next-state" ["NODE-04"] "It reports the traversal of a node with actions while they are still WAITING, stands there for a moment, and begins them right after that state."
+    liberty "node-actions-in-next-state" ["NODE-04"] "It reports the traversal of a node with actions while they are still WAITING, stands there for a moment, and begins them right after that state."
         => reaching(|agv, sequence_id| if agv.actions.waiting_at(Origin::Node(sequence_id)) {
             // It stands on the node, and says so.
             linger(agv, 100);
             agv.flush();
         });
-    liberty "r1-cut-edge-actions-fail" ["NODE-05"] "It reports an edge action as FAILED that it ends because it leaves the edge."
+    liberty "cut-edge-actions-fail" ["NODE-05"] "It reports an edge action as FAILED that it ends because it leaves the edge."
         => forbidding(|_, what| matches!(what, Permission::EndWithEdge(action) if action.status.is_active())).happens(|_, agv, event| if let Event::EdgeLeft(id) = event {
             let cut = agv.actions.iter_mut().filter(|action| action.origin == Origin::Edge(id) && action.status.is_active());
             cut.for_each(|action| action.end(Status::Failed));
         });
-    liberty "r2-failures-described" ["STATE-MSG-12"] "Failed actions have a resultDescription that says why, beside the error."
+    liberty "failures-described" ["STATE-MSG-12"] "Failed actions have a resultDescription that says why, beside the error."
         => failure(|agv, action, e| {
             if let Some(action) = agv.actions.get_mut(&action.request.id) {
                 action.result = Some(e.description.clone());
             }
             true
         });
-    liberty "r3-action-errors-until-new-order" ["IACT-06", "ACT-30", "ERR-01"] "It shows the error about a failed action until a new order is accepted."
+    liberty "action-errors-until-new-order" ["IACT-06", "ACT-30", "ERR-01"] "It shows the error about a failed action until a new order is accepted."
         => failure(|_, _, e| {
             e.life = Life::UntilNewOrder;
             true
         });
-    liberty "r3-action-errors-brief" ["IACT-06", "ACT-30", "MAP-19"] "It shows the error about a failed action for one or two states only."
+    liberty "action-errors-brief" ["IACT-06", "ACT-30", "MAP-19"] "It shows the error about a failed action for one or two states only."
         => failure(|agv, _, e| {
             e.life = Life::Until(agv.moment() + brief(agv));
             true
         });
-    liberty "r2-log-name-in-information" ["ACT-27", "INFO-01"] "The name of the last log is in the information of the states instead of a resultDescription, which the factsheet does not announce either."
+    liberty "log-name-in-information" ["ACT-27", "INFO-01"] "The name of the last log is in the information of the states instead of a resultDescription, which the factsheet does not announce either."
         => keep::<Option<(String, String)>>()
             .ends(|log, _, action, outcome| match outcome {
                 Outcome::Done(Some(name)) if is(action, Deed::LogReport) => {

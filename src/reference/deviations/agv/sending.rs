@@ -16,25 +16,28 @@ records! {
         => sending(|_, out| if out.name == "state" { out.topic.push('s') });
     fault "misspelled-topic" ["TOPIC-01", "TOPIC-11"] "Publishes its factsheet on a topic spelled with an underscore."
         => sending(|_, out| if let Some(above) = out.topic.strip_suffix("factsheet") { out.topic = format!("{above}fact_sheet") });
-    fault "r3-visualization-spelled-british" ["TOPIC-01"] "It publishes its visualization on the topic visualisation."
+    fault "visualization-spelled-british" ["TOPIC-01"] "It publishes its visualization on the topic visualisation."
         => sending(|_, out| if let Some(above) = out.topic.strip_suffix("visualization") { out.topic = format!("{above}visualisation") });
     fault "state-qos-1" ["MQTT-07"] "Publishes the state with QoS 1." because "A higher QoS delivers the state as well; the ruling of MQTT-06 and MQTT-07 is a warning."
         => sending(|_, out| if out.name == "state" { out.qos = 1 });
-    fault "r2-warned-state-qos-one" ["MQTT-07"] "States that hold an error are published with QoS 1."
+    fault "warned-state-qos-one" ["MQTT-07"] "States that hold an error are published with QoS 1."
+        because "The ruling of MQTT-07 makes a higher quality of service a warning: a state with QoS 1 harms nobody."
         => sending(|agv, out| if out.name == "state" && !agv.errors.is_empty() { out.qos = 1 });
-    fault "r1-visualization-qos-one" ["MQTT-07"] "It publishes the visualization with QoS 1."
+    fault "visualization-qos-one" ["MQTT-07"] "It publishes the visualization with QoS 1."
+        because "The ruling of MQTT-07 makes a higher quality of service a warning: a visualization with QoS 1 harms nobody."
         => sending(|_, out| if out.name == "visualization" { out.qos = 1 });
     fault "factsheet-qos-2" ["MQTT-07"] "Publishes the factsheet with QoS 2." because "A higher QoS delivers the factsheet as well; the ruling of MQTT-06 and MQTT-07 is a warning."
         => sending(|_, out| if out.name == "factsheet" { out.qos = 2 });
     fault "factsheet-not-retained" ["FACT-01"] "Publishes the factsheet without the retain flag."
         => sending(|_, out| if out.name == "factsheet" { out.retain = false });
-    fault "r1-factsheet-answer-not-retained" ["FACT-01"] "It answers a factsheetRequest with a factsheet without the retain flag."
+    fault "factsheet-answer-not-retained" ["FACT-01"] "It answers a factsheetRequest with a factsheet without the retain flag."
         => sending(|agv, out| if out.name == "factsheet" && agv.connection.factsheet_asked { out.retain = false });
     fault "no-factsheet" ["TOPIC-11", "ACT-40"] "Never publishes a factsheet."
         => unsaid(|_, name, _| name == "factsheet");
     fault "visualization-missing" ["VIS-02", "TOPIC-12"] "States a visualization interval and publishes none." because "It breaks a recommendation only."
         => unsaid(|_, name, _| name == "visualization");
-    fault "r1-visualization-only-moving" ["VIS-02"] "It publishes its visualization only while it moves, though the factsheet states an interval."
+    fault "visualization-only-moving" ["VIS-02"] "It publishes its visualization only while it moves, though the factsheet states an interval."
+        because "The topic is optional, and VIS-02, the rate on it, is a recommendation."
         => unsaid(|agv, name, _| name == "visualization" && !agv.motion.is_moving());
 
     fault "nul-after-json" ["MQTT-02", "JSON-10", "STATE-02"] "Sends the terminating zero byte of its string with every periodic state."
@@ -53,12 +56,12 @@ records! {
             let other: &[u8] = if agv.motion.is_moving() { b"{\"driving\":false," } else { b"{\"driving\":true," };
             replace(text, b"{", other);
         });
-    fault "r1-reach-unlimited" ["JSON-08", "MQTT-02", "STATE-MSG-15"] "While it charges it reports its reach as the overflowing number 1e999."
+    fault "reach-unlimited" ["JSON-08", "MQTT-02", "STATE-MSG-15"] "While it charges it reports its reach as the overflowing number 1e999."
         => plain().writes(|agv, _, text| if agv.charging { replace(text, b"\"reach\":8000", b"\"reach\":1e999") });
 
     fault "state-silence" ["STATE-02"] "Sends states only every 45 seconds when nothing happens."
         => silent(|_| true);
-    fault "r1-silent-when-idle" ["STATE-02"] "Without an order it sends no state for 45 seconds."
+    fault "silent-when-idle" ["STATE-02"] "Without an order it sends no state for 45 seconds."
         => silent(|agv| !agv.is_busy());
     fault "silent-while-held" ["STATE-02"] "Sends states only every 45 seconds while it waits for a release."
         => silent(|agv| agv.waits_at_decision_point());
@@ -66,7 +69,7 @@ records! {
         => silent(|agv| agv.holds.pause);
     fault "silent-by-hand" ["STATE-02"] "Sends states only every 45 seconds in MANUAL."
         => silent(|agv| agv.mode == Mode::Manual);
-    fault "r2-silent-in-emergency" ["STATE-02"] "While the emergency stop is pressed no state comes for 45 s unless something changes."
+    fault "silent-in-emergency" ["STATE-02"] "While the emergency stop is pressed no state comes for 45 s unless something changes."
         => silent(|agv| agv.holds.emergency);
     fault "silent-while-acting" ["STATE-02"] "Sends states only every 45 seconds while an action runs."
         => silent(|agv| agv.actions.iter().any(|action| action.of_order() && action.status.is_active()));

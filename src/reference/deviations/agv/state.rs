@@ -22,11 +22,11 @@ records! {
         => state(|agv, m| if is_done(agv) { m.set("orderId", "") });
     fault "order-id-forgotten-on-request" ["STATE-MSG-02", "STATE-13"] "Answers a stateRequest without its orderId."
         => state(|agv, m| if agv.report.answers_request() { m.set("orderId", "") });
-    fault "r1-no-order-null" ["JSON-06", "STATE-MSG-02", "STATE-MSG-01"] "Before its first order it reports null as orderId."
+    fault "no-order-null" ["JSON-06", "STATE-MSG-02", "STATE-MSG-01"] "Before its first order it reports null as orderId."
         => state(|agv, m| if !agv.book.has_order() { m.set("orderId", Value::Null) });
     fault "order-id-prefixed" ["ORD-FLOW-06", "STATE-MSG-02"] "Shows orderIds with its own serial number in front."
         => state(|_, m| text(m, "orderId", |id| if id.is_empty() { String::new() } else { format!("7-{id}") }));
-    fault "r4-order-id-cut-at-32" ["ORD-FLOW-06", "STATE-MSG-02"] "It keeps an orderId in a buffer of 32 characters, so that a longer one (such as a UUID) is reported cut off."
+    fault "order-id-cut-at-32" ["ORD-FLOW-06", "STATE-MSG-02"] "It keeps an orderId in a buffer of 32 characters, so that a longer one (such as a UUID) is reported cut off."
         => state(|_, m| text(m, "orderId", |id| id.chars().take(32).collect()));
     fault "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete."
         => state(|agv, m| if is_done(agv) { m.set("orderUpdateId", 0) });
@@ -39,12 +39,13 @@ records! {
         => state(|agv, m| if is_done(agv) { m.set("lastNodeId", "") });
     fault "last-node-unknown-on-request" ["STATE-MSG-04"] "Answers a stateRequest without its last node."
         => state(|agv, m| if agv.report.answers_request() { m.set("lastNodeId", "") });
-    fault "r2-last-node-is-next-node" ["STATE-MSG-04", "NODE-03"] "On an edge the vehicle reports the node it drives to as lastNodeId and lastNodeSequenceId."
+    fault "last-node-is-next-node" ["STATE-MSG-04", "NODE-03"] "On an edge the vehicle reports the node it drives to as lastNodeId and lastNodeSequenceId."
+        because "lastNodeId and what is left of the route contradict each other; which of them is wrong cannot be told, so that NODE-03 is warned of."
         => state(|agv, m| if let Some(ahead) = agv.book.nodes.front().filter(|_| agv.book.entered) {
             m.set("lastNodeId", ahead.node.id.clone());
             m.set("lastNodeSequenceId", ahead.node.sequence_id);
         });
-    fault "r1-last-node-after-actions" ["NODE-03", "STATE-MSG-04"] "It removes the node state at a node with actions but sets lastNodeId and lastNodeSequenceId when the actions have ended."
+    fault "last-node-after-actions" ["NODE-03", "STATE-MSG-04"] "It removes the node state at a node with actions but sets lastNodeId and lastNodeSequenceId when the actions have ended."
         => state(|agv, m| {
             let here = Origin::Node(agv.book.last_sequence);
             let (node, sequence) = &agv.book.previous;
@@ -53,11 +54,11 @@ records! {
                 m.set("lastNodeSequenceId", *sequence);
             }
         });
-    fault "r1-last-sequence-reset-when-done" ["STATE-MSG-04"] "When its order is complete it reports lastNodeSequenceId 0."
+    fault "last-sequence-reset-when-done" ["STATE-MSG-04"] "When its order is complete it reports lastNodeSequenceId 0."
         => state(|agv, m| if is_done(agv) { m.set("lastNodeSequenceId", 0) });
-    fault "r3-last-sequence-counts-nodes" ["STATE-MSG-04", "NODE-03"] "It counts only nodes in lastNodeSequenceId: 1 at the second node of an order instead of 2."
+    fault "last-sequence-counts-nodes" ["STATE-MSG-04", "NODE-03"] "It counts only nodes in lastNodeSequenceId: 1 at the second node of an order instead of 2."
         => state(|agv, m| m.set("lastNodeSequenceId", agv.book.last_sequence / 2));
-    fault "r2-last-sequence-minus-one" ["JSON-09", "STATE-MSG-04"] "Before its first order the vehicle reports lastNodeSequenceId -1."
+    fault "last-sequence-minus-one" ["JSON-09", "STATE-MSG-04"] "Before its first order the vehicle reports lastNodeSequenceId -1."
         => state(|agv, m| if !agv.book.has_order() { m.set("lastNodeSequenceId", -1) });
     fault "distance-not-reset" ["STATE-MSG-18"] "Counts the distance since its last node from the beginning of its order." because "It breaks a recommendation only."
         => keep::<Option<(f64, f64)>>()
@@ -80,14 +81,14 @@ records! {
         => state(|_, m| m.set("driving", false));
     fault "turns-without-driving" ["STATE-MSG-08"] "Does not say that it drives while it turns on the spot."
         => state(|agv, m| if agv.motion.is_turning() { m.set("driving", false) });
-    fault "r1-turning-not-driving" ["STATE-MSG-08"] "It reports driving as false while it turns on the spot."
+    fault "turning-not-driving" ["STATE-MSG-08"] "It reports driving as false while it turns on the spot."
         => state(|agv, m| {
             let velocity = agv.motion.velocity();
             if velocity.vx == 0.0 && velocity.omega != 0.0 {
                 m.set("driving", false);
             }
         });
-    fault "r3-slow-drive-not-driving" ["STATE-MSG-08"] "It reports driving false while it drives slower than 0.75 m/s."
+    fault "slow-drive-not-driving" ["STATE-MSG-08"] "It reports driving false while it drives slower than 0.75 m/s."
         => state(|agv, m| {
             let vx = agv.motion.velocity().vx;
             if vx != 0.0 && vx.abs() < 0.75 {
@@ -108,7 +109,7 @@ records! {
         => state(|_, m| m.unset("paused"));
     fault "button-pause-unreported" ["ACT-17"] "Does not report a pause made with the button."
         => state(|agv, m| if !agv.holds.pause { m.set("paused", agv.holds.emergency) });
-    fault "r1-pause-unreported-when-idle" ["ACT-13"] "Paused without an order, it reports the startPause FINISHED but paused as false."
+    fault "pause-unreported-when-idle" ["ACT-13"] "Paused without an order, it reports the startPause FINISHED but paused as false."
         => state(|agv, m| if is_done(agv) { m.set("paused", agv.holds.button || agv.holds.emergency) });
     fault "new-base-request-always" ["STATE-16"] "Asks for a new base all the time." because "It breaks a recommendation only."
         => state(|_, m| m.set("newBaseRequest", true));
@@ -126,9 +127,9 @@ records! {
                 true
             });
 
-    fault "r2-position-omitted-in-manual" ["MODE-06", "STATE-MSG-05"] "In MANUAL the states carry no agvPosition."
+    fault "position-omitted-in-manual" ["MODE-06", "STATE-MSG-05"] "In MANUAL the states carry no agvPosition."
         => state(|agv, m| if agv.mode == Mode::Manual { m.unset("agvPosition") });
-    fault "r6-no-position-at-standstill" ["STATE-MSG-05"] "It leaves agvPosition out of the state while it stands still without an order."
+    fault "no-position-at-standstill" ["STATE-MSG-05"] "It leaves agvPosition out of the state while it stands still without an order."
         => state(|agv, m| if is_done(agv) && !agv.motion.is_moving() { m.unset("agvPosition") });
     fault "maps-reported-empty" ["MAP-15", "MAP-20"] "Reports no maps although it drives on one."
         => state(|_, m| m.change("maps", |maps| *maps = json!([])));
@@ -139,24 +140,24 @@ records! {
 
     fault "loads-always-empty" ["STATE-MSG-06", "ACT-28"] "Reports no load although it carries one."
         => state(|_, m| m.set("loads", json!([])));
-    fault "r1-loads-omitted-when-empty" ["STATE-MSG-06"] "It reports loads while it carries one, and leaves the field out when it is unloaded."
+    fault "loads-omitted-when-empty" ["STATE-MSG-06"] "It reports loads while it carries one, and leaves the field out when it is unloaded."
         => state(|agv, m| if agv.loads.is_empty() { m.unset("loads") });
     fault "load-weight-negative" ["STATE-MSG-07"] "Reports a negative weight of its load."
         => state(|_, m| m.each("loads", |load| load.set("weight", -1.0)));
-    fault "r1-load-position-unlisted" ["FACT-09", "STATE-MSG-07"] "It reports a load on a loadPosition that its factsheet does not list."
+    fault "load-position-unlisted" ["FACT-09", "STATE-MSG-07"] "It reports a load on a loadPosition that its factsheet does not list."
         => state(|_, m| m.each("loads", |load| load.set("loadPosition", "1")));
-    fault "r1-load-width-missing" ["STATE-MSG-07", "JSON-10"] "The loadDimensions of its load have no width."
+    fault "load-width-missing" ["STATE-MSG-07", "JSON-10"] "The loadDimensions of its load have no width."
         => state(|_, m| m.each("loads", |load| load.part("loadDimensions", |size| size.unset("width"))));
 
     fault "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state."
         => state(|_, m| m.part("batteryState", |b| b.unset("batteryCharge")));
     fault "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent."
         => state(|agv, m| m.part("batteryState", |b| b.set("batteryCharge", if agv.motion.is_moving() { 0.0 } else { 100.0 })));
-    fault "r1-battery-health-unknown" ["STATE-MSG-15", "JSON-09"] "It reports an unknown battery health as 255."
+    fault "battery-health-unknown" ["STATE-MSG-15", "JSON-09"] "It reports an unknown battery health as 255."
         => state(|_, m| m.part("batteryState", |b| b.set("batteryHealth", 255)));
     fault "boolean-as-text" ["JSON-07", "STATE-MSG-15", "ACT-19"] "Sends charging as a word in quotes."
         => state(|_, m| m.part("batteryState", |b| b.change("charging", |charging| *charging = Value::String(charging.to_string()))));
-    fault "r2-reach-minus-one" ["STATE-MSG-15", "JSON-09"] "batteryState.reach is -1 for unknown."
+    fault "reach-minus-one" ["STATE-MSG-15", "JSON-09"] "batteryState.reach is -1 for unknown."
         => state(|_, m| m.part("batteryState", |b| b.set("reach", -1)));
     fault "reach-fractional" ["JSON-09", "STATE-MSG-15", "JSON-06"] "Estimates its reach in fractions of a metre."
         => state(|_, m| m.part("batteryState", |b| b.set("reach", 8_000.5)));
@@ -167,7 +168,7 @@ records! {
         => state(|agv, m| m.set("operatingMode", agv.mode as u8));
     fault "mode-lower-case" ["JSON-02", "MODE-01"] "Spells the operating mode in lower case."
         => state(|_, m| text(m, "operatingMode", str::to_ascii_lowercase));
-    fault "r1-semiautomatic-underscore" ["MODE-01", "JSON-02"] "It reports the mode SEMIAUTOMATIC as SEMI_AUTOMATIC."
+    fault "semiautomatic-underscore" ["MODE-01", "JSON-02"] "It reports the mode SEMIAUTOMATIC as SEMI_AUTOMATIC."
         => state(|_, m| text(m, "operatingMode", |mode| mode.replace("SEMIAUTOMATIC", "SEMI_AUTOMATIC")));
     fault "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list."
         => state(|agv, m| m.set("operatingMode", match agv.mode {
@@ -186,19 +187,19 @@ records! {
         => state(|_, m| m.part("safetyState", |s| text(s, "eStop", |stop| stop.replace("NONE", "Off"))));
     fault "emergency-stop-null" ["STATE-MSG-17", "JSON-10", "JSON-02"] "Writes null where no emergency stop is active."
         => state(|_, m| m.part("safetyState", |s| if s.says("eStop", "NONE") { s.set("eStop", Value::Null) }));
-    fault "r1-auto-ack-mixed-case" ["JSON-02", "STATE-MSG-17"] "While its field is violated it reports the e-stop as AutoAck."
+    fault "auto-ack-mixed-case" ["JSON-02", "STATE-MSG-17"] "While its field is violated it reports the e-stop as AutoAck."
         => state(|_, m| m.part("safetyState", |s| text(s, "eStop", |stop| stop.replace("AUTOACK", "AutoAck"))));
-    fault "r3-e-stop-lower-case" ["JSON-01", "STATE-MSG-17"] "It writes the member eStop of safetyState as estop."
+    fault "e-stop-lower-case" ["JSON-01", "STATE-MSG-17"] "It writes the member eStop of safetyState as estop."
         => state(|_, m| m.part("safetyState", |s| s.rename("eStop", "estop")));
-    fault "r1-field-violation-counted" ["JSON-07", "STATE-MSG-17"] "While its field is violated it reports fieldViolation as the number 1."
+    fault "field-violation-counted" ["JSON-07", "STATE-MSG-17"] "While its field is violated it reports fieldViolation as the number 1."
         => state(|agv, m| if agv.holds.field { m.part("safetyState", |s| s.set("fieldViolation", 1)) });
-    fault "r3-field-violation-unreported" ["STATE-MSG-17"] "It keeps fieldViolation false while something stands in its protective field."
+    fault "field-violation-unreported" ["STATE-MSG-17"] "It keeps fieldViolation false while something stands in its protective field."
         => state(|_, m| m.part("safetyState", |s| s.set("fieldViolation", false)));
 
     fault "info-level-warning" ["INFO-01", "JSON-02"] "Reports an information with the level WARNING."
         => state(|_, m| m.set("information", json!([{ "infoType": "service", "infoLevel": "WARNING" }])));
-    fault "r2-info-references-as-map" ["INFO-01", "BP-04"] "The infoReferences of an information entry are an object of keys and values instead of an array."
+    fault "info-references-as-map" ["INFO-01", "BP-04"] "The infoReferences of an information entry are an object of keys and values instead of an array."
         => state(|agv, m| if agv.is_flashing() { m.each("information", |info| info.set("infoReferences", json!({ "device": "lights" }))) });
-    fault "r1-info-type-missing" ["INFO-01"] "The information that its warning lights are on has no infoType."
+    fault "info-type-missing" ["INFO-01"] "The information that its warning lights are on has no infoType."
         => state(|agv, m| if agv.is_flashing() { m.set("information", json!([{ "infoDescription": "warning lights on", "infoLevel": "INFO" }])) });
 }

@@ -22,7 +22,7 @@ records! {
         });
     fault "pick-failure-finished" ["ACT-29"] "Reports pick FINISHED although there was nothing to pick."
         => fails_unseen(Deed::Pick);
-    fault "r1-pick-reported-late" ["ACT-28", "STATE-04", "STATE-MSG-06"] "It reports a load it has picked two seconds after the pick is FINISHED."
+    fault "pick-reported-late" ["ACT-28", "STATE-04", "STATE-MSG-06"] "It reports a load it has picked two seconds after the pick is FINISHED."
         => keep::<Option<Moment>>()
             .ends(|hidden, agv, action, outcome| {
                 if is(action, Deed::Pick) && matches!(outcome, Outcome::Done(_)) {
@@ -45,11 +45,11 @@ records! {
             Outcome::Failed(problem) if problem.reason == "the place is taken" => Outcome::Done(None),
             other => other,
         });
-    fault "r3-drop-without-load-finished" ["ACT-29"] "It reports drop FINISHED although it carries no load."
+    fault "drop-without-load-finished" ["ACT-29"] "It reports drop FINISHED although it carries no load."
         => instead(Deed::Drop, |agv, _| agv.loads.is_empty().then_some(Outcome::Done(None)));
     fault "drop-reported-late" ["ACT-28"] "Shows its load for another second after drop is FINISHED."
         => dropping_late(|_| Duration::from_secs(1));
-    fault "r6-drop-finished-before-load-gone" ["ACT-28"] "It reports drop FINISHED while loads still lists the load, which goes one state later."
+    fault "drop-finished-before-load-gone" ["ACT-28"] "It reports drop FINISHED while loads still lists the load, which goes one state later."
         => dropping_late(brief);
     fault "failure-changes-load" ["ACT-29"] "Changes the load it shows although its pick or drop has failed."
         => keep::<()>().ends(|(), agv, action, outcome| {
@@ -75,7 +75,7 @@ records! {
             let silent = [Deed::Pick, Deed::Drop, Deed::StartCharging, Deed::StopCharging];
             !silent.into_iter().any(|deed| is(action, deed))
         });
-    fault "r3-failure-blames-first-action" ["BP-03"] "It references the first action of the order in the error about a failed one, whichever failed."
+    fault "failure-blames-first-action" ["BP-03"] "It references the first action of the order in the error about a failed one, whichever failed."
         => failure(|agv, action, e| {
             if let Some(first) = agv.actions.iter().find(|other| other.of_order() && action.of_order()) {
                 let named = e.references.iter_mut().filter(|(key, _)| key == "actionId");
@@ -83,7 +83,7 @@ records! {
             }
             true
         });
-    fault "r3-failed-pick-retried" ["ASTATE-06", "ASTATE-05"] "It reports a pick or drop FAILED, tries it once more as RUNNING, and reports FAILED again."
+    fault "failed-pick-retried" ["ASTATE-06", "ASTATE-05"] "It reports a pick or drop FAILED, tries it once more as RUNNING, and reports FAILED again."
         => keep::<Vec<String>>().raises(|tried, agv, cause, _| match cause {
             Cause::Failure(Some(action)) if action.of_order() && (is(action, Deed::Pick) || is(action, Deed::Drop)) && !tried.contains(&action.request.id) => {
                 tried.push(action.request.id.clone());
@@ -125,9 +125,9 @@ records! {
         => succeeded_again(Deed::StartCharging, |was| !was);
     fault "charging-unreported" ["ACT-19"] "Does not report that it charges."
         => succeeded(Deed::StartCharging, |agv, _| agv.charging = false);
-    fault "r3-charging-reported-late" ["ACT-19"] "It reports startCharging FINISHED two seconds before charging becomes true."
+    fault "charging-reported-late" ["ACT-19"] "It reports startCharging FINISHED two seconds before charging becomes true."
         => charging_late(|_| Duration::from_secs(2));
-    fault "r6-charging-flag-lags" ["ACT-19"] "It reports startCharging FINISHED one state before charging becomes true."
+    fault "charging-flag-lags" ["ACT-19"] "It reports startCharging FINISHED one state before charging becomes true."
         => charging_late(brief);
     fault "charging-end-failure-finished" ["ACT-20", "ACT-19"] "Reports stopCharging FINISHED although it cannot leave the charger."
         => fails_unseen(Deed::StopCharging);
@@ -153,7 +153,7 @@ records! {
                 let refused = relation != Relation::Known && until.is_some_and(|until| until > agv.moment());
                 refused.then(|| Refusal::new(Rule::OtherOrderActive, "the vehicle is still at the charger"))
             });
-    fault "r1-node-stop-charging-unreported" ["ACT-19"] "A stopCharging on a node is FINISHED while charging stays true."
+    fault "node-stop-charging-unreported" ["ACT-19"] "A stopCharging on a node is FINISHED while charging stays true."
         => keep::<bool>()
             .does(|was, agv, _| {
                 *was = agv.charging;
@@ -165,12 +165,13 @@ records! {
                 }
                 outcome
             });
-    fault "r6-second-stop-charging-fails" ["ACT-11"] "It reports stopCharging FAILED when it is not charging."
+    fault "second-stop-charging-fails" ["ACT-11"] "It reports stopCharging FAILED when it is not charging."
+        because "Of actions that are marked idempotent some have cases of FAILED; the ruling of ACT-11 leaves a warning."
         => instead(Deed::StopCharging, |agv, action| {
             let idle = !agv.charging;
             idle.then(|| Outcome::Failed(Problem::new(Area::Charging, action, "the vehicle does not charge")))
         });
-    fault "r4-stop-charging-flag-late" ["ACT-19"] "It reports stopCharging FINISHED while batteryState.charging is still true for some seconds."
+    fault "stop-charging-flag-late" ["ACT-19"] "It reports stopCharging FINISHED while batteryState.charging is still true for some seconds."
         => keep::<Option<Moment>>()
             .does(|due, agv, action| {
                 if is(action, Deed::StartCharging) {

@@ -57,7 +57,7 @@ records! {
                 }
                 false => Telling::Now,
             });
-    fault "r4-no-state-on-plain-nodes" ["STATE-06", "STATE-09"] "It sends no state when it passes a node that has no actions."
+    fault "no-state-on-plain-nodes" ["STATE-06", "STATE-09"] "It sends no state when it passes a node that has no actions."
         => plain().tells(|(), agv, changes, _| {
             let plain = agv.book.left.0.as_ref().is_some_and(|stop| stop.node.actions.is_empty());
             match changes.node && plain && !changes.driving && !changes.actions && !changes.order {
@@ -67,7 +67,7 @@ records! {
         });
     fault "state-bursts" ["STATE-11"] "Sends every state five times." because "It breaks a recommendation only."
         => again(4);
-    fault "r4-reconnect-replays-buffered-states" ["FACT-14", "STATE-11"] "It sends all states that it has stored during a link loss in one burst after the reconnect."
+    fault "reconnect-replays-buffered-states" ["FACT-14", "STATE-11"] "It sends all states that it has stored during a link loss in one burst after the reconnect."
         => keep::<Vec<(String, Object)>>().happens(|buffered, agv, event| match event {
             Event::Settled if !agv.connection.online => {
                 let body = agv.state_picture();
@@ -83,7 +83,7 @@ records! {
             },
             _ => {}
         });
-    fault "r4-reconnect-relists-traversed-nodes" ["MQTT-03", "STATE-12"] "It reloads the node states of the moment of the link loss, so that nodes traversed during the outage are listed again after the reconnect."
+    fault "reconnect-relists-traversed-nodes" ["MQTT-03", "STATE-12"] "It reloads the node states of the moment of the link loss, so that nodes traversed during the outage are listed again after the reconnect."
         => keep::<(VecDeque<Stop>, Vec<Stop>)>()
             .happens(|(before, again), agv, event| match event {
                 Event::ConnectionLost => before.clone_from(&agv.book.nodes),
@@ -119,15 +119,15 @@ records! {
             .due(|due| *due);
     liberty "every-state-twice" ["STATE-02"] "Sends every state a second time."
         => again(1);
-    liberty "r2-online-again" ["CONN-05", "CONN-10"] "The vehicle publishes ONLINE again with every tenth state."
+    liberty "online-again" ["CONN-05", "CONN-10"] "The vehicle publishes ONLINE again with every tenth state."
         => when(Event::StateSent, |agv| if agv.states_sent.is_multiple_of(10) { agv.publish_connection("ONLINE") });
     liberty "factsheet-again" ["FACT-01"] "Publishes its factsheet with every tenth state."
         => when(Event::StateSent, |agv| if agv.states_sent.is_multiple_of(10) { agv.publish_factsheet() });
-    liberty "r2-first-state-late" ["CONN-05", "STATE-02"] "The first state of a connection comes more than a second after ONLINE."
+    liberty "first-state-late" ["CONN-05", "STATE-02"] "The first state of a connection comes more than a second after ONLINE."
         => when(Event::Reporting, |agv| agv.report.silent_until = Some(agv.moment() + Duration::from_millis(1_200)));
-    liberty "r6-lib-battery-good-or-bad" ["STATE-MSG-15", "STATE-MSG-16"] "It reports a batteryCharge of only 80 or 20."
+    liberty "lib-battery-good-or-bad" ["STATE-MSG-15", "STATE-MSG-16"] "It reports a batteryCharge of only 80 or 20."
         => state(|_, m| m.part("batteryState", |battery| number(battery, "batteryCharge", |charge| if charge > 50.0 { 80.0 } else { 20.0 })));
-    liberty "r1-battery-drains" ["STATE-MSG-15"] "Its battery charge falls a little with every state."
+    liberty "battery-drains" ["STATE-MSG-15"] "Its battery charge falls a little with every state."
         => state(|agv, m| {
             let used = u32::try_from(agv.states_sent % 5_000).unwrap_or_default();
             m.part("batteryState", |battery| if battery.says("batteryCharge", 87.5) {

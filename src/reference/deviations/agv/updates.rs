@@ -43,14 +43,14 @@ records! {
                 agv.trigger_actions(origin);
             }
         });
-    fault "r1-joint-actions-repeated" ["ORD-UPD-07", "ASTATE-06"] "An update that repeats the actions of a stitching node already traversed makes it do them again."
+    fault "joint-actions-repeated" ["ORD-UPD-07", "ASTATE-06"] "An update that repeats the actions of a stitching node already traversed makes it do them again."
         => updating(|agv, order| {
             let joint = &order.nodes[0];
             if !is_ahead(agv, joint.sequence_id) && !joint.actions.is_empty() {
                 agv.repeat_actions(joint.sequence_id);
             }
         });
-    fault "r1-joint-position-replaced" ["ORD-UPD-07"] "It replaces the nodePosition of a stitching node still ahead by the one in the update."
+    fault "joint-position-replaced" ["ORD-UPD-07"] "It replaces the nodePosition of a stitching node still ahead by the one in the update."
         => updating(|agv, order| {
             let joint = &order.nodes[0];
             let place = agv.place(joint);
@@ -60,7 +60,7 @@ records! {
                 stop.place = place.clone().unwrap_or_else(|| stop.place.clone());
             }
         });
-    fault "r1-joint-listed-twice" ["ORD-FLOW-09", "STATE-12"] "An update makes it list the stitching node twice in its node states as long as it is ahead."
+    fault "joint-listed-twice" ["ORD-FLOW-09", "STATE-12"] "An update makes it list the stitching node twice in its node states as long as it is ahead."
         => updating(|agv, order| {
             let joint = order.nodes[0].sequence_id;
             let again = agv.book.nodes.iter().find(|stop| stop.node.sequence_id == joint).cloned();
@@ -72,9 +72,9 @@ records! {
         => overlooking(|agv, what| matches!(what, Objection::Joint(_)) && !runs(agv));
     fault "update-joined-by-number" ["ORD-FLOW-08"] "Joins an update by its sequenceId, whatever the node."
         => overlooking(|agv, what| matches!(what, Objection::Joint(first) if runs(agv) && first.sequence_id == agv.book.base_end.1));
-    fault "r1-joint-sequence-unchecked" ["ORD-FLOW-08"] "It joins an update to its running order by the nodeId alone, whatever the sequenceId of the first node."
+    fault "joint-sequence-unchecked" ["ORD-FLOW-08"] "It joins an update to its running order by the nodeId alone, whatever the sequenceId of the first node."
         => overlooking(|agv, what| matches!(what, Objection::Joint(first) if runs(agv) && first.id == agv.book.base_end.0));
-    fault "r1-joint-node-unchecked" ["ORD-FLOW-10"] "It joins an update to its completed order by the sequenceId alone, whatever the nodeId of the first node."
+    fault "joint-node-unchecked" ["ORD-FLOW-10"] "It joins an update to its completed order by the sequenceId alone, whatever the nodeId of the first node."
         => overlooking(|agv, what| matches!(what, Objection::Joint(first) if !runs(agv) && first.sequence_id == agv.book.last_sequence));
     fault "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02", "ORD-CANCEL-11"] "Goes on with a cancelled order when an update of it comes late."
         => updating(|agv, _| revive(agv)).allows(|_, _, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)));
@@ -96,13 +96,13 @@ records! {
             .objects(|cut, _, _, relation| (*cut && relation == Relation::Update).then(|| broken("no update is taken now")));
     fault "completed-not-continued" ["ORD-FLOW-11"] "Refuses updates of a completed order."
         => refused(|agv, _| !agv.is_busy());
-    fault "r3-failed-order-not-continued" ["ORD-FLOW-11"] "It refuses to continue a completed order by an update when one of its actions had failed."
+    fault "failed-order-not-continued" ["ORD-FLOW-11"] "It refuses to continue a completed order by an update when one of its actions had failed."
         => refused(|agv, _| !agv.is_busy() && has_failed(agv));
-    fault "r2-stitch-only-update-refused" ["ORD-UPD-09"] "An update that holds nothing but the stitching node, to delete the horizon, is rejected."
+    fault "stitch-only-update-refused" ["ORD-UPD-09"] "An update that holds nothing but the stitching node, to delete the horizon, is rejected."
         => refused(|_, order| order.nodes.len() == 1);
-    fault "r6-update-of-horizon-only-refused" ["ORD-UPD-08"] "It refuses an update that changes only the horizon and releases nothing new."
+    fault "update-of-horizon-only-refused" ["ORD-UPD-08"] "It refuses an update that changes only the horizon and releases nothing new."
         => refused(|_, order| only_plans(order));
-    fault "r4-second-extension-refused" ["ORD-FLOW-09", "ORD-UPD-08"] "It rejects a second order update that arrives before it has reached the last base node of the first order message, because it compares with that old decision point."
+    fault "second-extension-refused" ["ORD-FLOW-09", "ORD-UPD-08"] "It rejects a second order update that arrives before it has reached the last base node of the first order message, because it compares with that old decision point."
         => keep::<(u32, bool)>()
             .happens(|(first_base, updated), agv, event| match event {
                 Event::Begun => (*first_base, *updated) = (agv.book.base_end.1, false),
@@ -119,11 +119,12 @@ records! {
         => letting(|_, what| matches!(what, Permission::KeepHorizon(order) if order.nodes.iter().all(|node| node.released)));
     fault "horizon-actions-stay" ["ORD-UPD-10"] "Lets the actions of a deleted horizon wait for ever." because "It breaks a recommendation only."
         => when(Event::HorizonDropped, |agv| strand(agv, |_| true, Origin::Node(u32::MAX)));
-    fault "r6-old-horizon-edge-actions-linger" ["ORD-UPD-10"] "It removes the node actions of a replaced horizon but leaves its edge actions WAITING, so that the next new order is refused."
+    fault "old-horizon-edge-actions-linger" ["ORD-UPD-10"] "It removes the node actions of a replaced horizon but leaves its edge actions WAITING, so that the next new order is refused."
+        because "What becomes of the actions of a replaced horizon is not described; ORD-UPD-10 is a recommendation."
         => when(Event::HorizonDropped, |agv| strand(agv, |action| matches!(action.origin, Origin::Edge(_)), Origin::Edge(u32::MAX)));
     fault "horizon-actions-inherited" ["ORD-UPD-08"] "Performs the actions of a horizon that was replaced on the nodes that took its place."
         => forbidding(|_, what| matches!(what, Permission::ForgetWithHorizon));
-    fault "r1-horizon-edges-stay" ["ORD-UPD-08", "ORD-UPD-09", "STATE-12"] "When an update replaces the horizon, the edges of the old one stay in its edge states."
+    fault "horizon-edges-stay" ["ORD-UPD-08", "ORD-UPD-09", "STATE-12"] "When an update replaces the horizon, the edges of the old one stay in its edge states."
         => keep::<Vec<Edge>>()
             .adopts(|edges, agv, _| {
                 *edges = agv.book.edges.iter().filter(|edge| !edge.released).cloned().collect();
@@ -132,7 +133,7 @@ records! {
             .happens(|edges, agv, event| if event == Event::HorizonDropped {
                 agv.book.edges.extend(edges.drain(..));
             });
-    fault "r2-horizon-change-ignored" ["ORD-UPD-08"] "An update that brings only another horizon is acknowledged with its orderUpdateId, but the old horizon stays."
+    fault "horizon-change-ignored" ["ORD-UPD-08"] "An update that brings only another horizon is acknowledged with its orderUpdateId, but the old horizon stays."
         => plain().adopts(|(), agv, adoption| {
             let ignored = adoption.update && only_plans(adoption.order);
             if ignored {
@@ -140,19 +141,19 @@ records! {
             }
             !ignored
         });
-    fault "r3-new-horizon-lost-while-driving" ["ORD-UPD-08", "ORD-FLOW-09"] "It takes over only the released part of an update that comes while it drives; the new horizon is lost."
+    fault "new-horizon-lost-while-driving" ["ORD-UPD-08", "ORD-FLOW-09"] "It takes over only the released part of an update that comes while it drives; the new horizon is lost."
         => updating(|agv, order| if agv.motion.is_moving() {
             order.nodes.retain(|node| node.released);
             order.edges.retain(|edge| edge.released);
         });
-    fault "r1-horizon-update-driven" ["ORD-07", "ORD-UPD-08", "ORD-UPD-01"] "It takes an update that only plans a new horizon as a release, and drives into that horizon."
+    fault "horizon-update-driven" ["ORD-07", "ORD-UPD-08", "ORD-UPD-01"] "It takes an update that only plans a new horizon as a release, and drives into that horizon."
         => unbound()
             .adopts(|unbound, _, adoption| {
                 *unbound |= adoption.update && only_plans(adoption.order);
                 true
             })
             .happens(|unbound, _, event| *unbound &= event != Event::Begun);
-    fault "r4-horizon-deletion-shortens-base" ["ORD-UPD-09", "ORD-06"] "It also deletes the base still to be driven when an update deletes the horizon."
+    fault "horizon-deletion-shortens-base" ["ORD-UPD-09", "ORD-06"] "It also deletes the base still to be driven when an update deletes the horizon."
         => updating(|agv, order| if order.nodes.len() == 1 && agv.book.nodes.iter().any(|stop| !stop.node.released) { shorten_base(agv) });
     fault "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives."
         => when(Event::HorizonDropped, |agv| while agv.book.nodes.len() > 1 {
@@ -161,15 +162,15 @@ records! {
         });
     fault "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId."
         => updating(|agv, order| order.update_id = agv.book.update_id);
-    fault "r3-stitch-only-update-id-kept" ["ORD-UPD-09", "ORD-FLOW-09"] "It deletes its horizon by an update that consists of the stitching node only, but keeps the old orderUpdateId."
+    fault "stitch-only-update-id-kept" ["ORD-UPD-09", "ORD-FLOW-09"] "It deletes its horizon by an update that consists of the stitching node only, but keeps the old orderUpdateId."
         => updating(|agv, order| if order.nodes.len() == 1 { order.update_id = agv.book.update_id });
-    fault "r4-first-state-after-update-has-old-lists" ["STATE-MSG-13", "ORD-FLOW-09", "STATE-12"] "It publishes the new orderUpdateId at once with the old node and edge states and corrects them only in the next state."
+    fault "first-state-after-update-has-old-lists" ["STATE-MSG-13", "ORD-FLOW-09", "STATE-12"] "It publishes the new orderUpdateId at once with the old node and edge states and corrects them only in the next state."
         => updating(|agv, order| {
             let update_id = std::mem::replace(&mut agv.book.update_id, order.update_id);
             agv.flush();
             agv.book.update_id = update_id;
         });
-    fault "r4-update-puts-new-nodes-in-front" ["STATE-12", "ORD-FLOW-09"] "It puts the nodes of an update before those still to be driven in nodeStates."
+    fault "update-puts-new-nodes-in-front" ["STATE-12", "ORD-FLOW-09"] "It puts the nodes of an update before those still to be driven in nodeStates."
         => keep::<Option<u32>>()
             .adopts(|joint, agv, adoption| {
                 *joint = adoption.update.then_some(agv.book.base_end.1);
@@ -184,30 +185,30 @@ records! {
             });
     fault "continuation-not-driven" ["ORD-06", "ORD-FLOW-11"] "Takes over an update of a completed order and does not drive it."
         => since_continuation().allows(|continued, _, what, usual| usual && !(*continued && matches!(what, Permission::SetOut(_))));
-    fault "r1-continuation-actions-skipped" ["ORD-FLOW-11", "NODE-04"] "It drives the continuation of a completed order but never begins the node actions in it."
+    fault "continuation-actions-skipped" ["ORD-FLOW-11", "NODE-04"] "It drives the continuation of a completed order but never begins the node actions in it."
         => since_continuation().allows(|continued, _, what, usual| usual && !(*continued && matches!(what, Permission::Trigger(Origin::Node(_)))));
-    fault "r1-stops-at-stitch" ["ORD-06", "ORD-FLOW-09"] "An update that arrives while it drives is taken over, but it stands still for ever at the stitching node."
+    fault "stops-at-stitch" ["ORD-06", "ORD-FLOW-09"] "An update that arrives while it drives is taken over, but it stands still for ever at the stitching node."
         => stuck().adopts(|at, agv, adoption| {
             if adoption.update && agv.is_busy() && agv.motion.is_moving() {
                 *at = Some(agv.book.base_end.1);
             }
             true
         });
-    fault "r3-update-in-pause-not-driven" ["ORD-06", "ACT-14"] "It takes over an update that comes while it is paused, but after stopPause it does not drive beyond the old decision point."
+    fault "update-in-pause-not-driven" ["ORD-06", "ACT-14"] "It takes over an update that comes while it is paused, but after stopPause it does not drive beyond the old decision point."
         => stuck().adopts(|at, agv, adoption| {
             if adoption.update {
                 *at = agv.holds.pause.then_some(agv.book.base_end.1);
             }
             true
         });
-    fault "r4-update-at-decision-point-not-driven" ["ORD-FLOW-07", "ORD-FLOW-09"] "It takes an update over in the state but does not drive on when it already stands waiting at the decision point."
+    fault "update-at-decision-point-not-driven" ["ORD-FLOW-07", "ORD-FLOW-09"] "It takes an update over in the state but does not drive on when it already stands waiting at the decision point."
         => parked()
             .adopts(|parked, agv, adoption| {
                 *parked |= adoption.update && agv.waits_at_decision_point() && !agv.motion.is_moving();
                 true
             })
             .happens(|parked, _, event| *parked &= event != Event::Begun);
-    fault "r1-update-drives-in-pause" ["ACT-12", "STATE-MSG-08"] "An update that arrives during a pause makes it drive although it stays paused."
+    fault "update-drives-in-pause" ["ACT-12", "STATE-MSG-08"] "An update that arrives during a pause makes it drive although it stays paused."
         => heedless()
             .adopts(|heedless, agv, adoption| {
                 *heedless |= adoption.update && agv.holds.pause;
@@ -251,9 +252,9 @@ records! {
             });
     fault "update-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when an update comes."
         => updating(|agv, _| agv.actions.retain(|action| !action.of_order() || !action.status.is_terminal()));
-    fault "r1-update-forgets-instant-actions" ["STATE-MSG-10", "STATE-MSG-09"] "An accepted update removes the ended instant actions from its action states."
+    fault "update-forgets-instant-actions" ["STATE-MSG-10", "STATE-MSG-09"] "An accepted update removes the ended instant actions from its action states."
         => updating(|agv, _| agv.actions.retain(|action| action.of_order() || !action.status.is_terminal()));
-    fault "r6-continuation-clears-action-states" ["STATE-MSG-10", "STATE-MSG-09"] "It empties actionStates, as for a new order, when an update continues a completed order."
+    fault "continuation-clears-action-states" ["STATE-MSG-10", "STATE-MSG-09"] "It empties actionStates, as for a new order, when an update continues a completed order."
         => updating(|agv, _| if !agv.is_busy() { agv.actions.retain(|action| !action.status.is_terminal()) });
     fault "update-repeats-actions" ["ASTATE-06"] "Performs the actions of its last node once more when an update comes."
         => updating(|agv, _| {
@@ -267,13 +268,14 @@ records! {
             let active = agv.actions.iter_mut().filter(|action| action.of_order() && action.status.is_active());
             active.for_each(|action| action.end(Status::Failed));
         });
-    fault "r3-update-serves-as-trigger" ["ACT-37"] "It ends a running waitForTrigger as FINISHED when an order update comes."
+    fault "update-serves-as-trigger" ["ACT-37"] "It ends a running waitForTrigger as FINISHED when an order update comes."
         => when(Event::Updated, |agv| agv.trigger(""));
-    fault "r2-max-speed-of-update-ignored" ["ORD-MSG-20", "OPT-01"] "maxSpeed is kept to on the edges of the first order message only; on edges that came with an update it is ignored."
+    fault "max-speed-of-update-ignored" ["ORD-MSG-20", "OPT-01"] "maxSpeed is kept to on the edges of the first order message only; on edges that came with an update it is ignored."
         => updating(|_, order| order.edges.iter_mut().for_each(|edge| edge.max_speed = None));
-    fault "r6-trajectory-of-update-ignored" ["ORD-MSG-26", "OPT-01"] "It follows the trajectories of a new order but drives straight on the edges that came by an update."
+    fault "trajectory-of-update-ignored" ["ORD-MSG-26", "OPT-01"] "It follows the trajectories of a new order but drives straight on the edges that came by an update."
+        because "ORD-MSG-26, that a trajectory is followed, is a recommendation, also for one that came with an update."
         => updating(|_, order| order.edges.iter_mut().for_each(|edge| edge.trajectory = None));
-    liberty "r1-horizon-actions-fail" ["ORD-UPD-10", "STATE-MSG-10"] "It keeps the actions of a horizon that was deleted in its action states, as FAILED."
+    liberty "horizon-actions-fail" ["ORD-UPD-10", "STATE-MSG-10"] "It keeps the actions of a horizon that was deleted in its action states, as FAILED."
         => when(Event::HorizonDropped, |agv| {
             let base_end = agv.book.base_end.1;
             for action in agv.actions.iter_mut().filter(|action| is_behind(action, base_end)) {

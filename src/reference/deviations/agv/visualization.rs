@@ -7,9 +7,9 @@ use crate::reference::deviations::words::Words;
 use serde_json::Value;
 
 records! {
-    fault "r4-visualization-theta-in-degrees" ["VIS-01", "MAP-02"] "It gives theta in degrees in the visualization, although in radians in the state."
+    fault "visualization-theta-in-degrees" ["VIS-01", "MAP-02"] "It gives theta in degrees in the visualization, although in radians in the state."
         => visualization(|_, m| m.part("agvPosition", |p| number(p, "theta", f64::to_degrees)));
-    fault "r6-visualization-theta-0-to-2pi" ["VIS-01", "MAP-02"] "It gives theta between 0 and 2 pi in visualization and properly in the state."
+    fault "visualization-theta-0-to-2pi" ["VIS-01", "MAP-02"] "It gives theta between 0 and 2 pi in visualization and properly in the state."
         => visualization(|_, m| m.part("agvPosition", |p| number(p, "theta", |theta| theta.rem_euclid(std::f64::consts::TAU))));
     fault "visualization-beside" ["VIS-01"] "Shows itself two metres beside where its states say it is."
         => visualization(|_, m| m.part("agvPosition", |p| number(p, "x", |x| x + 2.0)));
@@ -19,11 +19,12 @@ records! {
         => visualization(|agv, m| if agv.motion.is_moving() { m.part("agvPosition", millimetres) });
     fault "visualization-without-position" ["VIS-01"] "Leaves the position out of the visualization." because "The schema requires nothing; by the ruling of VIS-01 what is merely absent is a warning."
         => visualization(|_, m| m.unset("agvPosition"));
-    fault "r1-visualization-without-map" ["VIS-01"] "The agvPosition in its visualization has no mapId."
+    fault "visualization-without-map" ["VIS-01"] "The agvPosition in its visualization has no mapId."
         => visualization(|_, m| m.part("agvPosition", |p| p.unset("mapId")));
-    fault "r3-visualization-velocity-scalar" ["VIS-01"] "It sends velocity in the visualization as a single number instead of an object."
+    fault "visualization-velocity-scalar" ["VIS-01"] "It sends velocity in the visualization as a single number instead of an object."
         => visualization(|_, m| m.change("velocity", |velocity| *velocity = velocity["vx"].take()));
-    fault "r2-visualization-pose-at-root" ["VIS-01"] "The visualization gives x, y, theta and mapId at its top level instead of in agvPosition."
+    fault "visualization-pose-at-root" ["VIS-01"] "The visualization gives x, y, theta and mapId at its top level instead of in agvPosition."
+        because "The schema demands no member of a visualization, so that VIS-01 warns of a pose that is found elsewhere."
         => visualization(|_, m| if let Some(Value::Object(pose)) = m.remove("agvPosition") { m.extend(pose) });
 }
 

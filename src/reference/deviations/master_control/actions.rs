@@ -12,13 +12,13 @@ use serde_json::{Value, json};
 records! {
     fault "blocking-type-missing" ["ORD-MSG-15"] "Leaves blockingType out of its actions."
         => action(|_, a| a.unset("blockingType"));
-    fault "r1-instant-without-blocking-type" ["ORD-MSG-15", "IACT-01", "JSON-10"] "Instant actions have no blockingType."
+    fault "instant-without-blocking-type" ["ORD-MSG-15", "IACT-01", "JSON-10"] "Instant actions have no blockingType."
         => action(|name, a| {
             if name == "instantActions" {
                 a.unset("blockingType");
             }
         });
-    fault "r4-instant-actions-without-blocking-type" ["ORD-MSG-15", "IACT-01"] "It leaves blockingType out of the instant actions startPause and stopPause."
+    fault "instant-actions-without-blocking-type" ["ORD-MSG-15", "IACT-01"] "It leaves blockingType out of the instant actions startPause and stopPause."
         => action(|name, a| {
             if name == "instantActions" && matches!(a.text("actionType"), "startPause" | "stopPause") {
                 a.unset("blockingType");
@@ -35,7 +35,7 @@ records! {
                 a.set("blockingType", "SOFT");
             }
         });
-    liberty "r1-instants-block-nothing" ["ORD-MSG-16", "FACT-15"] "Instant actions have blockingType NONE where the vehicle allows it."
+    liberty "instants-block-nothing" ["ORD-MSG-16", "FACT-15"] "Instant actions have blockingType NONE where the vehicle allows it."
         => plain().action(|(), _, vehicle, a, _, instant| {
             let listed = vehicle.offer(a.text("actionType")).and_then(|offer| offer.blocking_types.as_ref());
             if instant && listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE")) {
@@ -54,13 +54,14 @@ records! {
                 *id = (site.ids % 3).to_string();
             }
         });
-    fault "r2-action-id-in-braces" ["JSON-04"] "It writes actionIds in curly braces."
+    fault "action-id-in-braces" ["JSON-04"] "It writes actionIds in curly braces."
+        because "JSON-04, which letters an identifier has, is a recommendation."
         => plain().id(|(), site, vehicle, what, id| {
             if what == "action" {
                 *id = site.fitting(vehicle, what, format!("{{{what}-{}{:05}}}", site.session, site.ids), site.ids);
             }
         });
-    fault "r1-action-ids-restart-on-reconnect" ["ORD-MSG-17"] "After its own connection was lost and came back it gives out the same actionIds again."
+    fault "action-ids-restart-on-reconnect" ["ORD-MSG-17"] "After its own connection was lost and came back it gives out the same actionIds again."
         => fleet::<u64>().id(|count, site, vehicle, what, id| {
             if what == "action" {
                 *count += 1;
@@ -69,7 +70,7 @@ records! {
         }).happens(|count, _, _, event| if let Event::Connected(true) = event {
             *count = 0;
         });
-    fault "r5-action-ids-restart-after-reconnect" ["ORD-MSG-17"]
+    fault "action-ids-restart-after-reconnect" ["ORD-MSG-17"]
         "It starts the count in its action ids anew when the vehicle comes ONLINE again, so that ids of the session return."
         => fleet::<u64>().id(|count, site, vehicle, what, id| {
             if what == "action" {
@@ -85,13 +86,13 @@ records! {
             *count += 1;
             a.set("actionId", site.spelled(vehicle, "action", *count));
         });
-    fault "r1-pause-id-repeats" ["ORD-MSG-17"] "Every startPause has the same actionId."
+    fault "pause-id-repeats" ["ORD-MSG-17"] "Every startPause has the same actionId."
         => made(|_, _, kind, a| {
             if kind == "startPause" {
                 a.set("actionId", "pause");
             }
         });
-    fault "r5-stop-pause-with-id-of-start-pause" ["ORD-MSG-17"] "It sends stopPause with the actionId of the startPause that it ends."
+    fault "stop-pause-with-id-of-start-pause" ["ORD-MSG-17"] "It sends stopPause with the actionId of the startPause that it ends."
         => keep::<Option<Value>>().action(|pause, _, _, a, _, _| match a.text("actionType") {
             "startPause" => *pause = a.get("actionId").cloned(),
             "stopPause" => {
@@ -114,13 +115,13 @@ records! {
                 a.set("actionType", capitalized(kind));
             }
         });
-    fault "r5-vendor-action-lower-case" ["ACT-07", "FACT-15"] "It sends a vendor action with its type written in lower case."
+    fault "vendor-action-lower-case" ["ACT-07", "FACT-15"] "It sends a vendor action with its type written in lower case."
         => made(|_, _, kind, a| {
             if !is_predefined(kind) {
                 a.set("actionType", kind.to_lowercase());
             }
         });
-    fault "r3-vendor-action-wrapped" ["ACT-07", "FACT-15"] "It sends an action of the manufacturer as actionType customAction with its name as a parameter."
+    fault "vendor-action-wrapped" ["ACT-07", "FACT-15"] "It sends an action of the manufacturer as actionType customAction with its name as a parameter."
         => made(|_, _, kind, a| {
             if !is_predefined(kind) {
                 a.set("actionType", "customAction");
@@ -128,13 +129,13 @@ records! {
                 a.add("actionParameters", json!({ "key": "name", "value": kind }));
             }
         });
-    fault "r1-vendor-parameters-dropped" ["ACT-07", "FACT-15"] "Actions of the manufacturer are sent without any parameter."
+    fault "vendor-parameters-dropped" ["ACT-07", "FACT-15"] "Actions of the manufacturer are sent without any parameter."
         => made(|_, _, kind, a| {
             if !is_predefined(kind) {
                 a.unset("actionParameters");
             }
         });
-    fault "r1-vendor-values-as-text" ["BP-05", "FACT-15"] "Parameters of actions of the manufacturer are strings, whatever their type in the factsheet."
+    fault "vendor-values-as-text" ["BP-05", "FACT-15"] "Parameters of actions of the manufacturer are strings, whatever their type in the factsheet."
         => made(|_, _, kind, a| {
             if !is_predefined(kind) {
                 a.each("actionParameters", |parameter| parameter.change("value", |value| if !value.is_string() {
@@ -156,7 +157,7 @@ records! {
                 drop_empty(a);
             }
         });
-    fault "r1-unlisted-parameters-passed" ["FACT-15"] "It sends parameters of an action that the factsheet does not list when somebody gives them."
+    fault "unlisted-parameters-passed" ["FACT-15"] "It sends parameters of an action that the factsheet does not list when somebody gives them."
         => plain().action(|(), _, _, a, given, _| {
             for (key, value) in given.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null()) {
                 a.entry("actionParameters").or_insert(json!([]));
@@ -165,7 +166,7 @@ records! {
                 }
             }
         });
-    liberty "r2-optional-parameters-filled" ["FACT-15"] "It sends optional parameters of vendor actions too, with values of the listed types."
+    liberty "optional-parameters-filled" ["FACT-15"] "It sends optional parameters of vendor actions too, with values of the listed types."
         => made(|site, vehicle, kind, a| {
             let listed = vehicle.offer(kind).and_then(|offer| offer.action_parameters.as_deref()).unwrap_or_default();
             for offered in listed.iter().filter(|_| !is_predefined(kind)) {
@@ -177,7 +178,7 @@ records! {
             }
             drop_empty(a);
         });
-    fault "r2-supplied-values-as-text" ["BP-05", "FACT-15"]
+    fault "supplied-values-as-text" ["BP-05", "FACT-15"]
         "It sends the values it supplies itself for parameters that are not optional as texts, whatever type the factsheet names."
         => plain().action(|(), _, vehicle, a, given, _| {
             let kind = a.text("actionType").to_owned();
@@ -197,13 +198,13 @@ records! {
                 }
             });
         });
-    fault "r5-pick-without-load-type" ["ACT-31", "FACT-15"] "It leaves loadType out of pick when the operator did not choose one."
+    fault "pick-without-load-type" ["ACT-31", "FACT-15"] "It leaves loadType out of pick when the operator did not choose one."
         => plain().action(|(), _, _, a, given, _| {
             if a.says("actionType", "pick") && given.get("loadType").is_none() {
                 a.keep("actionParameters", |parameter| !parameter.says("key", "loadType"));
             }
         });
-    fault "r5-cancel-with-order-id-parameter" ["FACT-15", "ACT-31"]
+    fault "cancel-with-order-id-parameter" ["FACT-15", "ACT-31"]
         "It adds the parameter orderId of version 3.0 to cancelOrder although the factsheet lists no parameter for it."
         => made(|_, vehicle, kind, a| {
             if let Some(running) = vehicle.running.as_ref().filter(|_| kind == "cancelOrder") {
@@ -214,7 +215,7 @@ records! {
         => plain().action(|(), _, _, a, given, _| each_device(a, |device| if given.get("lhd").is_none() {
             *device = json!("LHD1");
         }));
-    fault "r5-lhd-as-index" ["ACT-32"] "It names the load handling device by its index in the list (as the text 0 or 1) instead of its name in loadPositions."
+    fault "lhd-as-index" ["ACT-32"] "It names the load handling device by its index in the list (as the text 0 or 1) instead of its name in loadPositions."
         => plain().action(|(), _, vehicle, a, _, _| each_device(a, |device| {
             let known = vehicle.factsheet.iter().flat_map(|sheet| &sheet.devices).position(|known| *device == json!(known));
             if let Some(index) = known {
@@ -233,41 +234,41 @@ records! {
         => parameterless(&[("downloadMap", "mapId")]);
     fault "download-without-version" ["FACT-15", "MAP-16"] "Sends downloadMap without mapVersion."
         => parameterless(&[("downloadMap", "mapVersion")]);
-    fault "r1-enable-map-without-version" ["ACT-31", "FACT-15"] "enableMap has no mapVersion."
+    fault "enable-map-without-version" ["ACT-31", "FACT-15"] "enableMap has no mapVersion."
         => parameterless(&[("enableMap", "mapVersion")]);
-    fault "r1-delete-map-without-version" ["ACT-31", "FACT-15"] "deleteMap has no mapVersion."
+    fault "delete-map-without-version" ["ACT-31", "FACT-15"] "deleteMap has no mapVersion."
         => parameterless(&[("deleteMap", "mapVersion")]);
-    fault "r1-trigger-type-missing" ["ACT-31", "FACT-15"] "waitForTrigger has no triggerType."
+    fault "trigger-type-missing" ["ACT-31", "FACT-15"] "waitForTrigger has no triggerType."
         => parameterless(&[("waitForTrigger", "triggerType")]);
-    fault "r4-null-for-unknown-load-id" ["BP-05"] "It sends the parameter loadId with the value null in a pick, when the load is not known."
+    fault "null-for-unknown-load-id" ["BP-05"] "It sends the parameter loadId with the value null in a pick, when the load is not known."
         => null_parameter("pick", "loadId");
-    fault "r5-empty-map-hash-as-null" ["BP-05"] "It sends mapHash with the value null when it has no hash."
+    fault "empty-map-hash-as-null" ["BP-05"] "It sends mapHash with the value null when it has no hash."
         => null_parameter("downloadMap", "mapHash");
-    fault "r2-zero-pose-members-left-out" ["ACT-31"] "It leaves those of x, y and theta out of initPosition that are zero."
+    fault "zero-pose-members-left-out" ["ACT-31"] "It leaves those of x, y and theta out of initPosition that are zero."
         => action(|_, a| {
             if a.says("actionType", "initPosition") {
                 a.keep("actionParameters", |parameter| number(parameter, "value") != Some(0.0));
             }
         });
-    fault "r1-parameters-by-key" ["BP-04", "BP-05", "ACT-31", "JSON-10"] "Action parameters are objects with the key as the only member instead of key and value."
+    fault "parameters-by-key" ["BP-04", "BP-05", "ACT-31", "JSON-10"] "Action parameters are objects with the key as the only member instead of key and value."
         => action(|_, a| a.each("actionParameters", |parameter| {
             let key = parameter.text("key").to_owned();
             *parameter = Object::from_iter([(key, parameter["value"].clone())]);
         }));
     fault "parameters-as-object" ["BP-04"] "Writes the parameters of an action as one object."
         => action(|_, a| as_object(a));
-    fault "r4-map-parameters-as-object" ["BP-04", "ORD-MSG-15"]
+    fault "map-parameters-as-object" ["BP-04", "ORD-MSG-15"]
         "It sends the action parameters of downloadMap as one object with the keys as members, instead of an array of key and value."
         => action(|_, a| {
             if a.says("actionType", "downloadMap") {
                 as_object(a);
             }
         });
-    fault "r3-parameters-as-pairs" ["BP-04", "BP-05"] "It writes each action parameter as an array of key and value instead of an object."
+    fault "parameters-as-pairs" ["BP-04", "BP-05"] "It writes each action parameter as an array of key and value instead of an object."
         => action(|_, a| a.list("actionParameters").iter_mut().for_each(|parameter| {
             *parameter = json!([parameter["key"], parameter["value"]]);
         }));
-    fault "r3-pose-as-one-parameter" ["ACT-06", "ACT-31"] "It sends x, y and theta of initPosition as one parameter pose that holds an object."
+    fault "pose-as-one-parameter" ["ACT-06", "ACT-31"] "It sends x, y and theta of initPosition as one parameter pose that holds an object."
         => action(|_, a| {
             if a.says("actionType", "initPosition") {
                 let is_pose = |key: &str| matches!(key, "x" | "y" | "theta");
@@ -281,13 +282,13 @@ records! {
         });
     fault "station-type-renamed" ["ACT-06", "ACT-31"] "Gives the station type of pick and drop under a key of its own."
         => parameter(|_, p| respell(p, "stationType", "station_type"));
-    fault "r1-trigger-type-renamed" ["ACT-06", "ACT-31", "FACT-15"] "waitForTrigger carries its triggerType under the key trigger."
+    fault "trigger-type-renamed" ["ACT-06", "ACT-31", "FACT-15"] "waitForTrigger carries its triggerType under the key trigger."
         => parameter(|_, p| respell(p, "triggerType", "trigger"));
-    fault "r2-device-key-spelled-out" ["ACT-32", "ACT-06"] "It names the parameter for the load handling device loadHandlingDevice instead of lhd."
+    fault "device-key-spelled-out" ["ACT-32", "ACT-06"] "It names the parameter for the load handling device loadHandlingDevice instead of lhd."
         => parameter(|_, p| respell(p, "lhd", "loadHandlingDevice"));
-    fault "r3-download-link-called-url" ["MAP-16", "ACT-31", "ACT-06"] "It names the parameter mapDownloadLink of downloadMap mapUrl."
+    fault "download-link-called-url" ["MAP-16", "ACT-31", "ACT-06"] "It names the parameter mapDownloadLink of downloadMap mapUrl."
         => parameter(|_, p| respell(p, "mapDownloadLink", "mapUrl"));
-    fault "r1-device-as-number" ["ACT-32", "BP-05", "FACT-15"] "lhd is the number 0, not the name of a load handling device."
+    fault "device-as-number" ["ACT-32", "BP-05", "FACT-15"] "lhd is the number 0, not the name of a load handling device."
         => parameter(|_, p| if p.says("key", "lhd") {
             p.set("value", 0);
         });
@@ -295,7 +296,7 @@ records! {
         => parameter(|_, p| if p.says("key", "lhd") {
             p.set("value", "1");
         });
-    fault "r1-init-position-axes-swapped" ["MAP-01", "MAP-27"] "initPosition has x and y exchanged."
+    fault "init-position-axes-swapped" ["MAP-01", "MAP-27"] "initPosition has x and y exchanged."
         => parameter(|kind, p| if kind == "initPosition" {
             match p.text("key") {
                 "x" => p.set("key", "y"),
@@ -307,15 +308,15 @@ records! {
         => parameter(|kind, p| if kind == "initPosition" && let Some(value) = number(p, "value") {
             p.set("value", value.to_string());
         });
-    fault "r4-map-version-as-number" ["ACT-31", "JSON-06", "BP-05"] "It sends the mapVersion in map actions as a JSON number when the version looks like a number."
+    fault "map-version-as-number" ["ACT-31", "JSON-06", "BP-05"] "It sends the mapVersion in map actions as a JSON number when the version looks like a number."
         => parameter(|_, p| if p.says("key", "mapVersion") && let Ok(number) = p.text("value").parse::<serde_json::Number>() {
             p.set("value", Value::Number(number));
         });
-    fault "r5-pick-height-as-string" ["BP-05", "FACT-15"] "It sends number parameters of pick and drop as strings."
+    fault "pick-height-as-string" ["BP-05", "FACT-15"] "It sends number parameters of pick and drop as strings."
         => parameter(|kind, p| if matches!(kind, "pick" | "drop") && p["value"].is_number() {
             p.set("value", p["value"].to_string());
         });
-    fault "r6-parameter-values-as-strings" ["BP-05", "FACT-15"] "It sends all values of action parameters as strings, also numbers and Booleans."
+    fault "parameter-values-as-strings" ["BP-05", "FACT-15"] "It sends all values of action parameters as strings, also numbers and Booleans."
         => parameter(|_, p| if p["value"].is_number() || p["value"].is_boolean() {
             p.set("value", p["value"].to_string());
         });
@@ -323,13 +324,13 @@ records! {
         => parameter(|_, p| p.set("value", Value::Null));
     fault "parameter-without-key" ["BP-05", "BP-04"] "Calls the key of a parameter its name."
         => parameter(|_, p| p.rename("key", "name"));
-    liberty "r1-empty-parameter-lists" ["BP-04", "ORD-MSG-15"] "Actions without parameters carry an empty list of them."
+    liberty "empty-parameter-lists" ["BP-04", "ORD-MSG-15"] "Actions without parameters carry an empty list of them."
         => plain().action(|(), _, _, a, _, _| {
             a.entry("actionParameters").or_insert(json!([]));
         });
-    liberty "r2-parameters-reversed" ["BP-04"] "It lists the parameters of an action in the opposite order."
+    liberty "parameters-reversed" ["BP-04"] "It lists the parameters of an action in the opposite order."
         => plain().action(|(), _, _, a, _, _| a.list("actionParameters").reverse());
-    liberty "r6-several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message."
+    liberty "several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message."
         => keep::<()>().sends(|(), site, vehicle, out| {
             let asks = out.name == "instantActions" && !out.tells(&["stateRequest"]) && site.offers(vehicle, "stateRequest", "INSTANT");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["instantActions", "instantActions.actions", "actions"]));
@@ -341,7 +342,7 @@ records! {
         });
     fault "scope-ignored" ["FACT-15"] "Does not look for the scope of an action in the factsheet."
         => plain().allows(|(), _, _, what, usual| usual || matches!(what, Permission::Offer(..)));
-    fault "r1-predefined-need-no-factsheet" ["FACT-15"] "It sends predefined actions that the factsheet does not list, or not in that scope."
+    fault "predefined-need-no-factsheet" ["FACT-15"] "It sends predefined actions that the factsheet does not list, or not in that scope."
         => plain().allows(|(), _, _, what, usual| match what {
             Permission::Offer(kind, scope) => usual || is_predefined_in(kind, scope),
             _ => usual,

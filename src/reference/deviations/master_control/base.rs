@@ -26,15 +26,18 @@ records! {
     fault "new-base-request-ignored" ["STATE-17", "ORD-UPD-02"] "Does not look at newBaseRequest."
         because "It breaks a recommendation only."
         => heeds(|_, _| false);
-    fault "r1-new-base-only-at-rest" ["STATE-17"] "It ignores newBaseRequest while the vehicle is driving."
+    fault "new-base-only-at-rest" ["STATE-17"] "It ignores newBaseRequest while the vehicle is driving."
+        because "STATE-17, an answer to newBaseRequest, is described and not demanded; the base comes when the vehicle stands."
         => heeds(|vehicle, _| !drives(vehicle));
-    fault "r2-new-base-ignored-in-semiautomatic" ["STATE-17"] "It ignores newBaseRequest of a vehicle in SEMIAUTOMATIC."
+    fault "new-base-ignored-in-semiautomatic" ["STATE-17"] "It ignores newBaseRequest of a vehicle in SEMIAUTOMATIC."
+        because "STATE-17, an answer to newBaseRequest, is described and not demanded; how traffic stands in SEMIAUTOMATIC is not known."
         => heeds(|vehicle, _| mode(vehicle) != "SEMIAUTOMATIC");
-    fault "r1-new-base-answered-once" ["STATE-17"] "It answers the first newBaseRequest of a vehicle and ignores every later one."
+    fault "new-base-answered-once" ["STATE-17"] "It answers the first newBaseRequest of a vehicle and ignores every later one."
+        because "STATE-17, an answer to newBaseRequest, is described and not demanded; traffic may forbid the second one."
         => keep::<bool>().happens(|answered, _, _, event| if let Event::Updated(_, asked) = event {
             *answered |= *asked;
         }).allows(|answered, _, _, what, usual| usual && !(*answered && matches!(what, Permission::Heed(_))));
-    fault "r5-new-base-request-heard-once" ["STATE-17", "ORD-UPD-02"] "It answers only the first newBaseRequest of an order and waits for the decision point afterwards."
+    fault "new-base-request-heard-once" ["STATE-17", "ORD-UPD-02"] "It answers only the first newBaseRequest of an order and waits for the decision point afterwards."
         => keep::<bool>().happens(|answered, _, _, event| match event {
             Event::Updated(_, asked) => *answered |= *asked,
             Event::Begun => *answered = false,
@@ -44,7 +47,8 @@ records! {
             Permission::Grow(_, ahead, _) if *answered => ahead == 0 && !drives(vehicle),
             _ => usual,
         });
-    fault "r3-new-base-answered-by-horizon" ["STATE-17"] "It answers newBaseRequest by an update that releases nothing new."
+    fault "new-base-answered-by-horizon" ["STATE-17"] "It answers newBaseRequest by an update that releases nothing new."
+        because "STATE-17, an answer to newBaseRequest, is described and not demanded; an update without base may say that traffic does not permit one."
         => keep::<bool>().happens(|answered, _, vehicle, event| match event {
             Event::Extending(running) if asks(vehicle) && !*answered && !running.is_whole() => {
                 *answered = true;
@@ -56,7 +60,7 @@ records! {
             Permission::Grow(_, _, asked) => usual && !asked,
             _ => usual,
         });
-    fault "r3-edge-ahead-released-when-asked" ["ORD-08"] "In an update that the vehicle asks for by newBaseRequest it also releases the first edge of the horizon."
+    fault "edge-ahead-released-when-asked" ["ORD-08"] "In an update that the vehicle asks for by newBaseRequest it also releases the first edge of the horizon."
         => keep::<bool>().happens(|asked, _, vehicle, event| if let Event::Extending(_) = event {
             *asked = asks(vehicle);
         }).words(|asked, _, _, worded, m| worded.edges(m, |index, _, edge| if *asked && worded.is_update() && index + 1 == worded.window.released {
@@ -64,14 +68,15 @@ records! {
         }));
     fault "base-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Sends the whole order with every update."
         => plain().window(|(), _, _, _, window, _| window.first = 0);
-    fault "r3-base-sent-again-after-pause" ["ORD-UPD-05", "ORD-UPD-03"]
+    fault "base-sent-again-after-pause" ["ORD-UPD-05", "ORD-UPD-03"]
         "After the vehicle was paused it begins the updates of the order with the first node of the order."
         => keep::<bool>().happens(paused_with_it).window(|paused, _, _, _, window, _| if *paused {
             window.first = 0;
         });
-    fault "r4-no-base-after-pause" ["STATE-17", "ORD-UPD-02"] "It sends no further base for the order after the vehicle was paused and has been resumed."
+    fault "no-base-after-pause" ["STATE-17", "ORD-UPD-02"] "It sends no further base for the order after the vehicle was paused and has been resumed."
+        because "ORD-UPD-02 asks for a base early enough where traffic permits, and is a recommendation."
         => keep::<bool>().happens(paused_with_it).allows(|paused, _, _, what, usual| usual && !(*paused && matches!(what, Permission::Extend(_))));
-    fault "r6-resume-repeats-base" ["ORD-UPD-05", "ORD-UPD-03"] "It sends the order once more from its first node, with the next orderUpdateId, when a pause ends."
+    fault "resume-repeats-base" ["ORD-UPD-05", "ORD-UPD-03"] "It sends the order once more from its first node, with the next orderUpdateId, when a pause ends."
         => keep::<bool>().happens(|resumed, _, vehicle, event| match event {
             Event::State(Some(before)) if before.is_paused() && !vehicle.is_paused() => {
                 if let Some(running) = vehicle.running.as_mut().filter(|running| running.accepted) {
@@ -84,11 +89,11 @@ records! {
         }).window(|resumed, _, _, _, window, _| if *resumed {
             window.first = 0;
         });
-    fault "r1-update-from-vehicle" ["ORD-UPD-05", "ORD-UPD-03"] "Order updates begin with the node the vehicle has reached last and repeat the base from there."
+    fault "update-from-vehicle" ["ORD-UPD-05", "ORD-UPD-03"] "Order updates begin with the node the vehicle has reached last and repeat the base from there."
         => plain().window(|(), _, vehicle, running, window, _| if running.released > 0 {
             window.first = running.reached(vehicle.state.as_ref()).min(running.released - 1);
         });
-    fault "r2-update-begins-one-node-early" ["ORD-UPD-05", "ORD-UPD-03"] "It begins an update with the last but one node of the base sent before."
+    fault "update-begins-one-node-early" ["ORD-UPD-05", "ORD-UPD-03"] "It begins an update with the last but one node of the base sent before."
         => plain().window(|(), _, _, running, window, _| if running.released > 0 {
             window.first = running.released.saturating_sub(2);
         });
@@ -102,16 +107,16 @@ records! {
         => update_id(|running| running.update_id - u32::from(running.update_id > 1));
     fault "update-id-stops-at-ten" ["ORD-UPD-04"] "Compares orderUpdateIds as texts, so that 10 comes behind 9 for ever."
         => update_id(|running| running.update_id - u32::from(running.update_id == 11));
-    fault "r1-update-id-kept-on-reroute" ["ORD-UPD-04"] "The order update of a change of destination has the orderUpdateId of the message before."
+    fault "update-id-kept-on-reroute" ["ORD-UPD-04"] "The order update of a change of destination has the orderUpdateId of the message before."
         => update_id(|running| running.update_id - u32::from(running.changed));
-    fault "r3-update-id-kept-after-resend" ["ORD-UPD-04"] "It does not raise the orderUpdateId of an update that follows a message which it had to send again."
+    fault "update-id-kept-after-resend" ["ORD-UPD-04"] "It does not raise the orderUpdateId of an update that follows a message which it had to send again."
         => update_id(|running| running.update_id - u32::from(running.resends > 0));
-    fault "r6-update-id-raised-only-with-base" ["ORD-UPD-04"] "It leaves the orderUpdateId as it is when only the horizon changes."
+    fault "update-id-raised-only-with-base" ["ORD-UPD-04"] "It leaves the orderUpdateId as it is when only the horizon changes."
         => keep::<bool>().window(|grows, _, _, running, window, _| *grows = window.released > running.released)
             .happens(|grows, _, _, event| if let Event::Updating(running) = event && running.changed && !*grows {
                 running.update_id -= 1;
             });
-    fault "r4-counts-updates-from-the-reported-state" ["ORD-UPD-04"]
+    fault "counts-updates-from-the-reported-state" ["ORD-UPD-04"]
         "It takes as next orderUpdateId the reported one plus one, so that two updates in quick succession carry the same id with different content."
         => plain().happens(|(), _, vehicle, event| if let Event::Updating(running) = event {
             let state = vehicle.state.as_ref().filter(|state| state.order_id == running.id);
@@ -129,20 +134,22 @@ records! {
         } else {
             fate
         });
-    fault "r2-e-stop-withdraws-base" ["ORD-UPD-03", "ORD-UPD-05", "ORD-CANCEL-01"]
+    fault "e-stop-withdraws-base" ["ORD-UPD-03", "ORD-UPD-05", "ORD-CANCEL-01"]
         "It takes the rest of the base back by an update that begins where the vehicle is when the vehicle reports an emergency stop during an order."
         => withdraws(|state| !matches!(state.safety_state.e_stop.as_str(), "NONE" | ""));
-    fault "r4-takes-the-base-back-in-pause" ["ORD-UPD-03"]
+    fault "takes-the-base-back-in-pause" ["ORD-UPD-03"]
         "It sends an update that takes released nodes ahead of the vehicle back into the horizon, while the vehicle is paused."
         => withdraws(State::is_paused);
-    fault "r2-warning-holds-base" ["ORD-UPD-02", "STATE-17"] "It does not extend the base as long as the vehicle reports a warning."
+    fault "warning-holds-base" ["ORD-UPD-02", "STATE-17"] "It does not extend the base as long as the vehicle reports a warning."
+        because "STATE-17 depends on the traffic; a master control may be cautious with a vehicle that warns."
         => extends(|_, vehicle, _| {
             let mut errors = vehicle.state.iter().flat_map(|state| &state.errors);
             !errors.any(|error| error.error_level == "WARNING")
         });
-    liberty "r6-no-update-while-paused" ["STATE-17", "ORD-UPD-02"] "It sends no further base as long as the vehicle is paused."
+    liberty "no-update-while-paused" ["STATE-17", "ORD-UPD-02"] "It sends no further base as long as the vehicle is paused."
         => extends(|_, vehicle, _| !vehicle.is_paused());
-    fault "r3-base-planned-every-half-minute" ["ORD-UPD-02", "STATE-17"] "It extends the base no sooner than half a minute after its last order message."
+    fault "base-planned-every-half-minute" ["ORD-UPD-02", "STATE-17"] "It extends the base no sooner than half a minute after its last order message."
+        because "ORD-UPD-02 recommends a base early enough; a planner that is slow makes the vehicle halt, and breaks nothing."
         => plain().allows(|(), site, vehicle, what, usual| {
             let due = vehicle.last_order_at.map(|last| last + Duration::from_secs(30));
             usual && !(matches!(what, Permission::Extend(_)) && due.is_some_and(|due| due > site.now.moment))
@@ -150,7 +157,8 @@ records! {
             let due = vehicle.last_order_at.map(|last| last + Duration::from_secs(30));
             due.filter(|due| *due > site.now.moment).into_iter().for_each(|due| vehicle.at(due));
         });
-    fault "r1-goal-released-on-arrival" ["ORD-UPD-02"] "It releases the last node of a transport only when the vehicle has halted at the end of the base before it."
+    fault "goal-released-on-arrival" ["ORD-UPD-02"] "It releases the last node of a transport only when the vehicle has halted at the end of the base before it."
+        because "ORD-UPD-02 recommends a base early enough; a goal that is guarded makes the vehicle halt, and breaks nothing."
         => plain().measures(|(), _, vehicle, what, usual| match what {
             Measure::Base(running, _, asked) => {
                 let ahead = running.released.saturating_sub(running.reached(vehicle.state.as_ref()) + 1);
@@ -160,14 +168,14 @@ records! {
             }
             _ => usual,
         });
-    fault "r1-sequence-continues-over-orders" ["ORD-UPD-11"] "A second order continues the sequenceIds of the order before instead of beginning at 0."
+    fault "sequence-continues-over-orders" ["ORD-UPD-11"] "A second order continues the sequenceIds of the order before instead of beginning at 0."
         => Box::new(Renumbered::new(false, false));
-    fault "r2-sequence-continues-after-cancel" ["ORD-UPD-11"] "It continues the sequenceIds of a cancelled order in the new order that follows it."
+    fault "sequence-continues-after-cancel" ["ORD-UPD-11"] "It continues the sequenceIds of a cancelled order in the new order that follows it."
         => Box::new(Renumbered::new(true, false));
-    fault "r1-sequence-gap-after-reroute" ["ORD-UPD-11", "ORD-UPD-12"]
+    fault "sequence-gap-after-reroute" ["ORD-UPD-11", "ORD-UPD-12"]
         "After a change of destination the sequenceIds of the horizon given up are skipped, so that there is a gap."
         => Box::new(Renumbered::new(true, true));
-    fault "r6-queued-update-after-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends an update that waited for minOrderInterval after the cancelOrder that came in between."
+    fault "queued-update-after-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends an update that waited for minOrderInterval after the cancelOrder that came in between."
         => keep::<(Option<Value>, Option<Value>)>().happens(|(waiting, late), site, vehicle, event| match event {
             Event::Waits(running, target, free) => {
                 let released = (*target).max(running.released);
@@ -192,7 +200,7 @@ records! {
             }
             _ => {}
         });
-    liberty "r1-base-grows-eagerly" ["ORD-UPD-02"] "It extends the base by a node as soon as the message before was accepted, long before the vehicle needs it."
+    liberty "base-grows-eagerly" ["ORD-UPD-02"] "It extends the base by a node as soon as the message before was accepted, long before the vehicle needs it."
         => plain().allows(|(), _, _, what, usual| match what {
             Permission::Grow(running, ..) => usual || !running.is_whole(),
             _ => usual,
@@ -200,11 +208,11 @@ records! {
             Measure::Base(running, free, _) => usual.max(running.released + 1).min(free),
             _ => usual,
         });
-    liberty "r1-updates-without-horizon" ["ORD-UPD-03", "ORD-09"] "Order updates hold the new base only and delete the horizon."
+    liberty "updates-without-horizon" ["ORD-UPD-03", "ORD-09"] "Order updates hold the new base only and delete the horizon."
         => plain().window(|(), _, _, running, window, _| if running.released > 0 && window.released > running.released {
             window.end = window.released;
         });
-    liberty "r1-horizon-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Once in an order it sends an order update that extends nothing and gives the same horizon again."
+    liberty "horizon-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Once in an order it sends an order update that extends nothing and gives the same horizon again."
         => keep::<bool>().happens(|sent, _, _, event| match event {
             Event::Extending(running) if !*sent && !running.is_whole() => {
                 *sent = true;
@@ -213,7 +221,7 @@ records! {
             Event::Begun => *sent = false,
             _ => {}
         });
-    liberty "r4-horizon-deleted-first" ["ORD-UPD-03", "ORD-UPD-04"]
+    liberty "horizon-deleted-first" ["ORD-UPD-03", "ORD-UPD-04"]
         "It deletes the horizon by one update and sends the new one by a second, when the destination is changed."
         => keep::<bool>().happens(|due, _, _, event| match event {
             Event::Led(_) => *due = true,
@@ -221,7 +229,7 @@ records! {
             Event::Begun => *due = false,
             _ => {}
         }).allows(without_horizon).window(ends_with_base);
-    liberty "r5-horizon-deleted-on-pause" ["ORD-UPD-03", "ORD-UPD-02"]
+    liberty "horizon-deleted-on-pause" ["ORD-UPD-03", "ORD-UPD-02"]
         "It deletes the horizon by an update when the operator pauses a vehicle and sends it again after the resume."
         => keep::<bool>().happens(|short, _, vehicle, event| match event {
             Event::Extending(running) => {
@@ -231,7 +239,7 @@ records! {
             Event::Begun => *short = false,
             _ => {}
         }).allows(without_horizon).window(ends_with_base);
-    liberty "r6-horizon-withdrawn-and-given-again" ["ORD-UPD-12", "ORD-UPD-03"]
+    liberty "horizon-withdrawn-and-given-again" ["ORD-UPD-12", "ORD-UPD-03"]
         "It takes the horizon back by an update with the stitching node only and gives it again by the next update."
         => keep::<(bool, bool)>().happens(|(due, done), _, vehicle, event| match event {
             Event::Extending(running) => {

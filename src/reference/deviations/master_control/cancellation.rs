@@ -51,12 +51,13 @@ records! {
             let works = |id: &str| state.action(id).is_some_and(|action| !action.is_terminal());
             !state.driving && then.is_some() && running.action_ids().any(works)
         });
-    fault "r1-paused-order-replaced" ["ORD-CANCEL-01"] "When an order is called off while the vehicle is paused, it sends no cancelOrder, and the next new order at once."
+    fault "paused-order-replaced" ["ORD-CANCEL-01"] "When an order is called off while the vehicle is paused, it sends no cancelOrder, and the next new order at once."
+        because "A paused vehicle keeps its base; that ORD-CANCEL-01 asks for cancelOrder before it is replaced is seen from its usual conduct only."
         => replaced(|vehicle, _| vehicle.is_paused());
-    fault "r5-cancel-lost-while-disconnected" ["ORD-CANCEL-01"]
+    fault "cancel-lost-while-disconnected" ["ORD-CANCEL-01"]
         "It forgets a cancel request that comes while the vehicle is CONNECTIONBROKEN and sends a new order after ONLINE without any cancelOrder."
         => replaced(|vehicle, _| vehicle.presence == Presence::Away);
-    fault "r2-cancel-forgotten-before-acceptance" ["ORD-CANCEL-01"]
+    fault "cancel-forgotten-before-acceptance" ["ORD-CANCEL-01"]
         "It strikes an order without sending cancelOrder when it is called off after it was sent and before a state has shown it."
         => plain().happens(|(), site, vehicle, event| if let Event::CallingOff(then, sends) = event {
             if vehicle.running.as_ref().is_some_and(|running| !running.accepted) {
@@ -65,16 +66,17 @@ records! {
                 vehicle.queue.extend(then.take());
             }
         });
-    fault "r1-cancel-lost-while-away" ["ORD-CANCEL-01", "TOPIC-13"] "A cancellation asked for while the vehicle is away is never sent, and the order goes on."
+    fault "cancel-lost-while-away" ["ORD-CANCEL-01", "TOPIC-13"] "A cancellation asked for while the vehicle is away is never sent, and the order goes on."
         => plain().happens(|(), _, vehicle, event| if let Event::CallingOff(_, sends) = event {
             **sends &= vehicle.presence != Presence::Away;
         });
-    fault "r3-cancels-only-once" ["ORD-CANCEL-01"] "It sends cancelOrder to a vehicle only once: later requests to call an order off lead to nothing."
+    fault "cancels-only-once" ["ORD-CANCEL-01"] "It sends cancelOrder to a vehicle only once: later requests to call an order off lead to nothing."
         => keep::<bool>().happens(|done, _, _, event| if let Event::CallingOff(_, sends) = event {
             **sends &= !std::mem::replace(done, true);
         });
-    fault "r5-cancel-of-paused-vehicle-only-internal" ["ORD-CANCEL-01", "TOPIC-13"]
+    fault "cancel-of-paused-vehicle-only-internal" ["ORD-CANCEL-01", "TOPIC-13"]
         "It deletes the transport of a paused vehicle in its own list without sending cancelOrder, and dispatches the next one after stopPause."
+        because "No sentence obliges a master control to call off what it may also leave without a further base."
         => keep::<bool>().happens(|dropped, site, vehicle, event| match event {
             Event::CallingOff(then, sends) if vehicle.is_paused() => {
                 **sends = false;
@@ -89,7 +91,7 @@ records! {
             Permission::Begin => usual && !(*dropped && vehicle.is_paused()),
             _ => usual,
         });
-    fault "r1-pause-instead-of-cancel" ["ORD-CANCEL-01"] "To call an order off it sends startPause and never cancelOrder."
+    fault "pause-instead-of-cancel" ["ORD-CANCEL-01"] "To call an order off it sends startPause and never cancelOrder."
         => plain().happens(|(), site, vehicle, event| if let Event::CallingOff(_, sends) = event {
             **sends = false;
             let pausing = vehicle.instants.iter().any(|instant| instant.kind() == "startPause");
@@ -102,7 +104,7 @@ records! {
             let body = json!({ "orderId": running.id, "orderUpdateId": running.update_id + 1, "nodes": [], "edges": [] });
             site.publish(vehicle, "order", &body);
         });
-    fault "r2-failed-cancel-taken-for-done" ["ORD-CANCEL-01"] "It sends the next order when cancelOrder has FAILED and the vehicle still drives the old one."
+    fault "failed-cancel-taken-for-done" ["ORD-CANCEL-01"] "It sends the next order when cancelOrder has FAILED and the vehicle still drives the old one."
         => keep::<bool>().happens(|hasty, _, _, event| match event {
             Event::Ended(_, true) => *hasty = true,
             Event::Begun => *hasty = false,
@@ -112,9 +114,10 @@ records! {
             Permission::Interrupt => usual || *hasty,
             _ => usual,
         });
-    fault "r2-cancel-held-while-paused" ["ORD-CANCEL-01"] "It holds cancelOrder back as long as the vehicle is paused."
+    fault "cancel-held-while-paused" ["ORD-CANCEL-01"] "It holds cancelOrder back as long as the vehicle is paused."
+        because "ORD-CANCEL-01 names no time by which cancelOrder has to follow the wish."
         => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Tell("cancelOrder")) && vehicle.is_paused()));
-    fault "r4-new-order-without-cancel-in-pause" ["ORD-CANCEL-01", "ORD-UPD-03"]
+    fault "new-order-without-cancel-in-pause" ["ORD-CANCEL-01", "ORD-UPD-03"]
         "It sends a new order without cancelOrder when the destination is changed while the vehicle is paused in the middle of its order."
         => keep::<bool>().happens(|hasty, _, vehicle, event| match event {
             Event::Rerouting(running, how) if vehicle.is_paused() && running.accepted && vehicle.cancel.is_none() => {
@@ -124,7 +127,7 @@ records! {
             Event::Begun => *hasty = false,
             _ => {}
         }).allows(hasty);
-    fault "r1-next-order-after-failed-action" ["ORD-CANCEL-01"]
+    fault "next-order-after-failed-action" ["ORD-CANCEL-01"]
         "After an action of an order has failed it sends the next new order without cancelOrder while the old one still has nodes left."
         => keep::<bool>().judges(|hasty, _, _, running, state, fate| {
             if fate == Fate::CalledOff && has_failed(running, state) {
@@ -137,7 +140,7 @@ records! {
         }).allows(hasty);
     fault "trigger-unsupervised" ["ACT-39"] "Waits for a trigger without end."
         => plain().allows(|(), _, _, what, usual| usual && !matches!(what, Permission::Supervise(_)));
-    fault "r3-trigger-unsupervised-after-update" ["ACT-39"] "It does not supervise the time-out of waitForTrigger in an order that has been updated."
+    fault "trigger-unsupervised-after-update" ["ACT-39"] "It does not supervise the time-out of waitForTrigger in an order that has been updated."
         => plain().allows(|(), _, _, what, usual| usual && !matches!(what, Permission::Supervise(running) if running.is_updated()));
     fault "trigger-forgotten-in-pause" ["ACT-39"] "Stops the time of waitForTrigger when the vehicle is paused, and never starts it again."
         => keep::<bool>().happens(|forgotten, _, vehicle, event| match event {
@@ -152,13 +155,13 @@ records! {
         => keep::<bool>().happens(|once, _, _, event| if let Event::Ended(order, false) = event {
             *once |= order.waits.is_some();
         }).allows(|once, _, _, what, usual| usual && !(*once && matches!(what, Permission::Supervise(_))));
-    fault "r1-trigger-timer-restarts" ["ACT-39"]
+    fault "trigger-timer-restarts" ["ACT-39"]
         "The time-out of waitForTrigger begins again with every state, so that it never runs out at a vehicle that reports often."
         => plain().happens(|(), site, vehicle, event| if let Event::State(_) = event {
             let waits = vehicle.running.as_mut().and_then(|running| running.waits.as_mut());
             waits.into_iter().for_each(|(_, since)| *since = site.now.moment);
         });
-    fault "r1-trigger-timeout-pauses" ["ACT-39"] "When waitForTrigger runs too long it sends startPause and does not call the order off."
+    fault "trigger-timeout-pauses" ["ACT-39"] "When waitForTrigger runs too long it sends startPause and does not call the order off."
         => plain().judges(|(), site, vehicle, running, _, fate| {
             if fate != Fate::TooLate {
                 return fate;
@@ -168,7 +171,7 @@ records! {
             site.instant(vehicle, "startPause", &Value::Null);
             Fate::Runs
         });
-    fault "r6-trigger-timeout-without-cancel" ["ACT-39", "ORD-CANCEL-01"] "It sends the next order when waitForTrigger has timed out, without cancelOrder."
+    fault "trigger-timeout-without-cancel" ["ACT-39", "ORD-CANCEL-01"] "It sends the next order when waitForTrigger has timed out, without cancelOrder."
         => keep::<bool>().judges(|hasty, _, _, _, _, fate| {
             if fate == Fate::TooLate {
                 *hasty = true;
@@ -178,14 +181,14 @@ records! {
         }).happens(|hasty, _, _, event| if let Event::Begun = event {
             *hasty = false;
         }).allows(hasty);
-    fault "r5-trigger-timeout-only-drops-transport" ["ACT-39", "ORD-CANCEL-01"]
+    fault "trigger-timeout-only-drops-transport" ["ACT-39", "ORD-CANCEL-01"]
         "It drops the transport in its own list when waitForTrigger takes too long, but does not cancel the order."
         => plain().judges(|(), _, _, _, _, fate| if fate == Fate::TooLate { Fate::Over } else { fate });
-    liberty "r3-resumes-before-cancel" ["ORD-CANCEL-01"] "It sends stopPause to a paused vehicle before it calls its order off."
+    liberty "resumes-before-cancel" ["ORD-CANCEL-01"] "It sends stopPause to a paused vehicle before it calls its order off."
         => plain().happens(|(), site, vehicle, event| if let Event::CallingOff(..) = event && vehicle.is_paused() {
             site.instant(vehicle, "stopPause", &Value::Null);
         });
-    liberty "r2-pauses-before-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends startPause before cancelOrder, and stopPause when the cancellation has ended."
+    liberty "pauses-before-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends startPause before cancelOrder, and stopPause when the cancellation has ended."
         => keep::<bool>().happens(|resumes, site, vehicle, event| match event {
             Event::CallingOff(..) if !vehicle.is_paused() => *resumes = site.instant(vehicle, "startPause", &Value::Null).is_some(),
             Event::CancelOver if std::mem::take(resumes) => {
@@ -193,7 +196,7 @@ records! {
             }
             _ => {}
         });
-    liberty "r3-cancel-sent-to-idle" ["ORD-CANCEL-01"] "It passes a requested cancelOrder on to a vehicle that has nothing to do."
+    liberty "cancel-sent-to-idle" ["ORD-CANCEL-01"] "It passes a requested cancelOrder on to a vehicle that has nothing to do."
         => plain().asked(|(), site, vehicle, command, _| {
             let idle = vehicle.running.is_none() && vehicle.queue.is_empty() && vehicle.cancel.is_none();
             let idle = idle && vehicle.state.as_ref().is_some_and(State::route_empty);
@@ -202,7 +205,7 @@ records! {
             }
             true
         });
-    liberty "r4-cancels-after-two-seconds" ["ORD-CANCEL-01", "TOPIC-13"] "It sends cancelOrder two seconds after the operator asked for it."
+    liberty "cancels-after-two-seconds" ["ORD-CANCEL-01", "TOPIC-13"] "It sends cancelOrder two seconds after the operator asked for it."
         => keep::<Option<(Moment, String)>>().asked(|due, site, vehicle, command, _| {
             let order = vehicle.running.as_ref().map(|running| running.id.clone());
             let Some(order) = order.filter(|_| command == "cancel") else { return true };
@@ -218,7 +221,7 @@ records! {
                 site.call_off(vehicle);
             }
         });
-    liberty "r6-cancels-on-fatal" ["IACT-02", "CONN-14"] "It cancels the order of a vehicle that reports a FATAL error."
+    liberty "cancels-on-fatal" ["IACT-02", "CONN-14"] "It cancels the order of a vehicle that reports a FATAL error."
         => keep::<bool>().happens(|done, site, vehicle, event| match event {
             Event::Looked => {
                 let mut errors = vehicle.state.iter().flat_map(|state| &state.errors);
@@ -232,7 +235,7 @@ records! {
             Event::Begun => *done = false,
             _ => {}
         });
-    liberty "r1-log-asked-after-failure" ["ACT-08", "ACT-31"] "After an action of an order has failed it asks for a log if the vehicle offers that."
+    liberty "log-asked-after-failure" ["ACT-08", "ACT-31"] "After an action of an order has failed it asks for a log if the vehicle offers that."
         => keep::<bool>().judges(|asked, site, vehicle, running, state, fate| {
             if has_failed(running, state) && !*asked && vehicle.offer("logReport").is_some() {
                 *asked = true;

@@ -22,19 +22,19 @@ records! {
         => Box::new(PauseForAll);
     fault "orders-not-sent" ["TOPIC-13"] "Plans its orders and never sends them."
         => plain().sends(|(), _, _, out| out.name != "order");
-    fault "r2-order-id-from-goal" ["ORD-MSG-02"] "It makes the orderId from the destination, so that a later transport to the same place has the same orderId."
+    fault "order-id-from-goal" ["ORD-MSG-02"] "It makes the orderId from the destination, so that a later transport to the same place has the same orderId."
         => plain().happens(|(), _, _, event| if let Event::Planned(running) = event {
             let transport = &running.transport;
             running.id = numbered(format!("to-{}", transport.to), transport.begun);
         });
-    fault "r6-order-id-from-route" ["ORD-MSG-02"] "It forms the orderId from start and destination, so that the same transport on another day has the same orderId."
+    fault "order-id-from-route" ["ORD-MSG-02"] "It forms the orderId from start and destination, so that the same transport on another day has the same orderId."
         => plain().happens(|(), _, _, event| if let Event::Planned(running) = event {
             let transport = &running.transport;
             let start = running.stops.first().map(|stop| stop.id.as_str());
             let from = transport.from.as_deref().or(start).unwrap_or_default();
             running.id = numbered(format!("{from}-to-{}", transport.to), transport.begun);
         });
-    fault "r6-order-id-kept-after-cancel" ["ORD-MSG-02"] "It sends the order after a cancellation under the orderId of the cancelled one, with orderUpdateId 0."
+    fault "order-id-kept-behind-a-cancellation" ["ORD-MSG-02"] "It sends the order after a cancellation under the orderId of the cancelled one, with orderUpdateId 0."
         => keep::<Option<String>>().happens(|kept, _, vehicle, event| match event {
             Event::Ended(order, true) => *kept = Some(order.id.clone()),
             Event::Planned(running) => running.id = kept.clone().unwrap_or(std::mem::take(&mut running.id)),
@@ -46,7 +46,7 @@ records! {
             }
             _ => {}
         });
-    fault "r1-order-id-kept-after-cancel" ["ORD-MSG-02", "ORD-UPD-04", "ORD-UPD-05"]
+    fault "order-id-kept-after-cancel" ["ORD-MSG-02", "ORD-UPD-04", "ORD-UPD-05"]
         "The first order after a cancellation has the orderId of the order that was called off and the next orderUpdateId."
         => keep::<Option<(String, u32)>>().happens(|kept, _, _, event| match event {
             Event::Ended(order, true) => *kept = Some((order.id.clone(), order.update_id)),
@@ -61,7 +61,7 @@ records! {
         => plain().happens(|(), _, _, event| if let Event::Planned(running) = event {
             running.update_id = 7;
         });
-    fault "r3-action-ids-kept-after-cancel" ["ORD-MSG-17"]
+    fault "action-ids-kept-after-cancel" ["ORD-MSG-17"]
         "It gives the actions of the order after a cancelled one the actionIds of the actions of the same type in the cancelled one."
         => keep::<Option<Running>>().happens(|old, _, _, event| match event {
             Event::Ended(order, true) => *old = Some(order.clone()),
@@ -76,30 +76,30 @@ records! {
             Event::Begun => *old = None,
             _ => {}
         });
-    fault "r5-action-ids-counted-per-message" ["ORD-MSG-17"]
+    fault "action-ids-counted-per-message" ["ORD-MSG-17"]
         "It numbers the actions within each order message, so that the actions of an update get the ids of those of the first message."
         => plain().happens(|(), _, vehicle, event| match event {
             Event::Begins(running) => number_actions(vehicle, running, 0),
             Event::Updating(running) => number_actions(vehicle, running, running.released),
             _ => {}
         });
-    liberty "r5-horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update."
+    liberty "horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update."
         => plain().happens(|(), site, vehicle, event| if let Event::Updating(running) = event {
             let first = running.released;
             for action in unreleased(running, first) {
                 action["actionId"] = json!(site.next_id(vehicle, "action"));
             }
         });
-    fault "r3-resume-on-first-node" ["ACT-08", "FACT-15"] "It puts a stopPause on the first node of an order for a vehicle that is paused."
+    fault "resume-on-first-node" ["ACT-08", "FACT-15"] "It puts a stopPause on the first node of an order for a vehicle that is paused."
         => plain().happens(|(), site, vehicle, event| if let Event::Planned(running) = event && vehicle.is_paused() {
             let action = site.action(vehicle, "stopPause", &Value::Null);
             running.stops[0].actions.push(action);
         });
-    fault "r2-state-request-at-goal" ["ACT-08", "FACT-15"] "It puts a stateRequest on the last node of each order."
+    fault "state-request-at-goal" ["ACT-08", "FACT-15"] "It puts a stateRequest on the last node of each order."
         => plain().way(|(), site, vehicle, way, _, _| at_goal(site, vehicle, way, "stateRequest"));
     fault "pause-on-node" ["ACT-08", "FACT-15"] "Sends startPause as an action of a node."
         => plain().way(|(), site, vehicle, way, _, _| at_goal(site, vehicle, way, "startPause"));
-    fault "r1-pick-and-drop-share-id" ["ORD-MSG-17"] "The pick and the drop of one transport have the same actionId."
+    fault "pick-and-drop-share-id" ["ORD-MSG-17"] "The pick and the drop of one transport have the same actionId."
         => plain().way(|(), _, _, way, _, _| {
             let mut picked = None;
             for action in way.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
@@ -110,18 +110,18 @@ records! {
                 }
             }
         });
-    fault "r2-action-id-of-station" ["ORD-MSG-17"]
+    fault "action-id-of-station" ["ORD-MSG-17"]
         "It makes the actionId of a node action from its type and the node, so that the same action at the same node has it again in a later order."
         => plain().way(|(), _, _, way, _, _| for stop in &mut way.stops {
             for action in &mut stop.actions {
                 action["actionId"] = json!(format!("{}-{}", action["actionType"].as_str().unwrap_or_default(), stop.id));
             }
         });
-    fault "r4-hard-although-not-listed" ["FACT-15"] "It sends actions at stations with blocking type HARD, though the factsheet lists other blocking types only for them."
+    fault "hard-although-not-listed" ["FACT-15"] "It sends actions at stations with blocking type HARD, though the factsheet lists other blocking types only for them."
         => plain().way(|(), _, _, way, _, _| for action in way_actions(way) {
             action["blockingType"] = json!("HARD");
         });
-    liberty "r3-vendor-actions-block-nothing" ["ORD-MSG-16", "FACT-15"]
+    liberty "vendor-actions-block-nothing" ["ORD-MSG-16", "FACT-15"]
         "It sends actions of the manufacturer on nodes with blockingType NONE where the vehicle allows it."
         => plain().way(|(), _, vehicle, way, _, _| for action in way.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
             let kind = action["actionType"].as_str().unwrap_or_default();
@@ -130,18 +130,18 @@ records! {
                 action["blockingType"] = json!("NONE");
             }
         });
-    fault "r1-trigger-on-edge" ["ACT-08", "FACT-15"] "It puts waitForTrigger on the edge before the node."
+    fault "trigger-on-edge" ["ACT-08", "FACT-15"] "It puts waitForTrigger on the edge before the node."
         => plain().way(|(), _, _, way, _, _| to_edges(way, |kind, _| kind == "waitForTrigger"));
-    liberty "r1-actions-on-edges" ["ACT-08", "FACT-15"] "pick, drop and other actions are put on the last edge before the station where the vehicle offers that scope."
+    liberty "actions-on-edges" ["ACT-08", "FACT-15"] "pick, drop and other actions are put on the last edge before the station where the vehicle offers that scope."
         => plain().way(|(), site, vehicle, way, _, _| to_edges(way, |kind, taken| {
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["edge.actions"]));
             site.offers(vehicle, kind, "EDGE") && taken < limit
         }));
-    fault "r2-edge-action-on-node" ["FACT-15"] "It puts an action on a node that the vehicle offers on edges only."
+    fault "edge-action-on-node" ["FACT-15"] "It puts an action on a node that the vehicle offers on edges only."
         => plain().way(|(), _, _, way, _, _| for (leg, stop) in way.legs.iter_mut().zip(way.stops.iter_mut().skip(1)) {
             stop.actions.append(&mut leg.actions);
         });
-    liberty "r3-load-id-given" ["ACT-31", "FACT-15"] "It sends the optional parameter loadId with pick where the vehicle lists it."
+    liberty "load-id-given" ["ACT-31", "FACT-15"] "It sends the optional parameter loadId with pick where the vehicle lists it."
         => plain().way(|(), site, vehicle, way, _, _| for stop in way.stops.iter_mut().filter(|_| is_roomy(vehicle)) {
             for pick in stop.actions.iter_mut().filter(|action| action["actionType"] == "pick") {
                 let listed = vehicle.offer("pick").and_then(|offer| offer.action_parameters.as_deref()).unwrap_or_default();
@@ -151,7 +151,7 @@ records! {
                 }
             }
         });
-    liberty "r3-fine-positioning-before-pick" ["ACT-08", "FACT-15"] "It puts a finePositioning before each pick on a node where the vehicle offers it."
+    liberty "fine-positioning-before-pick" ["ACT-08", "FACT-15"] "It puts a finePositioning before each pick on a node where the vehicle offers it."
         => plain().way(|(), site, vehicle, way, _, _| {
             let offered = vehicle.offer("finePositioning").is_some() && site.offers(vehicle, "finePositioning", "NODE");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["node.actions"]));
@@ -163,7 +163,7 @@ records! {
         });
     fault "pick-at-once" ["ACT-08", "FACT-15"] "Sends pick as an instant action."
         => plain().way(|(), site, vehicle, way, _, _| at_once(site, vehicle, &mut way.stops, "pick"));
-    fault "r1-drop-at-once-when-there" ["ACT-08", "FACT-15"] "When the vehicle stands at the goal already it sends drop as an instant action."
+    fault "drop-at-once-when-there" ["ACT-08", "FACT-15"] "When the vehicle stands at the goal already it sends drop as an instant action."
         => plain().way(|(), site, vehicle, way, _, fresh| {
             let there = fresh && way.legs.is_empty() && way.stops.first().is_some_and(|stop| stop.actions.len() == 1);
             if there {
@@ -174,11 +174,11 @@ records! {
         => plain().measures(|(), _, _, what, usual| if let Measure::Actions = what { usize::MAX } else { usual });
     fault "parameter-limit-ignored" ["FACT-12"] "Gives an action more parameters than the vehicle takes."
         => plain().measures(|(), _, _, what, usual| if let Measure::Parameters = what { usize::MAX } else { usual });
-    liberty "r1-generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
+    liberty "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
         => plain().way(|(), _, _, way, _, fresh| for stop in way.stops.iter_mut().filter(|stop| fresh && stop.actions.is_empty()) {
             stop.deviation_xy.get_or_insert(0.8);
         });
-    liberty "r4-second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
+    liberty "second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
         "It sends the way to the first station as an order without horizon and, when that is completed, the rest as an update that begins at the last node."
         => keep::<Option<usize>>().happens(|halt, _, vehicle, event| match event {
             Event::Planned(running) => *halt = first_leg(running),
@@ -202,13 +202,13 @@ records! {
         => at_any_time(|_, _| true);
     fault "resent-too-soon" ["FACT-13"] "Sends a lost order again without regard to minOrderInterval."
         => at_any_time(|_, occasion| occasion == Occasion::Again);
-    fault "r2-interval-ignored-on-reroute" ["FACT-13"] "It does not wait for minOrderInterval when it sends another destination or another horizon."
+    fault "interval-ignored-on-reroute" ["FACT-13"] "It does not wait for minOrderInterval when it sends another destination or another horizon."
         => at_any_time(|_, occasion| matches!(occasion, Occasion::Update { changed: true, .. }));
-    fault "r3-interval-not-when-base-asked" ["FACT-13"] "It does not keep minOrderInterval for an update that the vehicle asks for by newBaseRequest."
+    fault "interval-not-when-base-asked" ["FACT-13"] "It does not keep minOrderInterval for an update that the vehicle asks for by newBaseRequest."
         => at_any_time(|_, occasion| matches!(occasion, Occasion::Update { asked: true, .. }));
-    fault "r1-interval-not-after-cancel" ["FACT-13"] "The first order after a cancellation is sent without regard to minOrderInterval."
+    fault "interval-not-after-cancel" ["FACT-13"] "The first order after a cancellation is sent without regard to minOrderInterval."
         => at_any_time(|called_off, occasion| called_off && occasion == Occasion::New);
-    fault "r1-interval-in-milliseconds" ["FACT-13"] "It takes minOrderInterval for milliseconds."
+    fault "interval-in-milliseconds" ["FACT-13"] "It takes minOrderInterval for milliseconds."
         => plain().lasts(|(), _, _, what, usual| if let Span::Interval(_) = what { usual / 1000 } else { usual });
     liberty "answers-slowly" ["ORD-UPD-02"] "Looks at a message half a second after it came."
         => plain().configures(|config| config.answers_after = Duration::from_millis(500));
@@ -216,7 +216,7 @@ records! {
         => plain().configures(|config| config.horizon_length = 0);
     liberty "long-horizon" ["ORD-09"] "Sends the whole way as horizon."
         => plain().configures(|config| config.horizon_length = usize::MAX);
-    liberty "r3-horizon-of-one-node" ["ORD-09"] "It never shows more than one node of the horizon."
+    liberty "horizon-of-one-node" ["ORD-09"] "It never shows more than one node of the horizon."
         => plain().configures(|config| config.horizon_length = config.horizon_length.min(1));
     liberty "whole-base" ["ORD-UPD-02"] "Releases the whole way at once."
         => plain().configures(|config| config.base_length = usize::MAX);
@@ -227,25 +227,25 @@ records! {
             Permission::Grow(_, ahead, _) => usual || ahead < site.config.base_length,
             _ => usual,
         });
-    liberty "r2-whole-way-released" ["ORD-09", "ORD-UPD-02"] "It releases the whole way with the first message of an order."
+    liberty "whole-way-released" ["ORD-09", "ORD-UPD-02"] "It releases the whole way with the first message of an order."
         => plain().window(|(), _, _, running, window, free| if running.released == 0 {
             (window.released, window.end) = (free, free);
         });
-    liberty "r2-horizon-to-the-goal" ["ORD-09", "ORD-UPD-02"] "It shows the whole rest of the way as horizon."
+    liberty "horizon-to-the-goal" ["ORD-09", "ORD-UPD-02"] "It shows the whole rest of the way as horizon."
         => plain().window(|(), _, _, _, window, free| window.end = free);
-    liberty "r2-first-order-without-horizon" ["ORD-09", "ORD-UPD-02"] "It sends the first message of an order without horizon and extends the base by updates."
+    liberty "first-order-without-horizon" ["ORD-09", "ORD-UPD-02"] "It sends the first message of an order without horizon and extends the base by updates."
         => plain().window(|(), _, _, running, window, _| if running.released == 0 {
             window.end = window.released;
         });
-    liberty "r6-one-node-first" ["ORD-02", "ORD-MSG-06"] "It first sends an order with only the node where the vehicle stands and adds the way by an update."
+    liberty "one-node-first" ["ORD-02", "ORD-MSG-06"] "It first sends an order with only the node where the vehicle stands and adds the way by an update."
         => plain().window(|(), _, _, running, window, _| if running.released == 0 {
             (window.released, window.end) = (1, 1);
         });
-    liberty "r2-factsheet-awaited" ["OPT-03", "FACT-15"] "It begins no order before it has the factsheet of the vehicle."
+    liberty "factsheet-awaited" ["OPT-03", "FACT-15"] "It begins no order before it has the factsheet of the vehicle."
         => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && vehicle.factsheet.is_none()));
-    liberty "r2-no-new-order-while-paused" ["TOPIC-13"] "It begins no new order while the vehicle is paused."
+    liberty "no-new-order-while-paused" ["TOPIC-13"] "It begins no new order while the vehicle is paused."
         => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && vehicle.is_paused()));
-    liberty "r5-pause-after-cancel-before-next-order" ["TOPIC-13", "ORD-CANCEL-17"] "It waits some seconds after a finished cancelOrder before it sends the next order."
+    liberty "pause-after-cancel-before-next-order" ["TOPIC-13", "ORD-CANCEL-17"] "It waits some seconds after a finished cancelOrder before it sends the next order."
         => keep::<Option<Moment>>().happens(|due, site, vehicle, event| match event {
             Event::Ended(_, true) => {
                 *due = Some(site.now.moment + Duration::from_secs(3));
@@ -254,7 +254,7 @@ records! {
             Event::Looked => again_at(*due, site, vehicle),
             _ => {}
         }).allows(not_before);
-    liberty "r4-dispatches-after-two-seconds" ["TOPIC-13"] "It sends an order two seconds after the operator asked for it."
+    liberty "dispatches-after-two-seconds" ["TOPIC-13"] "It sends an order two seconds after the operator asked for it."
         => keep::<Option<Moment>>().asked(|due, site, _vehicle, command, _| {
             if command == "dispatch" {
                 *due = Some(site.now.moment + Duration::from_secs(2));
@@ -263,7 +263,7 @@ records! {
         }).happens(|due, site, vehicle, event| if let Event::Looked = event {
             again_at(*due, site, vehicle);
         }).allows(not_before);
-    liberty "r2-latest-transport-first" ["TOPIC-13", "ORD-MSG-02"] "It begins the transport asked for last before those that wait longer."
+    liberty "latest-transport-first" ["TOPIC-13", "ORD-MSG-02"] "It begins the transport asked for last before those that wait longer."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let Some(latest) = transport(vehicle, arguments).filter(|_| command == "dispatch") else { return true };
             site.dispatch(vehicle, latest);
@@ -272,7 +272,7 @@ records! {
             }
             false
         });
-    liberty "r1-pick-and-drop-apart" ["ORD-MSG-02", "TOPIC-13"] "A transport from one station to another is done in two orders, one for the pick and one for the drop."
+    liberty "pick-and-drop-apart" ["ORD-MSG-02", "TOPIC-13"] "A transport from one station to another is done in two orders, one for the pick and one for the drop."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let whole = transport(vehicle, arguments).filter(|whole| command == "dispatch" && whole.action.is_none());
             let Some((whole, from)) = whole.and_then(|whole| Some((whole.clone(), whole.from?))) else { return true };
@@ -283,7 +283,7 @@ records! {
             site.dispatch(vehicle, drop);
             false
         });
-    liberty "r3-long-ways-in-two-orders" ["ORD-MSG-02", "ORD-02"] "It drives a long way in two orders one after the other."
+    liberty "long-ways-in-two-orders" ["ORD-MSG-02", "ORD-02"] "It drives a long way in two orders one after the other."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let plain = |whole: &Transport| whole.from.is_none() && whole.action.is_none() && whole.load_type.is_none();
             let idle = vehicle.running.is_none() && vehicle.queue.is_empty();

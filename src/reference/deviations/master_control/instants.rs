@@ -11,11 +11,12 @@ records! {
     fault "position-during-order" ["IACT-02"] "Sets the position of a vehicle that drives an order."
         because "Whether initPosition contradicts an order is disputed, so that the ruling makes it a warning."
         => beside(|_, _| true);
-    fault "r1-charging-during-order" ["IACT-02"] "It sends startCharging and stopCharging as instant actions while the vehicle drives an order."
+    fault "charging-during-order" ["IACT-02"] "It sends startCharging and stopCharging as instant actions while the vehicle drives an order."
         => beside(|_, kind| kind.ends_with("Charging"));
-    fault "r1-position-while-paused" ["IACT-02"] "It sends initPosition during an order when the vehicle is paused."
+    fault "position-while-paused" ["IACT-02"] "It sends initPosition during an order when the vehicle is paused."
+        because "Whether initPosition contradicts an order that is paused is disputed, so that IACT-02 makes it a warning."
         => beside(|vehicle, kind| kind == "initPosition" && vehicle.is_paused());
-    fault "r2-position-set-when-lost" ["IACT-02"] "It sends initPosition on its own during a running order when the vehicle reports that its position is not initialized."
+    fault "position-set-when-lost" ["IACT-02"] "It sends initPosition on its own during a running order when the vehicle reports that its position is not initialized."
         => keep::<bool>().happens(|before, site, vehicle, event| if let Event::State(_) = event {
             let position = vehicle.state.as_ref().and_then(|state| state.agv_position.clone());
             let lost = position.filter(|position| !position.position_initialized);
@@ -26,7 +27,7 @@ records! {
             }
             *before = lost.is_some();
         });
-    fault "r3-charging-on-low-battery" ["IACT-02"] "It sends startCharging as an instant action to a vehicle that drives an order when its battery runs low."
+    fault "charging-on-low-battery" ["IACT-02"] "It sends startCharging as an instant action to a vehicle that drives an order when its battery runs low."
         => keep::<bool>().happens(|charged, site, vehicle, event| if let Event::Looked = event {
             let charges = vehicle.state.as_ref().is_some_and(|state| state.battery_state.charging);
             let low = has_low_battery(site, vehicle) && !charges;
@@ -36,16 +37,17 @@ records! {
             }
             *charged &= low;
         });
-    fault "r3-pause-waits-for-standstill" ["TOPIC-13"] "It holds a requested startPause back until the vehicle stands still."
+    fault "pause-waits-for-standstill" ["TOPIC-13"] "It holds a requested startPause back until the vehicle stands still."
+        because "TOPIC-13 says where a startPause is sent, and names no time by which it has to be."
         => plain().allows(|(), _, vehicle, what, usual| {
             let drives = vehicle.state.as_ref().is_some_and(|state| state.driving);
             usual && !(drives && matches!(what, Permission::Tell("startPause")))
         });
     fault "instant-actions-limit-ignored" ["FACT-12"] "Sends more instant actions at once than the vehicle takes."
         => plain().measures(|(), _, _, what, usual| if let Measure::Instants = what { usize::MAX } else { usual });
-    liberty "r1-instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own."
+    liberty "instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own."
         => plain().measures(|(), _, _, what, usual| if let Measure::Instants = what { 1 } else { usual });
-    liberty "r5-pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message."
+    liberty "pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message."
         => plain().asked(|(), site, vehicle, command, _| {
             if command == "pause" {
                 site.instant(vehicle, "startPause", &Value::Null);
@@ -53,7 +55,7 @@ records! {
             }
             command != "pause"
         });
-    liberty "r4-pause-sent-twice" ["ORD-MSG-17", "IACT-01"] "It sends startPause a second time, with its own actionId, while the first is not reported finished."
+    liberty "pause-sent-twice" ["ORD-MSG-17", "IACT-01"] "It sends startPause a second time, with its own actionId, while the first is not reported finished."
         => plain().asked(|(), site, vehicle, command, _| {
             if command == "pause" {
                 site.instant(vehicle, "startPause", &Value::Null);

@@ -11,7 +11,7 @@ records! {
             Measure::Shown(asked) => asked,
             _ => usual,
         });
-    fault "r1-array-limit-ignored-in-updates" ["FACT-12"] "It keeps the limits of nodes and edges in new orders, but not in order updates."
+    fault "array-limit-ignored-in-updates" ["FACT-12"] "It keeps the limits of nodes and edges in new orders, but not in order updates."
         => plain().measures(|(), _, _, what, usual| match what {
             Measure::Nodes(true) => usize::MAX,
             _ => usual,
@@ -22,7 +22,8 @@ records! {
             Measure::NodeStates => usize::MAX,
             _ => usual,
         });
-    fault "r2-horizon-beyond-array-limit" ["FACT-12"] "It counts only the base, and not the horizon, towards the array limits of a vehicle."
+    fault "horizon-beyond-array-limit" ["FACT-12"] "It counts only the base, and not the horizon, towards the array limits of a vehicle."
+        because "Whether the horizon counts towards a limit of the state is a matter of reading FACT-12."
         => plain().measures(|(), _, _, what, usual| match what {
             Measure::Shown(asked) => asked,
             _ => usual,
@@ -32,7 +33,7 @@ records! {
             Measure::Message(_) => usize::MAX,
             _ => usual,
         });
-    fault "r3-message-limit-ignored-in-updates" ["FACT-12"] "It keeps to the msgLen of the vehicle in new orders, but not in updates."
+    fault "message-limit-ignored-in-updates" ["FACT-12"] "It keeps to the msgLen of the vehicle in new orders, but not in updates."
         => plain().measures(|(), _, _, what, usual| match what {
             Measure::Message(true) => usize::MAX,
             _ => usual,
@@ -40,7 +41,7 @@ records! {
     fault "id-limit-ignored" ["FACT-12"] "Sends longer ids than the vehicle takes."
         => plain().id(|(), site, _, what, id| *id = format!("{what}-{}-{:064}", site.session, site.ids))
             .measures(|(), _, _, what, usual| if let Measure::IdLength = what { usize::MAX } else { usual });
-    fault "r2-action-id-limit-ignored" ["FACT-12"] "It heeds the longest id a vehicle takes for orders, nodes and edges, but not for actionIds."
+    fault "action-id-limit-ignored" ["FACT-12"] "It heeds the longest id a vehicle takes for orders, nodes and edges, but not for actionIds."
         => plain().id(|(), site, _, what, id| {
             if what == "action" {
                 // Where the clock begins at 0 an id is short anyway.
@@ -48,7 +49,7 @@ records! {
                 *id = format!("{what}-{number:0>15}");
             }
         });
-    fault "r5-action-ids-cut-to-id-length" ["ORD-MSG-17", "FACT-12"]
+    fault "action-ids-cut-to-id-length" ["ORD-MSG-17", "FACT-12"]
         "It cuts action ids to the idLen of the factsheet from the end, so that several actions have the same id."
         => plain().id(|(), site, vehicle, what, id| {
             if what == "action" {
@@ -59,6 +60,6 @@ records! {
         });
     fault "numerical-ids-ignored" ["FACT-12"] "Sends ids with letters to a vehicle that takes digits only."
         => plain().allows(|(), _, _, what, usual| usual || matches!(what, Permission::Letters(_)));
-    fault "r6-numerical-ids-for-orders-only" ["FACT-12"] "It respects idNumericalOnly for orderId, nodeId and edgeId but not for actionId."
+    fault "numerical-ids-for-orders-only" ["FACT-12"] "It respects idNumericalOnly for orderId, nodeId and edgeId but not for actionId."
         => plain().allows(|(), _, _, what, usual| usual || matches!(what, Permission::Letters("action")));
 }

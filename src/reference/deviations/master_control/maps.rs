@@ -17,15 +17,16 @@ records! {
         => uses(|_, _, _| true);
     fault "map-enabled-blindly" ["MAP-09"] "Takes a map for enabled once it has sent enableMap."
         => uses(|vehicle, map_id, _| vehicle.enabling.contains_key(map_id));
-    fault "r3-map-on-board-is-enough" ["MAP-09"] "It takes a map for usable that is on board of the vehicle but DISABLED."
+    fault "map-on-board-is-enough" ["MAP-09"] "It takes a map for usable that is on board of the vehicle but DISABLED."
         => uses(|vehicle, map_id, _| on_board(vehicle).any(|map| map.map_id == map_id));
-    fault "r1-absent-map-used" ["MAP-09"] "It sends an order on a map the vehicle does not have at all."
+    fault "absent-map-used" ["MAP-09"] "It sends an order on a map the vehicle does not have at all."
         => uses(|vehicle, map_id, _| on_board(vehicle).all(|map| map.map_id != map_id));
-    fault "r1-map-not-checked-in-updates" ["MAP-09"] "An order update releases nodes on a map that is not enabled any more; only new orders are checked."
+    fault "map-not-checked-in-updates" ["MAP-09"] "An order update releases nodes on a map that is not enabled any more; only new orders are checked."
+        because "The map was enabled when the order began; that an update counts anew is a matter of reading MAP-09."
         => uses(|_, _, running| running.released > 0);
-    fault "r4-checks-the-first-map-only" ["MAP-09"] "It checks only the map of the first node before an order that leads over two maps."
+    fault "checks-the-first-map-only" ["MAP-09"] "It checks only the map of the first node before an order that leads over two maps."
         => uses(|_, map_id, running| running.stops.first().is_some_and(|first| first.map_id != map_id));
-    fault "r5-map-check-only-at-first-order" ["MAP-09"]
+    fault "map-check-only-at-first-order" ["MAP-09"]
         "It checks the maps of a vehicle before its first order only; if the map is disabled later, it still sends the next order."
         => keep::<bool>().happens(|begun, _, _, event| *begun |= matches!(event, Event::Begun))
             .allows(|begun, _, _, what, usual| usual || (*begun && matches!(what, Permission::UseMap(..))));
@@ -33,32 +34,33 @@ records! {
         => fleet::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::State(_) = event {
             enabled.extend(enabled_maps(vehicle));
         }).allows(remembered);
-    fault "r2-map-enabled-for-ever" ["MAP-09"] "It takes a map for enabled that a vehicle once reported as ENABLED, also after it reports it as DISABLED."
+    fault "map-enabled-for-ever" ["MAP-09"] "It takes a map for enabled that a vehicle once reported as ENABLED, also after it reports it as DISABLED."
         => keep::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::State(_) = event {
             enabled.extend(enabled_maps(vehicle));
         }).allows(remembered);
-    fault "r6-map-remembered-over-reconnect" ["MAP-09"] "It remembers a map as ENABLED over a reconnect of the vehicle and does not look at maps again."
+    fault "map-remembered-over-reconnect" ["MAP-09"] "It remembers a map as ENABLED over a reconnect of the vehicle and does not look at maps again."
         => keep::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::Online(Presence::Away) = event {
             enabled.extend(enabled_maps(vehicle));
         }).allows(remembered);
-    fault "r1-enable-map-taken-for-done" ["MAP-09"] "Once enableMap was reported FINISHED it sends orders on that map although the state shows it as disabled."
+    fault "enable-map-taken-for-done" ["MAP-09"] "Once enableMap was reported FINISHED it sends orders on that map although the state shows it as disabled."
         => keep::<BTreeSet<String>>().happens(|enabled, _, _, event| if let Event::Enabled(map_id, true) = event {
             enabled.insert((*map_id).to_owned());
         }).allows(remembered);
-    fault "r4-order-after-failed-enable-map" ["MAP-09"] "It sends the order although enableMap was reported FAILED."
+    fault "order-after-failed-enable-map" ["MAP-09"] "It sends the order although enableMap was reported FAILED."
         => keep::<BTreeSet<String>>().happens(|enabled, _, _, event| if let Event::Enabled(map_id, false) = event {
             enabled.insert((*map_id).to_owned());
         }).allows(remembered);
     fault "map-not-preloaded" ["MAP-10"] "Rolls a map out when an order needs it."
         because "It breaks a recommendation only."
         => plain().asked(|(), _, _, command, _| command != "download-map");
-    fault "r3-download-refused-during-order" ["MAP-10"] "It drops the roll-out of a map to a vehicle that drives an order."
+    fault "download-refused-during-order" ["MAP-10"] "It drops the roll-out of a map to a vehicle that drives an order."
         => plain().asked(|(), _, vehicle, command, _| command != "download-map" || vehicle.running.is_none());
-    fault "r1-enable-before-download" ["MAP-10"] "It sends enableMap for a map it rolls out before downloadMap."
+    fault "enable-before-download" ["MAP-10"] "It sends enableMap for a map it rolls out before downloadMap."
+        because "MAP-10 recommends that a map is on board before it is activated, and obliges nobody."
         => plain().happens(|(), site, vehicle, event| if let Event::RollOut(map, _) = event {
             site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version);
         });
-    liberty "r3-on-board-map-deleted-first" ["MAP-28"]
+    liberty "on-board-map-deleted-first" ["MAP-28"]
         "It deletes a disabled map that is on board already before it has it downloaded again, without waiting for a rejection."
         => plain().happens(|(), site, vehicle, event| if let Event::RollOut(map, done) = event {
             let same = |seen: &&MapSeen| seen.map_id == map.map_id && seen.map_version == map.map_version;
@@ -69,24 +71,26 @@ records! {
                 **done = true;
             }
         });
-    fault "r1-download-link-relative" ["MAP-16"] "mapDownloadLink is a path without protocol and host."
+    fault "download-link-relative" ["MAP-16"] "mapDownloadLink is a path without protocol and host."
+        because "MAP-16 asks for a link; what a link must hold so that the vehicle can follow it is not said."
         => made(|_, _, kind, a| if kind == "downloadMap" {
             link(a, |link| match link.split_once("://") {
                 Some((_, rest)) => rest.find('/').map_or(rest, |at| &rest[at..]).to_owned(),
                 None => link.to_owned(),
             });
         });
-    fault "r2-download-link-to-disk" ["MAP-16"] "It sends a path on its own disk as mapDownloadLink."
+    fault "download-link-to-disk" ["MAP-16"] "It sends a path on its own disk as mapDownloadLink."
+        because "MAP-16 asks for a link; whose disk it points to cannot be seen."
         => made(|_, _, kind, a| if kind == "downloadMap" {
             link(a, |link| format!("file:///var/maps/{}", link.rsplit('/').next().unwrap_or_default()));
         });
-    liberty "r2-map-hash-left-out" ["MAP-16", "ACT-31"] "It leaves the optional mapHash out of downloadMap."
+    liberty "map-hash-left-out" ["MAP-16", "ACT-31"] "It leaves the optional mapHash out of downloadMap."
         => made(|_, _, kind, a| if kind == "downloadMap" {
             a.keep("actionParameters", |parameter| !parameter.says("key", "mapHash"));
         });
     fault "download-repeated" ["MAP-28"] "Repeats a download that was refused as a duplicate without deleting the map."
         => on_duplicate(|site, vehicle, job| download_again(site, vehicle, job));
-    fault "r3-duplicate-kept-during-order" ["MAP-28"]
+    fault "duplicate-kept-during-order" ["MAP-28"]
         "It repeats a download that was rejected as a duplicate without deleting the map first if the vehicle drives an order."
         => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, false, next, done) = event {
             if job.stage == Stage::Download && vehicle.running.is_some() && is_duplicate(vehicle, job) {
@@ -94,15 +98,15 @@ records! {
                 **done = true;
             }
         });
-    fault "r1-download-before-delete" ["MAP-28"] "After a download was rejected as a duplicate it repeats the download first and deletes the map after it."
+    fault "download-before-delete" ["MAP-28"] "After a download was rejected as a duplicate it repeats the download first and deletes the map after it."
         => on_duplicate(|site, vehicle, job| {
             let next = download_again(site, vehicle, job);
             site.map_action(vehicle, "deleteMap", &job.map.map_id, &job.map.map_version);
             next
         });
-    liberty "r3-duplicate-left-alone" ["MAP-28"] "It gives a download up that was rejected as a duplicate."
+    liberty "duplicate-left-alone" ["MAP-28"] "It gives a download up that was rejected as a duplicate."
         => on_duplicate(|_, _, _| None);
-    fault "r1-duplicate-other-version-deleted" ["MAP-28"]
+    fault "duplicate-other-version-deleted" ["MAP-28"]
         "After a download was rejected as a duplicate it deletes another version of that map and then repeats the download."
         => on_duplicate(|site, vehicle, job| {
             let map = job.map.clone();
@@ -111,26 +115,26 @@ records! {
             job.stage = Stage::Delete;
             site.map_action(vehicle, "deleteMap", &map.map_id, &version)
         });
-    fault "r5-duplicate-deletes-enabled-version" ["MAP-28"]
+    fault "duplicate-deletes-enabled-version" ["MAP-28"]
         "It deletes the enabled version of the map after a duplicate rejection instead of the version that it wants to download again."
         => on_duplicate(|site, vehicle, job| {
             let version = enabled_version(vehicle, &job.map.map_id).unwrap_or_else(|| job.map.map_version.clone());
             job.stage = Stage::Delete;
             site.map_action(vehicle, "deleteMap", &job.map.map_id, &version)
         });
-    fault "r4-download-after-failed-delete" ["MAP-28"] "It repeats a rejected download although the deletion of the duplicate was reported FAILED."
+    fault "download-after-failed-delete" ["MAP-28"] "It repeats a rejected download although the deletion of the duplicate was reported FAILED."
         => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, false, next, done) = event && job.stage == Stage::Delete {
             **next = download_again(site, vehicle, job);
             **done = true;
         });
-    fault "r1-repeated-download-without-link" ["MAP-16", "ACT-31", "FACT-15"] "The downloadMap that is repeated after a duplicate was deleted has no mapDownloadLink."
+    fault "repeated-download-without-link" ["MAP-16", "ACT-31", "FACT-15"] "The downloadMap that is repeated after a duplicate was deleted has no mapDownloadLink."
         => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, true, next, done) = event && job.stage == Stage::Delete {
             **next = download_again(site, vehicle, job);
             **done = true;
             let again = vehicle.instants.back_mut().and_then(|instant| instant.action.as_object_mut());
             again.into_iter().for_each(|again| again.keep("actionParameters", |parameter| !parameter.says("key", "mapDownloadLink")));
         });
-    fault "r6-delete-map-under-running-order" ["IACT-02"] "It sends deleteMap for the old version of a map whilst the vehicle still drives an order on it."
+    fault "delete-map-under-running-order" ["IACT-02"] "It sends deleteMap for the old version of a map whilst the vehicle still drives an order on it."
         => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, true, _, _) = event && job.stage != Stage::Delete {
             let map = job.map.clone();
             let version = enabled_version(vehicle, &map.map_id).filter(|version| *version != map.map_version);
@@ -139,7 +143,7 @@ records! {
                 site.map_action(vehicle, "deleteMap", &map.map_id, &version);
             }
         });
-    liberty "r2-enables-after-download" ["MAP-09", "MAP-10"] "It enables a map of which no version is enabled as soon as its download has ended, while no order runs."
+    liberty "enables-after-download" ["MAP-09", "MAP-10"] "It enables a map of which no version is enabled as soon as its download has ended, while no order runs."
         => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, true, _, _) = event && job.stage != Stage::Delete {
             let map = job.map.clone();
             let enabled = vehicle.state.as_ref().is_none_or(|state| state.map_enabled(&map.map_id));
@@ -148,7 +152,7 @@ records! {
                 vehicle.enabling.insert(map.map_id, id);
             }
         });
-    liberty "r1-preloads-maps" ["MAP-10", "MAP-16"] "It sends downloadMap unasked for each map of the site that the vehicle does not have."
+    liberty "preloads-maps" ["MAP-10", "MAP-16"] "It sends downloadMap unasked for each map of the site that the vehicle does not have."
         => plain().happens(|(), site, vehicle, event| if let Event::Looked = event && site.commandable(vehicle) {
             for map in site.config.maps.clone() {
                 let maps = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
@@ -158,7 +162,7 @@ records! {
                 }
             }
         });
-    liberty "r3-enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
+    liberty "enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
         => plain().happens(|(), site, vehicle, event| if let Event::Begins(running) = event {
             let map_id = running.stops[0].map_id.clone();
             if let Some(version) = enabled_version(vehicle, &map_id) {
@@ -170,7 +174,7 @@ records! {
         => plain().happens(|(), _, vehicle, event| if let Event::Placing(given, done) = event {
             **done = given["mapId"] != reported(vehicle);
         });
-    fault "r3-new-map-only-enabled" ["MAP-27"] "It only enables a new map, and sends no initPosition, when a vehicle is to be set to a position on it."
+    fault "new-map-only-enabled" ["MAP-27"] "It only enables a new map, and sends no initPosition, when a vehicle is to be set to a position on it."
         => plain().happens(|(), site, vehicle, event| if let Event::Placing(given, done) = event {
             let (map_id, known) = (given["mapId"].as_str().unwrap_or_default().to_owned(), reported(vehicle));
             if map_id != known && !known.is_empty() {
@@ -180,13 +184,13 @@ records! {
                 **done = true;
             }
         });
-    fault "r1-init-position-on-old-map" ["MAP-27"] "initPosition names the map the vehicle reports already, not the new one that was asked for."
+    fault "init-position-on-old-map" ["MAP-27"] "initPosition names the map the vehicle reports already, not the new one that was asked for."
         => plain().happens(|(), _, vehicle, event| if let Event::Placing(given, _) = event && !reported(vehicle).is_empty() {
             given["mapId"] = json!(reported(vehicle));
         });
-    fault "r1-init-position-in-degrees" ["MAP-02"] "theta of initPosition is in degrees."
+    fault "init-position-in-degrees" ["MAP-02"] "theta of initPosition is in degrees."
         => places(|given| scale(given, "theta", 180.0 / PI));
-    fault "r2-init-theta-clockwise" ["MAP-01"] "It counts theta of initPosition clockwise."
+    fault "init-theta-clockwise" ["MAP-01"] "It counts theta of initPosition clockwise."
         => places(|given| scale(given, "theta", -1.0));
 }
 

@@ -89,11 +89,6 @@ fn find(name: &str) -> Option<&'static Record<dyn Deviation>> {
     records().find(|record| record.name == name)
 }
 
-/// Written by somebody who has not seen the suites; they need not be found yet.
-fn is_blind(name: &str) -> bool {
-    name.as_bytes().first() == Some(&b'r') && name.as_bytes().get(2) == Some(&b'-')
-}
-
 fn fault(record: &Record<dyn Deviation>) -> Fault {
     Fault {
         name: record.name,
@@ -104,25 +99,19 @@ fn fault(record: &Record<dyn Deviation>) -> Fault {
 
 /// Its faults and lapses.
 pub static FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| {
-    let moved = records().filter(|record| record.is_fault() && !is_blind(record.name));
-    moved.map(fault).collect()
-});
-
-/// Its faults of blind rounds, which the suites need not find yet.
-pub static BLIND_FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| {
-    let moved = records().filter(|record| record.is_fault() && is_blind(record.name));
-    moved.map(fault).collect()
+    let faults = records().filter(|record| record.is_fault());
+    faults.map(fault).collect()
 });
 
 /// The liberties it can take.
 pub static TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| {
-    let moved = records().filter(|record| record.is_liberty() && !is_blind(record.name));
-    let moved = moved.map(|record| Tolerance {
+    let liberties = records().filter(|record| record.is_liberty());
+    let liberties = liberties.map(|record| Tolerance {
         name: record.name,
         under: record.requirements,
         does: record.does,
     });
-    moved.collect()
+    liberties.collect()
 });
 
 /// Why a fault ends in less than a failure.

@@ -29,19 +29,20 @@ records! {
                 *id = format!("Order {}-{}", site.session, site.ids);
             }
         });
-    fault "r6-order-id-with-blank-and-slash" ["JSON-04"] "It forms the orderId with a blank and a slash, such as \"Transport 12/1\"."
+    fault "order-id-with-blank-and-slash" ["JSON-04"] "It forms the orderId with a blank and a slash, such as \"Transport 12/1\"."
+        because "JSON-04, which letters an identifier has, is a recommendation; the vehicle takes the orderId as it is."
         => plain().id(|(), site, _, what, id| {
             if what == "order" {
                 *id = format!("Transport {}/{}", site.session, site.ids);
             }
         });
-    fault "r3-order-id-of-the-minute" ["ORD-MSG-02"] "It makes the orderId of the current minute, so that two orders begun within one minute share it."
+    fault "order-id-of-the-minute" ["ORD-MSG-02"] "It makes the orderId of the current minute, so that two orders begun within one minute share it."
         => plain().id(|(), site, _, what, id| {
             if what == "order" {
                 *id = site.now.utc.as_second().div_euclid(60).to_string();
             }
         });
-    fault "r4-order-ids-from-the-start-after-reconnect" ["ORD-MSG-02"]
+    fault "order-ids-from-the-start-after-reconnect" ["ORD-MSG-02"]
         "It counts its order numbers from the start after its own connection to the broker was lost, so that an orderId returns for another order."
         => fleet::<u64>().id(|count, site, vehicle, what, id| {
             if what == "order" {
@@ -53,31 +54,31 @@ records! {
                 *count = 0;
             }
         });
-    liberty "r2-plain-number-ids" ["ORD-MSG-02", "ORD-MSG-17", "JSON-04"] "It makes orderIds and actionIds of digits only."
+    liberty "plain-number-ids" ["ORD-MSG-02", "ORD-MSG-17", "JSON-04"] "It makes orderIds and actionIds of digits only."
         => plain().id(|(), site, vehicle, what, id| {
             *id = site.fitting(vehicle, what, format!("{}{:05}", site.session, site.ids), site.ids);
         });
-    liberty "r1-uuid-ids" ["ORD-MSG-17", "JSON-04"] "Ids of orders, actions and temporary elements look like UUIDs where the vehicle allows their length."
+    liberty "uuid-ids" ["ORD-MSG-17", "JSON-04"] "Ids of orders, actions and temporary elements look like UUIDs where the vehicle allows their length."
         => plain().id(|(), site, vehicle, what, id| {
             let kind = ["order", "action", "place"].iter().position(|known| *known == what).map_or(4, |at| at + 1);
             let (high, low) = (site.session >> 16 & 0xffff_ffff, site.session & 0xffff);
             let full = format!("{high:08x}-{low:04x}-4a{kind:02x}-9c3e-{:012x}", site.ids);
             *id = site.fitting(vehicle, what, full, site.ids);
         });
-    liberty "r1-ids-with-punctuation" ["JSON-04"] "Ids contain colon, underscore, dot and hyphen."
+    liberty "ids-with-punctuation" ["JSON-04"] "Ids contain colon, underscore, dot and hyphen."
         => plain().id(|(), site, vehicle, what, id| {
             let full = format!("{what}:{}{:05}_a.-", site.session, site.ids);
             *id = site.fitting(vehicle, what, full, site.ids);
         });
-    fault "r3-order-id-missing-in-updates" ["ORD-MSG-01", "ORD-UPD-04"] "It leaves the orderId out of order updates."
+    fault "order-id-missing-in-updates" ["ORD-MSG-01", "ORD-UPD-04"] "It leaves the orderId out of order updates."
         => update(|m| m.unset("orderId"));
     fault "zone-set-empty" ["ORD-MSG-03", "OPT-03"] "Sends an empty zoneSetId."
         => order(|m| m.set("zoneSetId", ""));
-    fault "r4-empty-zone-set" ["ORD-MSG-03"] "It sends zoneSetId as an empty string in order updates, though no zones are used."
+    fault "empty-zone-set" ["ORD-MSG-03"] "It sends zoneSetId as an empty string in order updates, though no zones are used."
         => update(|m| m.set("zoneSetId", ""));
-    fault "r1-zone-set-null-in-updates" ["ORD-MSG-03", "JSON-06", "JSON-10"] "Order updates carry zoneSetId with the value null."
+    fault "zone-set-null-in-updates" ["ORD-MSG-03", "JSON-06", "JSON-10"] "Order updates carry zoneSetId with the value null."
         => update(|m| m.set("zoneSetId", Value::Null));
-    fault "r3-zone-set-named-none" ["ORD-MSG-03", "OPT-03"] "It sends the text none as zoneSetId where no zones are used."
+    fault "zone-set-named-none" ["ORD-MSG-03", "OPT-03"] "It sends the text none as zoneSetId where no zones are used."
         => order(|m| {
             m.entry("zoneSetId").or_insert(json!("none"));
         });
@@ -89,9 +90,9 @@ records! {
         });
     fault "map-id-missing" ["ORD-MSG-05", "JSON-10"] "Leaves mapId out of nodePosition."
         => position(|p| p.unset("mapId"));
-    fault "r1-zero-coordinates-omitted" ["ORD-MSG-05", "JSON-10"] "x and y of a node position are left out when they are zero."
+    fault "zero-coordinates-omitted" ["ORD-MSG-05", "JSON-10"] "x and y of a node position are left out when they are zero."
         => position(|p| p.retain(|key, value| !matches!(key.as_str(), "x" | "y") || value.as_f64() != Some(0.0)));
-    fault "r1-horizon-without-actions" ["ORD-MSG-06", "ORD-MSG-05", "ORD-MSG-18", "JSON-10"] "Nodes and edges of the horizon have no actions array."
+    fault "horizon-without-actions" ["ORD-MSG-06", "ORD-MSG-05", "ORD-MSG-18", "JSON-10"] "Nodes and edges of the horizon have no actions array."
         => plain().sends(|(), _, _, out| {
             for list in ["nodes", "edges"] {
                 out.message.each(list, |element| {
@@ -102,7 +103,7 @@ records! {
             }
             true
         });
-    fault "r4-no-action-list-in-the-horizon" ["ORD-MSG-05", "ORD-MSG-06", "JSON-10"] "It leaves the actions array out on horizon nodes that have no action."
+    fault "no-action-list-in-the-horizon" ["ORD-MSG-05", "ORD-MSG-06", "JSON-10"] "It leaves the actions array out on horizon nodes that have no action."
         => node(|n| {
             if n.says("released", false) && n.says("actions", json!([])) {
                 n.unset("actions");
@@ -110,19 +111,19 @@ records! {
         });
     fault "node-position-missing" ["OPT-05", "ORD-MSG-08"] "Leaves nodePosition out."
         => node(|n| n.unset("nodePosition"));
-    fault "r1-horizon-without-position" ["ORD-MSG-08", "OPT-05"] "Nodes of the horizon have no nodePosition."
+    fault "horizon-without-position" ["ORD-MSG-08", "OPT-05"] "Nodes of the horizon have no nodePosition."
         => node(|n| {
             if n.says("released", false) {
                 n.unset("nodePosition");
             }
         });
-    fault "r2-positions-only-in-first-message" ["ORD-MSG-08"] "It leaves nodePosition out of the nodes that come new with an update."
+    fault "positions-only-in-first-message" ["ORD-MSG-08"] "It leaves nodePosition out of the nodes that come new with an update."
         => update(|m| m.list("nodes").iter_mut().skip(1).for_each(|node| {
             if let Some(node) = node.as_object_mut() {
                 node.unset("nodePosition");
             }
         }));
-    fault "r3-position-missing-at-start" ["ORD-MSG-08"] "It leaves the nodePosition of the first node of a new order out, since the vehicle stands there."
+    fault "position-missing-at-start" ["ORD-MSG-08"] "It leaves the nodePosition of the first node of a new order out, since the vehicle stands there."
         => plain().words(|(), site, _, worded, m| {
             let starts = !worded.is_update() && worded.window.end > 1;
             worded.nodes(m, |index, stop, node| {
@@ -145,26 +146,26 @@ records! {
             let theta = number(p, "theta").unwrap_or(FRAC_PI_2);
             p.set("theta", theta.to_degrees());
         });
-    fault "r1-theta-up-to-two-pi" ["ORD-MSG-09", "MAP-02"] "Node orientations are given between 0 and two pi, such as 4.71."
+    fault "theta-up-to-two-pi" ["ORD-MSG-09", "MAP-02"] "Node orientations are given between 0 and two pi, such as 4.71."
         => plain().field(|(), _, field, value| {
             if field.name.ends_with(".theta") && taken(field) {
                 let theta = field.layout.as_ref().and_then(Value::as_f64).unwrap_or(-FRAC_PI_2);
                 *value = Some(json!(theta.rem_euclid(TAU)));
             }
         });
-    liberty "r1-theta-at-the-bound" ["ORD-MSG-09", "MAP-02"] "Node orientations, where the vehicle supports them, are exactly minus pi."
+    liberty "theta-at-the-bound" ["ORD-MSG-09", "MAP-02"] "Node orientations, where the vehicle supports them, are exactly minus pi."
         => plain().field(|(), _, field, value| {
             if field.name.ends_with(".theta") && taken(field) {
                 *value = Some(json!(-PI));
             }
         });
-    liberty "r4-no-theta-on-nodes" ["ORD-MSG-09", "MAP-02"] "It sends no theta and leaves the orientation to the vehicle."
+    liberty "no-theta-on-nodes" ["ORD-MSG-09", "MAP-02"] "It sends no theta and leaves the orientation to the vehicle."
         => plain().field(|(), _, field, value| {
             if field.name.ends_with(".theta") && field.support != Some("REQUIRED") {
                 *value = None;
             }
         });
-    fault "r6-theta-not-normalised-on-reverse" ["ORD-MSG-09", "MAP-02"]
+    fault "theta-not-normalised-on-reverse" ["ORD-MSG-09", "MAP-02"]
         "It adds pi to the theta of a node that is approached against the drawn direction and does not bring it back below pi."
         => plain().words(|(), _, _, worded, m| worded.nodes(m, |index, stop, node| {
             // The layout is drawn from the lesser id to the greater.
@@ -177,7 +178,7 @@ records! {
         => position(|p| {
             p.entry("allowedDeviationXY").or_insert(json!(-1.0));
         });
-    fault "r4-negative-deviation-for-no-limit" ["ORD-MSG-09"] "It sends allowedDeviationXY -1 on nodes through which the vehicle only passes."
+    fault "negative-deviation-for-no-limit" ["ORD-MSG-09"] "It sends allowedDeviationXY -1 on nodes through which the vehicle only passes."
         => plain().words(|(), _, vehicle, worded, m| {
             let stops = &worded.running.stops;
             let support = vehicle.factsheet.as_ref().map(|sheet| sheet.support("order.nodes.nodePosition.allowedDeviationXY"));
@@ -188,27 +189,27 @@ records! {
                 }
             });
         });
-    fault "r1-deviation-theta-full-circle" ["ORD-MSG-09"] "Where the orientation does not matter, allowedDeviationTheta is two pi."
+    fault "deviation-theta-full-circle" ["ORD-MSG-09"] "Where the orientation does not matter, allowedDeviationTheta is two pi."
         => plain().field(|(), _, field, value| {
             if field.name.ends_with("allowedDeviationTheta") && taken(field) {
                 *value = Some(json!(TAU));
             }
         });
-    liberty "r2-every-direction-allowed" ["ORD-MSG-09", "OPT-03"]
+    liberty "every-direction-allowed" ["ORD-MSG-09", "OPT-03"]
         "It sends an allowedDeviationTheta of pi for nodes where any direction will do, if the vehicle supports it."
         => plain().field(|(), _, field, value| {
             if field.name.ends_with("allowedDeviationTheta") && taken(field) {
                 value.get_or_insert(json!(PI));
             }
         });
-    liberty "r2-zero-deviations" ["ORD-MSG-09", "OPT-03"]
+    liberty "zero-deviations" ["ORD-MSG-09", "OPT-03"]
         "It sends an allowedDeviationXY of 0 for nodes behind the first that have none in the layout, if the vehicle supports it."
         => plain().field(|(), _, field, value| {
             if field.name.ends_with("allowedDeviationXY") && taken(field) && field.index > 0 && field.layout.is_none() {
                 *value = Some(json!(0.0));
             }
         });
-    fault "r2-deviation-theta-in-degrees" ["ORD-MSG-09", "MAP-02"] "It gives allowedDeviationTheta in degrees."
+    fault "deviation-theta-in-degrees" ["ORD-MSG-09", "MAP-02"] "It gives allowedDeviationTheta in degrees."
         => position(|p| p.change("allowedDeviationTheta", |turn| {
             *turn = json!(turn.as_f64().unwrap_or_default().to_degrees());
         }));
@@ -219,13 +220,13 @@ records! {
             scale(p, "x", 1000.0);
             scale(p, "y", 1000.0);
         });
-    fault "r3-axes-swapped" ["MAP-01"] "It exchanges x and y in every nodePosition."
+    fault "axes-swapped" ["MAP-01"] "It exchanges x and y in every nodePosition."
         => position(|p| {
             let (x, y) = (p["x"].clone(), p["y"].clone());
             p.set("x", y);
             p.set("y", x);
         });
-    fault "r3-station-moved-when-loaded" ["ORD-MSG-07"] "It moves the position of a node by the length of the fork when a load is dropped there, under the same nodeId."
+    fault "station-moved-when-loaded" ["ORD-MSG-07"] "It moves the position of a node by the length of the fork when a load is dropped there, under the same nodeId."
         => node(|n| {
             if n.list("actions").iter().any(|action| action["actionType"] == "drop") {
                 n.part("nodePosition", |place| shift(place, "x", 0.4));
@@ -236,7 +237,7 @@ records! {
             e.unset("startNodeId");
             e.unset("endNodeId");
         });
-    fault "r2-end-node-missing-in-horizon" ["ORD-MSG-18"] "It leaves endNodeId out of the edges of the horizon."
+    fault "end-node-missing-in-horizon" ["ORD-MSG-18"] "It leaves endNodeId out of the edges of the horizon."
         => edge(|e| {
             if e.says("released", false) {
                 e.unset("endNodeId");
@@ -244,9 +245,10 @@ records! {
         });
     fault "edge-id-missing" ["ORD-MSG-18"] "Leaves edgeId out."
         => edge(|e| e.unset("edgeId"));
-    fault "r1-edge-id-with-arrow" ["JSON-04"] "Edge ids contain an arrow with a greater-than sign."
+    fault "edge-id-with-arrow" ["JSON-04"] "Edge ids contain an arrow with a greater-than sign."
+        because "JSON-04, which letters an identifier has, is a recommendation; an arrow in an edgeId is warned of."
         => edge(|e| e.set("edgeId", e.text("edgeId").replacen('-', "->", 1)));
-    liberty "r3-edge-ids-named-otherwise" ["ORD-MSG-18", "JSON-04"] "It names edges way, start node and end node with colons instead of by the ids of the layout."
+    liberty "edge-ids-named-otherwise" ["ORD-MSG-18", "JSON-04"] "It names edges way, start node and end node with colons instead of by the ids of the layout."
         => plain().words(|(), site, vehicle, worded, m| {
             let free = vehicle.factsheet.as_ref().is_none_or(|sheet| sheet.id_length.is_none() && !sheet.ids_numerical);
             worded.edges(m, |_, leg, edge| {
@@ -257,7 +259,7 @@ records! {
         });
     fault "edge-ends-swapped" ["ORD-MSG-19"] "Swaps the start node and end node of edges."
         => edge(swap_ends);
-    fault "r1-reverse-edges-misdirected" ["ORD-MSG-19"] "An edge that leads to a node with a lesser id has startNodeId and endNodeId exchanged."
+    fault "reverse-edges-misdirected" ["ORD-MSG-19"] "An edge that leads to a node with a lesser id has startNodeId and endNodeId exchanged."
         => edge(|e| {
             if e.text("startNodeId") > e.text("endNodeId") {
                 swap_ends(e);
@@ -272,12 +274,12 @@ records! {
                 edge.set("endNodeId", end.clone());
             });
         });
-    fault "r3-edge-ends-as-sequence-ids" ["ORD-MSG-18", "ORD-MSG-19", "JSON-06"] "It writes the sequenceIds of the nodes into startNodeId and endNodeId of edges."
+    fault "edge-ends-as-sequence-ids" ["ORD-MSG-18", "ORD-MSG-19", "JSON-06"] "It writes the sequenceIds of the nodes into startNodeId and endNodeId of edges."
         => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
             edge.set("startNodeId", 2 * index);
             edge.set("endNodeId", 2 * index + 2);
         }));
-    fault "r3-temporary-edge-from-last-node" ["ORD-MSG-19"] "It writes the last node of the vehicle as startNodeId of the edge that begins at a temporary node."
+    fault "temporary-edge-from-last-node" ["ORD-MSG-19"] "It writes the last node of the vehicle as startNodeId of the edge that begins at a temporary node."
         => plain().words(|(), site, vehicle, worded, m| {
             let temporary = worded.running.stops.first().is_some_and(|start| site.config.node(&start.id).is_none());
             let last = vehicle.state.as_ref().map(|state| state.last_node_id.as_str()).unwrap_or_default();
@@ -287,7 +289,7 @@ records! {
                 }
             });
         });
-    fault "r2-update-edge-starts-at-vehicle" ["ORD-MSG-19"] "It names the node the vehicle has passed last as startNodeId of the first edge of an update."
+    fault "update-edge-starts-at-vehicle" ["ORD-MSG-19"] "It names the node the vehicle has passed last as startNodeId of the first edge of an update."
         => plain().words(|(), _, vehicle, worded, m| {
             let last = vehicle.state.as_ref().map(|state| state.last_node_id.as_str()).unwrap_or_default();
             worded.edges(m, |index, _, edge| {
@@ -302,11 +304,11 @@ records! {
                 edges.as_array_mut().and_then(Vec::pop);
             });
         });
-    fault "r2-dangling-edge" ["ORD-02", "ORD-MSG-19"] "It puts the edge that leads on from the last node into the message when the way goes on behind it."
+    fault "dangling-edge" ["ORD-02", "ORD-MSG-19"] "It puts the edge that leads on from the last node into the message when the way goes on behind it."
         => dangling(|_| true);
-    fault "r4-cut-leaves-a-dangling-edge" ["ORD-02"] "It cuts an order that is too long for the vehicle behind the edge, so that the message has as many edges as nodes."
+    fault "cut-leaves-a-dangling-edge" ["ORD-02"] "It cuts an order that is too long for the vehicle behind the edge, so that the message has as many edges as nodes."
         => dangling(|worded| worded.cut);
-    fault "r1-self-edge" ["ORD-02", "ORD-MSG-06"] "An order of one node has an edge from that node to itself."
+    fault "self-edge" ["ORD-02", "ORD-MSG-06"] "An order of one node has an edge from that node to itself."
         => plain().words(|(), _, _, worded, m| {
             if let [stop] = worded.running.stops.as_slice() && !worded.is_update() {
                 let id = &stop.id;
@@ -327,19 +329,19 @@ records! {
                 node["released"] = json!(true);
             }
         });
-    fault "r1-stations-always-released" ["ORD-09"] "A node with actions is released even if it lies in the horizon."
+    fault "stations-always-released" ["ORD-09"] "A node with actions is released even if it lies in the horizon."
         => node(|n| {
             if !n.list("actions").is_empty() {
                 n.set("released", true);
             }
         });
-    fault "r4-releases-the-reserved-station" ["ORD-09"] "It marks the destination node of the horizon as released, because the station is reserved for the vehicle."
+    fault "releases-the-reserved-station" ["ORD-09"] "It marks the destination node of the horizon as released, because the station is reserved for the vehicle."
         => plain().words(|(), _, _, worded, m| worded.nodes(m, |index, _, node| {
             if index + 1 == worded.running.stops.len() {
                 node.set("released", true);
             }
         }));
-    fault "r2-loop-released-by-id" ["ORD-09"] "It releases a node in the horizon when the way has been released over a node of the same nodeId."
+    fault "loop-released-by-id" ["ORD-09"] "It releases a node in the horizon when the way has been released over a node of the same nodeId."
         => plain().words(|(), _, _, _, m| {
             let released: Vec<Value> = m.list("nodes").iter().filter(|node| node["released"] == true).map(|node| node["nodeId"].clone()).collect();
             m.each("nodes", |node| {
@@ -348,37 +350,37 @@ records! {
                 }
             });
         });
-    fault "r1-edges-released-after-reroute" ["ORD-08", "ORD-09"] "After a change of destination all edges of the order updates are released, also those of the horizon."
+    fault "edges-released-after-reroute" ["ORD-08", "ORD-09"] "After a change of destination all edges of the order updates are released, also those of the horizon."
         => keep::<bool>().happens(rerouted).words(|rerouted, _, _, _, m| m.each("edges", |edge| {
             if *rerouted {
                 edge.set("released", true);
             }
         }));
-    liberty "r3-slow-last-edge" ["OPT-03"] "It limits the speed on the last edge of a way more than it does on the same edge elsewhere."
+    liberty "slow-last-edge" ["OPT-03"] "It limits the speed on the last edge of a way more than it does on the same edge elsewhere."
         => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
             if index + 2 == worded.running.stops.len() && let Some(speed) = number(edge, "maxSpeed") {
                 edge.set("maxSpeed", speed.min(0.4));
             }
         }));
-    liberty "r3-horizon-slower" ["ORD-UPD-03"] "It sends a lower maxSpeed for edges in the horizon than when they are released."
+    liberty "horizon-slower" ["ORD-UPD-03"] "It sends a lower maxSpeed for edges in the horizon than when they are released."
         => plain().words(|(), _, _, _, m| m.each("edges", |edge| {
             if edge.says("released", false) {
                 scale(edge, "maxSpeed", 0.5);
             }
         }));
-    liberty "r2-slower-when-loaded" ["ORD-UPD-03", "OPT-03"] "It sends half the maxSpeed for edges while the vehicle carries a load."
+    liberty "slower-when-loaded" ["ORD-UPD-03", "OPT-03"] "It sends half the maxSpeed for edges while the vehicle carries a load."
         => plain().words(|(), _, vehicle, _, m| m.each("edges", |edge| {
             if is_loaded(vehicle) {
                 scale(edge, "maxSpeed", 0.5);
             }
         }));
-    fault "r2-low-score-slows-down" ["INFO-03"] "It sends a third of the maxSpeed to a vehicle with a low localizationScore."
+    fault "low-score-slows-down" ["INFO-03"] "It sends a third of the maxSpeed to a vehicle with a low localizationScore."
         => plain().words(|(), _, vehicle, _, m| m.each("edges", |edge| {
             if is_unsure(vehicle) {
                 scale(edge, "maxSpeed", 1.0 / 3.0);
             }
         }));
-    liberty "r3-horizon-actions-open" ["ORD-UPD-03", "ORD-MSG-06"]
+    liberty "horizon-actions-open" ["ORD-UPD-03", "ORD-MSG-06"]
         "It sends the actions of nodes and edges only when they are released; in the horizon the lists are empty."
         => plain().words(|(), _, _, _, m| {
             for list in ["nodes", "edges"] {

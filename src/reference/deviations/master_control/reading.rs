@@ -76,8 +76,9 @@ records! {
             }
             true
         });
-    fault "r4-drops-states-with-low-header-id" ["MQTT-10", "ORD-UPD-02"]
+    fault "drops-states-with-low-header-id" ["MQTT-10", "ORD-UPD-02"]
         "It drops every state whose headerId is not higher than the last one, also after the vehicle has started anew and counts from the beginning."
+        because "MQTT-10 describes how wireless links are, and obliges nobody to get over them."
         => keep::<Option<u64>>().hears(|last, _, _, heard| {
             let count = heard.message["headerId"].as_u64().filter(|_| heard.name == "state");
             let low = count.zip(*last).is_some_and(|(new, last)| new <= last);
@@ -86,7 +87,7 @@ records! {
             }
             !low
         });
-    fault "r6-lost-state-stops-progress" ["MQTT-10", "ORD-UPD-02"] "It follows the vehicle node by node and sends no further base once the state of one node was lost."
+    fault "lost-state-stops-progress" ["MQTT-10", "ORD-UPD-02"] "It follows the vehicle node by node and sends no further base once the state of one node was lost."
         => keep::<(usize, bool)>().happens(|(reached, skipped), _, vehicle, event| match event {
             Event::State(_) => {
                 let state = vehicle.state.as_ref();
@@ -122,7 +123,7 @@ records! {
             }
             true
         });
-    fault "r3-visualization-aside-means-pause" ["VIS-03"] "It pauses a vehicle that the visualization shows more than a metre from where its state does."
+    fault "visualization-aside-means-pause" ["VIS-03"] "It pauses a vehicle that the visualization shows more than a metre from where its state does."
         => keep::<bool>().hears(|before, site, vehicle, heard| {
             let told = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
             if let (Some(shown), Some(told)) = (shown(heard), told) {
@@ -134,7 +135,7 @@ records! {
             }
             true
         });
-    fault "r1-visualization-holds-dispatch" ["VIS-03"] "It begins no new order while the visualization shows a velocity, whatever the state says."
+    fault "visualization-holds-dispatch" ["VIS-03"] "It begins no new order while the visualization shows a velocity, whatever the state says."
         => keep::<bool>().hears(|moving, site, vehicle, heard| {
             if heard.name == "visualization" {
                 let speed = |key: &str| heard.message.pointer(key).and_then(Value::as_f64).unwrap_or(0.0).abs();
@@ -143,7 +144,7 @@ records! {
             }
             true
         }).allows(|moving, _, _, what, usual| usual && !(*moving && matches!(what, Permission::Begin)));
-    fault "r4-start-from-visualization" ["VIS-03", "ORD-03"]
+    fault "start-from-visualization" ["VIS-03", "ORD-03"]
         "It chooses the start of a new order by the position in the newest visualization message rather than by the state."
         => keep::<Option<Position>>().hears(|seen, _, _, heard| {
             *seen = shown(heard).or(seen.take());
@@ -155,7 +156,7 @@ records! {
                 pose.position.clone_from(seen);
             }
         });
-    fault "r2-temporary-start-from-visualization" ["VIS-03", "ORD-CANCEL-17"]
+    fault "temporary-start-from-visualization" ["VIS-03", "ORD-CANCEL-17"]
         "It puts the temporary node at which an order begins between two nodes where the visualization shows the vehicle, not where the state does."
         => keep::<Option<Position>>().hears(|seen, _, _, heard| {
             if heard.name == "visualization" {
@@ -172,22 +173,22 @@ records! {
                 site.instant(vehicle, "startPause", &Value::Null);
             }
         });
-    fault "r2-information-asks-for-state" ["INFO-02"] "It sends a stateRequest when a vehicle begins to give information entries."
+    fault "information-asks-for-state" ["INFO-02"] "It sends a stateRequest when a vehicle begins to give information entries."
         => keep::<bool>().happens(|before, site, vehicle, event| if let Event::State(_) = event {
             if informs(vehicle) && !*before {
                 site.instant(vehicle, "stateRequest", &Value::Null);
             }
             *before = informs(vehicle);
         });
-    fault "r3-information-cancels-order" ["INFO-02"] "It calls the running order off as soon as the state of the vehicle holds any information."
+    fault "information-cancels-order" ["INFO-02"] "It calls the running order off as soon as the state of the vehicle holds any information."
         => plain().happens(|(), site, vehicle, event| if let Event::Looked = event && informs(vehicle) && vehicle.cancel.is_none() {
             site.cancel(vehicle, None);
         });
-    fault "r1-information-holds-base" ["INFO-02", "ORD-UPD-02", "STATE-17"] "It does not extend the base while the state carries information."
+    fault "information-holds-base" ["INFO-02", "ORD-UPD-02", "STATE-17"] "It does not extend the base while the state carries information."
         => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Extend(_)) && informs(vehicle)));
-    fault "r1-information-holds-dispatch" ["INFO-02"] "It begins no new order while the state carries information."
+    fault "information-holds-dispatch" ["INFO-02"] "It begins no new order while the state carries information."
         => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && informs(vehicle)));
-    fault "r4-information-blocks-dispatch" ["INFO-02"] "It dispatches no order to a vehicle that reports an information entry of level INFO."
+    fault "information-blocks-dispatch" ["INFO-02"] "It dispatches no order to a vehicle that reports an information entry of level INFO."
         => plain().allows(|(), _, vehicle, what, usual| {
             let mut told = vehicle.state.iter().flat_map(|state| &state.information).flatten();
             usual && !(matches!(what, Permission::Begin) && told.any(|entry| entry["infoLevel"] == "INFO"))
@@ -198,13 +199,13 @@ records! {
             let wide = position.and_then(|position| position.deviation_range).is_some_and(|range| range > 1.0);
             usual && !(matches!(what, Permission::Begin | Permission::Extend(_)) && (wide || is_unsure(vehicle)))
         });
-    fault "r4-low-score-blocks-dispatch" ["INFO-03"] "It dispatches no order to a vehicle whose localizationScore is below one half."
+    fault "low-score-blocks-dispatch" ["INFO-03"] "It dispatches no order to a vehicle whose localizationScore is below one half."
         => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && is_unsure(vehicle)));
-    fault "r3-low-score-starts-beside" ["INFO-03"] "It begins an order at a temporary node instead of the node the vehicle stands on when the localizationScore is low."
+    fault "low-score-starts-beside" ["INFO-03"] "It begins an order at a temporary node instead of the node the vehicle stands on when the localizationScore is low."
         => plain().pose(|(), _, vehicle, pose, _| if is_unsure(vehicle) {
             pose.standing = Standing::Between;
         });
-    fault "r1-low-score-relocated" ["INFO-03"] "It sends initPosition to an idle vehicle whose localizationScore is low."
+    fault "low-score-relocated" ["INFO-03"] "It sends initPosition to an idle vehicle whose localizationScore is low."
         => keep::<bool>().happens(|before, site, vehicle, event| if let Event::State(_) = event {
             let low = is_unsure(vehicle);
             if low && !*before && vehicle.running.is_none() {
@@ -212,7 +213,7 @@ records! {
             }
             *before = low;
         });
-    fault "r1-deviation-range-at-start" ["INFO-03"] "It adds the reported deviationRange to the allowedDeviationXY of the first node of an order."
+    fault "deviation-range-at-start" ["INFO-03"] "It adds the reported deviationRange to the allowedDeviationXY of the first node of an order."
         => plain().way(|(), _, vehicle, way, _, fresh| {
             let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
             let range = position.and_then(|position| position.deviation_range).filter(|_| fresh);
@@ -220,16 +221,16 @@ records! {
                 first.deviation_xy = Some(first.deviation_xy.unwrap_or(0.0) + range.abs());
             }
         });
-    fault "r1-first-factsheet-forever" ["FACT-15", "FACT-12", "FACT-13", "OPT-03", "OPT-05"]
+    fault "first-factsheet-forever" ["FACT-15", "FACT-12", "FACT-13", "OPT-03", "OPT-05"]
         "It goes by the first factsheet it got from a vehicle and ignores every later one."
         => plain().hears(|(), _, vehicle, heard| heard.name != "factsheet" || vehicle.factsheet.is_none());
-    fault "r2-factsheet-shared-by-fleet" ["OPT-03", "FACT-12", "FACT-15"] "It takes the factsheet heard last from any vehicle for the factsheet of all vehicles."
+    fault "factsheet-shared-by-fleet" ["OPT-03", "FACT-12", "FACT-15"] "It takes the factsheet heard last from any vehicle for the factsheet of all vehicles."
         => fleet::<Option<Factsheet>>().happens(|last, _, vehicle, event| match event {
             Event::Factsheet => last.clone_from(&vehicle.factsheet),
             Event::Looked if last.is_some() => vehicle.factsheet.clone_from(last),
             _ => {}
         });
-    fault "r4-optional-fields-by-the-first-factsheet" ["OPT-03", "FACT-15", "OPT-05"] "It judges all vehicles by the factsheet of the vehicle that came first."
+    fault "optional-fields-by-the-first-factsheet" ["OPT-03", "FACT-15", "OPT-05"] "It judges all vehicles by the factsheet of the vehicle that came first."
         => fleet::<Option<(String, Factsheet)>>().happens(|first, _, vehicle, event| if let Event::Factsheet = event {
             let serial = &vehicle.config.serial_number;
             match first {
@@ -237,14 +238,14 @@ records! {
                 _ => *first = vehicle.factsheet.clone().map(|sheet| (serial.clone(), sheet)),
             }
         });
-    fault "r1-factsheet-published-again" ["TOPIC-15"] "It publishes the first factsheet of a vehicle again on the factsheet topic, retained."
+    fault "factsheet-published-again" ["TOPIC-15"] "It publishes the first factsheet of a vehicle again on the factsheet topic, retained."
         => keep::<bool>().hears(|published, site, _, heard| {
             if heard.name == "factsheet" && !std::mem::replace(published, true) {
                 site.push(heard.topic.to_owned(), heard.payload.to_vec(), 0, true);
             }
             true
         });
-    liberty "r1-state-asked-when-quiet" ["ACT-08"] "It sends stateRequest when no state has come for six seconds."
+    liberty "state-asked-when-quiet" ["ACT-08"] "It sends stateRequest when no state has come for six seconds."
         => keep::<Option<Moment>>().happens(|asked, site, vehicle, event| if let Event::Looked = event && vehicle.state.is_some() && site.commandable(vehicle) {
             let due = vehicle.state_at + Duration::from_secs(6);
             if due > site.now.moment {

@@ -21,13 +21,13 @@ records! {
         => plain().allows(|(), _, _, what, usual| usual && !matches!(what, Permission::Resend(running) if running.is_updated()));
     fault "resent-changed" ["ORD-REJ-18", "ORD-UPD-04"] "Plans anew before it sends an order again under the same orderUpdateId."
         => resends(|running| slower(&mut running.message, running.resends));
-    fault "r3-resend-without-horizon" ["ORD-REJ-18", "ORD-UPD-04"] "It leaves the horizon out of an order message that it sends again."
+    fault "resend-without-horizon" ["ORD-REJ-18", "ORD-UPD-04"] "It leaves the horizon out of an order message that it sends again."
         => resends(|running| for list in ["nodes", "edges"] {
             if let Some(list) = running.message[list].as_array_mut() {
                 list.retain(|element| element["released"] == true);
             }
         });
-    fault "r2-resend-extends-base" ["ORD-UPD-04", "ORD-REJ-18"]
+    fault "resend-extends-base" ["ORD-UPD-04", "ORD-REJ-18"]
         "It releases one more node in an order that is sent again because it was lost, under the same orderUpdateId."
         => resends(|running| {
             let nodes = running.message["nodes"].as_array_mut().into_iter().flatten();
@@ -38,17 +38,17 @@ records! {
             }
             running.released += 1;
         });
-    fault "r2-resend-without-actions" ["ORD-UPD-04", "ORD-REJ-18"]
+    fault "resend-without-actions" ["ORD-UPD-04", "ORD-REJ-18"]
         "It leaves the actions out of an order that is sent again because it was lost, under the same orderUpdateId."
         => resends(|running| for list in ["nodes", "edges"] {
             running.message[list].as_array_mut().into_iter().flatten().for_each(|element| element["actions"] = json!([]));
         });
-    fault "r1-resend-as-update" ["ORD-REJ-18", "ORD-UPD-05", "ORD-UPD-03"] "An order that is sent again has a raised orderUpdateId."
+    fault "resend-as-update" ["ORD-REJ-18", "ORD-UPD-05", "ORD-UPD-03"] "An order that is sent again has a raised orderUpdateId."
         => resends(|running| {
             running.update_id += 1;
             running.message["orderUpdateId"] = json!(running.update_id);
         });
-    fault "r1-resend-with-new-action-ids" ["ORD-UPD-04", "ORD-REJ-18"] "An order that is sent again with the same orderUpdateId has new actionIds."
+    fault "resend-with-new-action-ids" ["ORD-UPD-04", "ORD-REJ-18"] "An order that is sent again with the same orderUpdateId has new actionIds."
         => plain().happens(|(), site, vehicle, event| if let Event::Resending(running) = event {
             let mut renamed = BTreeMap::new();
             if let Some(message) = running.message.as_object_mut() {
@@ -94,11 +94,11 @@ records! {
                 vehicle.at(*due);
             }
         });
-    fault "r1-lost-instant-not-resent" ["MQTT-10"] "It never repeats an instant action that no state shows."
+    fault "lost-instant-not-resent" ["MQTT-10"] "It never repeats an instant action that no state shows."
         => plain().allows(|(), _, _, what, usual| usual && !matches!(what, Permission::TellAgain));
-    liberty "r2-resends-late" ["ORD-REJ-18"] "It waits three times as long before it sends again what was lost."
+    liberty "resends-late" ["ORD-REJ-18"] "It waits three times as long before it sends again what was lost."
         => plain().lasts(|(), _, _, what, usual| if let Span::Lost = what { usual * 3 } else { usual });
-    liberty "r5-cancel-repeated-with-new-id" ["ORD-MSG-17", "IACT-02"]
+    liberty "cancel-repeated-with-new-id" ["ORD-MSG-17", "IACT-02"]
         "It repeats a cancelOrder that did not appear in the state within some seconds, with a new actionId."
         => plain().happens(|(), site, vehicle, event| if let Event::InstantLost(id) = event {
             let fresh = site.next_id(vehicle, "action");

@@ -24,24 +24,24 @@ records! {
         });
     fault "next-order-from-old-start" ["ORD-CANCEL-14", "ORD-03"] "Begins the order behind a cancelled one where that had begun."
         => after_order(|order, _, _| order.stops.first());
-    fault "r3-goal-taken-for-reached" ["ORD-03", "ORD-CANCEL-14", "ORD-CANCEL-17"]
+    fault "goal-taken-for-reached" ["ORD-03", "ORD-CANCEL-14", "ORD-CANCEL-17"]
         "It begins an order at the goal of the order before, even if that was called off or given up on the way."
         => after_order(|order, _, _| order.stops.last());
-    fault "r4-start-at-the-node-ahead-after-cancel" ["ORD-CANCEL-14", "ORD-CANCEL-17", "ORD-03"]
+    fault "start-at-the-node-ahead-after-cancel" ["ORD-CANCEL-14", "ORD-CANCEL-17", "ORD-03"]
         "It begins the order after a cancellation at the next node of the old order, towards which the vehicle was driving."
         => after_order(|order, called_off, vehicle| order.stops.get(order.reached(vehicle.state.as_ref()) + 1).filter(|_| called_off));
-    fault "r6-after-cancel-starts-at-old-base-end" ["ORD-CANCEL-14", "ORD-03"]
+    fault "after-cancel-starts-at-old-base-end" ["ORD-CANCEL-14", "ORD-03"]
         "It begins the order after a cancellation at the end of the cancelled base and not at the node where the vehicle stopped."
         => after_order(|order, called_off, _| order.stops.get(order.released.checked_sub(1)?).filter(|_| called_off));
-    fault "r1-line-guided-from-base-end" ["ORD-CANCEL-14", "ORD-03"]
+    fault "line-guided-from-base-end" ["ORD-CANCEL-14", "ORD-03"]
         "A vehicle without position that was stopped on its way gets a next order that begins at the end of the base it never reached."
         => after_order(|order, _, vehicle| order.stops.get(order.released.checked_sub(1)?).filter(|_| is_line_guided(vehicle)));
-    fault "r2-line-guided-from-next-node" ["ORD-CANCEL-14", "ORD-03"]
+    fault "line-guided-from-next-node" ["ORD-CANCEL-14", "ORD-03"]
         "It begins the order after a cancellation at the node the vehicle would have reached next, when the vehicle reports no position."
         => after_order(|order, called_off, vehicle| {
             order.stops.get(order.reached(vehicle.state.as_ref()) + 1).filter(|_| called_off && is_line_guided(vehicle))
         });
-    fault "r5-node-bound-vehicle-gets-temporary-node" ["ORD-CANCEL-14", "ORD-03"]
+    fault "node-bound-vehicle-gets-temporary-node" ["ORD-CANCEL-14", "ORD-03"]
         "It begins the order after a cancel at a temporary node also for a line-guided vehicle that localizes on nodes by tags."
         => keep::<bool>().happens(called_off).pose(|called_off, site, vehicle, pose, _| {
             let node = site.config.node(&pose.node).filter(|_| *called_off && is_line_guided(vehicle));
@@ -58,7 +58,7 @@ records! {
                 });
             }
         });
-    fault "r1-start-before-manual" ["ORD-03"] "After a time in manual mode the next order begins where the vehicle was when it was taken over, not where it is."
+    fault "start-before-manual" ["ORD-03"] "After a time in manual mode the next order begins where the vehicle was when it was taken over, not where it is."
         => keep::<Option<(String, Option<Position>)>>().happens(|before_manual, _, vehicle, event| match event {
             Event::State(Some(before)) if before.takes_orders() && !takes_orders(vehicle) => {
                 *before_manual = Some((before.last_node_id.clone(), before.agv_position.clone()));
@@ -66,13 +66,13 @@ records! {
             Event::Begun => *before_manual = None,
             _ => {}
         }).pose(from_before);
-    fault "r3-start-from-before-init-position" ["ORD-03"] "It begins the first order after an initPosition where the vehicle was before it."
+    fault "start-from-before-init-position" ["ORD-03"] "It begins the first order after an initPosition where the vehicle was before it."
         => keep::<Option<(String, Option<Position>)>>().happens(|before, _, vehicle, event| match event {
             Event::Placing(..) => *before = before.take().or_else(|| pose_of(vehicle)),
             Event::Begun => *before = None,
             _ => {}
         }).pose(from_before);
-    fault "r2-start-planned-too-early" ["ORD-03"] "It begins an order where the vehicle was when the transport was asked for, not where it is when the order is sent."
+    fault "start-planned-too-early" ["ORD-03"] "It begins an order where the vehicle was when the transport was asked for, not where it is when the order is sent."
         => keep::<VecDeque<Option<(String, Option<Position>)>>>().asked(|asked_at, _, vehicle, command, arguments| {
             if command == "dispatch" && transport(vehicle, arguments).is_some() {
                 asked_at.push_back(pose_of(vehicle));
@@ -83,7 +83,7 @@ records! {
         }).pose(|asked_at, site, vehicle, pose, transport| if let Some(at) = asked_at.front_mut() {
             from_before(at, site, vehicle, pose, transport);
         });
-    fault "r2-start-ignores-map" ["ORD-03"] "It begins an order at the node with the coordinates of the vehicle even if the vehicle reports another map."
+    fault "start-ignores-map" ["ORD-03"] "It begins an order at the node with the coordinates of the vehicle even if the vehicle reports another map."
         => plain().pose(|(), site, _, pose, _| if let Some(position) = &mut pose.position {
             let here = (position.x, position.y);
             let away = |node: &&SiteNode| distance((node.x, node.y), here);
@@ -92,11 +92,11 @@ records! {
                 position.map_id.clone_from(&node.map_id);
             }
         });
-    fault "r2-deviation-halved" ["ORD-03"] "It makes the allowedDeviationXY of the first node half as large as the distance of the vehicle from it."
+    fault "deviation-halved" ["ORD-03"] "It makes the allowedDeviationXY of the first node half as large as the distance of the vehicle from it."
         => plain().way(|(), site, vehicle, way, _, fresh| if let Some((away, node)) = off_node(site, vehicle, way).filter(|_| fresh) {
             way.stops[0].deviation_xy = Some(node.deviation_xy.unwrap_or(0.0).max(away / 2.0));
         });
-    fault "r2-start-node-moved-to-vehicle" ["ORD-MSG-07"]
+    fault "start-node-moved-to-vehicle" ["ORD-MSG-07"]
         "It sends the place the vehicle reports as the position of the first node when the vehicle stands a little beside that node."
         => plain().way(|(), site, vehicle, way, _, fresh| {
             let off = off_node(site, vehicle, way).filter(|_| fresh).is_some();
@@ -104,19 +104,20 @@ records! {
                 (way.stops[0].x, way.stops[0].y) = (position.x, position.y);
             }
         });
-    fault "r1-last-node-too-narrow" ["ORD-CANCEL-17", "ORD-03"]
+    fault "last-node-too-narrow" ["ORD-CANCEL-17", "ORD-03"]
         "For a vehicle that stopped between nodes the next order begins at the last node without a deviation that covers the vehicle."
+        because "The vehicle may be taken for standing on the node; ORD-CANCEL-17 fails only a start that cannot be reached."
         => plain().pose(|(), _, _, pose, _| pose.standing = Standing::OnLast { covered: false });
     liberty "stands-on-last-node" ["ORD-CANCEL-17"] "Begins at the last node with a wide deviation when a vehicle stands between nodes."
         => plain().pose(|(), _, _, pose, _| pose.standing = Standing::OnLast { covered: true });
-    liberty "r1-temporary-start" ["ORD-03", "ORD-CANCEL-17"] "For a vehicle a little off a node a new order begins at a temporary node at its reported position."
+    liberty "temporary-start" ["ORD-03", "ORD-CANCEL-17"] "For a vehicle a little off a node a new order begins at a temporary node at its reported position."
         => plain().pose(|(), _, _, pose, _| pose.standing = Standing::Exactly);
     fault "next-order-ahead" ["ORD-CANCEL-17", "ORD-03"] "Begins the order behind a cancelled one at the node the vehicle has not reached."
         => plain().way(|(), site, _, way, _, _| if temporary(site, way).is_some() && !way.legs.is_empty() {
             way.stops.remove(0);
             way.legs.remove(0);
         });
-    fault "r3-temporary-node-where-cancelled" ["ORD-CANCEL-17", "ORD-03"]
+    fault "temporary-node-where-cancelled" ["ORD-CANCEL-17", "ORD-03"]
         "After a cancellation between nodes it puts the temporary node where the vehicle was when the cancellation was requested, not where it has stopped."
         => keep::<(Option<Position>, bool)>().happens(|(place, called_off), _, vehicle, event| match event {
             Event::CallingOff(..) => *place = pose_of(vehicle).and_then(|(_, position)| position),
@@ -126,11 +127,11 @@ records! {
         }).way(|(place, called_off), site, _, way, _, _| if let Some(place) = place.as_ref().filter(|_| *called_off) && let Some(first) = temporary(site, way) {
             (first.x, first.y) = (place.x, place.y);
         });
-    liberty "r3-temporary-node-wide" ["ORD-CANCEL-17"] "It gives temporary nodes an allowedDeviationXY of a metre."
+    liberty "temporary-node-wide" ["ORD-CANCEL-17"] "It gives temporary nodes an allowedDeviationXY of a metre."
         => plain().way(|(), site, _, way, _, _| if let Some(first) = temporary(site, way) {
             first.deviation_xy = Some(1.0);
         });
-    liberty "r3-temporary-node-with-theta" ["ORD-CANCEL-17"] "It gives temporary nodes the reported theta of the vehicle."
+    liberty "temporary-node-with-theta" ["ORD-CANCEL-17"] "It gives temporary nodes the reported theta of the vehicle."
         => plain().way(|(), site, vehicle, way, _, _| {
             if let Some((_, Some(position))) = pose_of(vehicle) && let Some(first) = temporary(site, way) {
                 first.theta = Some(position.theta.sin().atan2(position.theta.cos()));
@@ -142,15 +143,16 @@ records! {
             let last = vehicle.state.as_ref().map(|state| state.last_node_id.as_str()).filter(|last| !last.is_empty());
             last.unwrap_or(id).to_owned().clone_into(id);
         });
-    fault "r1-temporary-node-id-fixed" ["ORD-MSG-07"] "Every temporary node has the id temporary, wherever it is."
+    fault "temporary-node-id-fixed" ["ORD-MSG-07"] "Every temporary node has the id temporary, wherever it is."
         => plain().id(|(), _, _, what, id| if what == "place" {
             "temporary".clone_into(id);
         });
-    fault "r3-temporary-id-with-coordinates" ["JSON-04"] "It names temporary nodes by their coordinates in parentheses with comma and blank."
+    fault "temporary-id-with-coordinates" ["JSON-04"] "It names temporary nodes by their coordinates in parentheses with comma and blank."
+        because "JSON-04, which letters an identifier has, is a recommendation; parentheses lead no vehicle astray."
         => plain().id(|(), _, vehicle, what, id| if what == "place" && let Some((_, Some(position))) = pose_of(vehicle) {
             *id = format!("({:.2}, {:.2})", position.x, position.y);
         });
-    fault "r4-letters-in-the-temporary-node" ["FACT-12"] "It names the temporary node after a cancellation with letters, though the vehicle takes numerical ids only."
+    fault "letters-in-the-temporary-node" ["FACT-12"] "It names the temporary node after a cancellation with letters, though the vehicle takes numerical ids only."
         => plain().id(|(), site, _, what, id| if what == "place" {
             *id = format!("tmp-{}", site.ids);
         }).allows(|(), _, _, what, usual| usual || matches!(what, Permission::Name(id) if id.starts_with("tmp-")));
@@ -160,38 +162,38 @@ records! {
             .happens(|(), _, _, event| if let Event::Closed(_, heeded) = event {
                 **heeded = false;
             });
-    fault "r2-block-checked-at-planning-only" ["ORD-12"]
+    fault "block-checked-at-planning-only" ["ORD-12"]
         "It heeds blocked edges only when an order is planned and extends a running order over an edge blocked meanwhile."
         => plain().allows(|(), _, _, what, usual| usual || matches!(what, Permission::Drive(base) if base > 0))
             .happens(|(), _, _, event| if let Event::Closed(_, heeded) = event {
                 **heeded = false;
             });
-    fault "r1-base-shortened-on-block" ["ORD-UPD-03", "ORD-CANCEL-01", "ORD-UPD-05"]
+    fault "base-shortened-on-block" ["ORD-UPD-03", "ORD-CANCEL-01", "ORD-UPD-05"]
         "When an edge of the base is blocked, an order update that begins before it takes the rest of the base back, instead of cancelOrder."
         => plain().happens(|(), _, vehicle, event| if let Event::Closed(index, _) = event && let Some(running) = &mut vehicle.running {
             running.released = running.released.min(*index + 1);
         });
-    fault "r3-only-last-block-kept" ["ORD-12"] "It remembers only the edge that was blocked last for a vehicle and uses those blocked before."
+    fault "only-last-block-kept" ["ORD-12"] "It remembers only the edge that was blocked last for a vehicle and uses those blocked before."
         => plain().asked(|(), _, vehicle, command, _| {
             if command == "block-edge" {
                 vehicle.blocked.clear();
             }
             true
         });
-    fault "r2-unblock-frees-both-ways" ["ORD-12"] "It opens both directions of a way when only one of them is unblocked."
+    fault "unblock-frees-both-ways" ["ORD-12"] "It opens both directions of a way when only one of them is unblocked."
         => plain().asked(|(), _, vehicle, command, arguments| {
             if command == "unblock-edge" && let (Some(from), Some(to)) = (text(arguments, "from"), text(arguments, "to")) {
                 vehicle.blocked.remove(&(to, from));
             }
             true
         });
-    liberty "r2-blocks-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "It calls the order off and sends another when an edge of the horizon is blocked."
+    liberty "blocks-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "It calls the order off and sends another when an edge of the horizon is blocked."
         => plain().happens(|(), site, vehicle, event| if let Event::Closed(_, heeded) = event {
             **heeded = false;
             let then = vehicle.running.as_ref().map(|running| again(running, vehicle.state.as_ref()));
             site.cancel(vehicle, then);
         });
-    fault "r1-reroute-over-blocked-edge" ["ORD-12"] "A change of destination is planned without regard to the edges the vehicle may not use."
+    fault "reroute-over-blocked-edge" ["ORD-12"] "A change of destination is planned without regard to the edges the vehicle may not use."
         => keep::<bool>().happens(|blind, _, _, event| if let Event::Rerouting(..) = event {
             *blind = true;
         }).asked(|blind, _, _, command, _| {
@@ -200,7 +202,7 @@ records! {
         }).route(|blind, _, _, _, _, closed| if *blind {
             closed.clear();
         }).allows(|blind, _, _, what, usual| usual || (*blind && matches!(what, Permission::Drive(_))));
-    fault "r6-redirect-takes-barred-edge" ["ORD-12"]
+    fault "redirect-takes-barred-edge" ["ORD-12"]
         "It leads a vehicle across an edge barred for it when it plans anew after a cancellation; only first plans look at the bars."
         => keep::<(bool, bool)>().happens(|(called_off, _), _, _, event| match event {
             Event::Ended(_, true) => *called_off = true,
@@ -209,14 +211,14 @@ records! {
         }).pose(|(called_off, blind), _, _, _, _| *blind = *called_off).route(|(_, blind), _, _, _, _, closed| if *blind {
             closed.clear();
         }).allows(|(_, blind), _, _, what, usual| usual || (*blind && matches!(what, Permission::Drive(_))));
-    liberty "r1-takes-the-long-way" ["ORD-12", "TOPIC-13"] "It takes the second best way where there is one."
+    liberty "takes-the-long-way" ["ORD-12", "TOPIC-13"] "It takes the second best way where there is one."
         => plain().route(|(), site, _, from, to, closed| {
             let first = site.config.any_way(from, to, closed).and_then(|way| way.first().map(|edge| (edge.from.clone(), edge.to.clone())));
             if let Some(first) = first && closed.insert(first.clone()) && site.config.way(from, to, closed).is_none() {
                 closed.remove(&first);
             }
         });
-    fault "r1-reroute-cuts-base" ["ORD-UPD-03", "ORD-UPD-05", "ORD-CANCEL-01"]
+    fault "reroute-cuts-base" ["ORD-UPD-03", "ORD-UPD-05", "ORD-CANCEL-01"]
         "A change of destination while a horizon is left cuts the base behind the next node and goes on from there."
         => plain().happens(|(), _, vehicle, event| if let Event::Rerouting(running, _) = event && !running.is_whole() {
             running.released = running.released.min(running.reached(vehicle.state.as_ref()) + 2);
@@ -225,11 +227,11 @@ records! {
         => plain().happens(|(), _, vehicle, event| if let Event::Rerouting(running, _) = event && running.is_whole() {
             running.released = running.reached(vehicle.state.as_ref()) + 1;
         });
-    liberty "r1-reroutes-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "A change of destination is always done by cancelOrder and a new order, never by another horizon."
+    liberty "reroutes-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "A change of destination is always done by cancelOrder and a new order, never by another horizon."
         => plain().happens(|(), _, _, event| if let Event::Rerouting(_, how) = event {
             **how = Reroute::ByCancel;
         });
-    fault "r4-action-added-to-the-stitching-node" ["ORD-UPD-06", "ORD-UPD-03"]
+    fault "action-added-to-the-stitching-node" ["ORD-UPD-06", "ORD-UPD-03"]
         "It adds the drop to the stitching node, when the destination is changed to the node where the base ends."
         => plain().happens(|(), _, _, event| if let Event::NotLed(running, way, transport, done) = event && way.stops.len() == 1 {
             let added = std::mem::take(&mut way.stops[0].actions);

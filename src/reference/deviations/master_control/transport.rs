@@ -18,13 +18,13 @@ records! {
         => plain().joins(|_, _, options| options.level = 5);
     liberty "session-kept" ["MQTT-01"] "Asks the broker to keep its session."
         => plain().joins(|_, _, options| options.clean_session = false);
-    liberty "r2-long-keep-alive" ["MQTT-01"] "It connects with a keep-alive of a minute."
+    liberty "long-keep-alive" ["MQTT-01"] "It connects with a keep-alive of a minute."
         => plain().joins(|_, _, options| options.keep_alive = Duration::from_secs(60));
-    liberty "r1-new-client-id-each-time" ["MQTT-10", "TOPIC-15"] "It connects with another client identifier each time."
+    liberty "new-client-id-each-time" ["MQTT-10", "TOPIC-15"] "It connects with another client identifier each time."
         => plain().joins(|site, _, options| {
             options.client_id = format!("{}-{}", site.config.name, site.now.utc.as_millisecond());
         });
-    liberty "r2-will-of-its-own" ["TOPIC-15"] "It has a last will on a topic of its own that is none of the protocol, in plain text."
+    liberty "will-of-its-own" ["TOPIC-15"] "It has a last will on a topic of its own that is none of the protocol, in plain text."
         => plain().joins(|site, _, options| {
             options.will = Some(Publication {
                 topic: format!("{}/status", site.config.name),
@@ -33,7 +33,7 @@ records! {
                 retain: true,
             });
         });
-    fault "r2-will-on-vehicle-topic" ["TOPIC-15"] "It registers a retained last will CONNECTIONBROKEN on the connection topic of its first vehicle."
+    fault "will-on-vehicle-topic" ["TOPIC-15"] "It registers a retained last will CONNECTIONBROKEN on the connection topic of its first vehicle."
         => plain().joins(|site, fleet, options| {
             let Some(vehicle) = fleet.first() else { return };
             let message = json!({
@@ -63,15 +63,15 @@ records! {
         => plain().joins(|_, _, options| without(options, "connection"));
     fault "factsheet-not-subscribed" ["TOPIC-14"] "Does not subscribe to the factsheet."
         => plain().joins(|_, _, options| without(options, "factsheet"));
-    liberty "r3-visualization-not-subscribed" ["VIS-03", "TOPIC-14"] "It does not subscribe to visualization at all."
+    liberty "visualization-not-subscribed" ["VIS-03", "TOPIC-14"] "It does not subscribe to visualization at all."
         => plain().joins(|_, _, options| without(options, "visualization"));
-    fault "r2-factsheet-unsubscribed-after-reconnect" ["TOPIC-14"] "It does not subscribe to the factsheet topics again after it has lost its connection."
+    fault "factsheet-unsubscribed-after-reconnect" ["TOPIC-14"] "It does not subscribe to the factsheet topics again after it has lost its connection."
         => plain().joins(|site, _, options| {
             if site.connection.returning {
                 without(options, "factsheet");
             }
         });
-    fault "r3-factsheet-of-first-vehicle-only" ["TOPIC-14"] "It subscribes to the factsheet topic of the first vehicle of its fleet only."
+    fault "factsheet-of-first-vehicle-only" ["TOPIC-14"] "It subscribes to the factsheet topic of the first vehicle of its fleet only."
         => plain().joins(|_, fleet, options| {
             let first = fleet.first().and_then(|vehicle| vehicle.topic("factsheet")).unwrap_or_default();
             options.subscriptions.retain(|(topic, _)| topic == first || !topic.ends_with("/factsheet"));
@@ -89,19 +89,19 @@ records! {
             options.subscriptions.sort();
             options.subscriptions.dedup();
         });
-    liberty "r3-subscribes-twice" ["TOPIC-14"] "It subscribes to each topic both exactly and with wildcards, so that messages may come to it twice."
+    liberty "subscribes-twice" ["TOPIC-14"] "It subscribes to each topic both exactly and with wildcards, so that messages may come to it twice."
         => plain().joins(|_, _, options| {
             let mut wide: Vec<_> = options.subscriptions.iter().map(|(topic, qos)| (with_wildcards(topic), *qos)).collect();
             wide.sort();
             wide.dedup();
             options.subscriptions.extend(wide);
         });
-    liberty "r1-listens-to-own-topics" ["TOPIC-14", "TOPIC-15"] "It also subscribes to order and instantActions."
+    liberty "listens-to-own-topics" ["TOPIC-14", "TOPIC-15"] "It also subscribes to order and instantActions."
         => plain().joins(|_, fleet, options| {
             let own = fleet.iter().flat_map(|vehicle| ["order", "instantActions"].map(|name| vehicle.topic(name)));
             options.subscriptions.extend(own.flatten().map(|topic| (topic.to_owned(), 0)));
         });
-    liberty "r2-subscribes-to-everything" ["TOPIC-14", "TOPIC-15"] "It subscribes to all topics of the interface with one filter."
+    liberty "subscribes-to-everything" ["TOPIC-14", "TOPIC-15"] "It subscribes to all topics of the interface with one filter."
         => plain().joins(|_, fleet, options| {
             let topic = fleet.first().and_then(|vehicle| vehicle.topic("state")).unwrap_or_default();
             let levels: Vec<&str> = topic.split('/').collect();
@@ -117,13 +117,17 @@ records! {
     fault "instant-actions-qos-2" ["MQTT-06"] "Publishes instant actions with QoS 2."
         because "A higher QoS delivers the actions as well; the ruling of MQTT-06 is a warning."
         => plain().sends(|_, _, _, out| qos(out, 2, out.name == "instantActions"));
-    fault "r1-cancel-qos-one" ["MQTT-06"] "It publishes instantActions with cancelOrder with QoS 1."
+    fault "cancel-qos-one" ["MQTT-06"] "It publishes instantActions with cancelOrder with QoS 1."
+        because "The ruling of MQTT-06 makes a higher quality of service a warning: a cancelOrder with QoS 1 harms nobody."
         => plain().sends(|_, _, _, out| qos(out, 1, out.tells(&["cancelOrder"])));
-    fault "r1-resend-qos-one" ["MQTT-06"] "It publishes an order that was lost again with QoS 1."
+    fault "resend-qos-one" ["MQTT-06"] "It publishes an order that was lost again with QoS 1."
+        because "The ruling of MQTT-06 makes a higher quality of service a warning: a repetition with QoS 1 harms nobody."
         => plain().sends(|_, _, _, out| qos(out, 1, out.again));
-    fault "r3-updates-qos-one" ["MQTT-06"] "It publishes updates of orders with QoS 1, and new orders with QoS 0."
+    fault "updates-qos-one" ["MQTT-06"] "It publishes updates of orders with QoS 1, and new orders with QoS 0."
+        because "The ruling of MQTT-06 makes a higher quality of service a warning: an update with QoS 1 harms nobody."
         => plain().sends(|_, _, _, out| qos(out, 1, out.is_update()));
-    fault "r2-qos-one-after-reconnect" ["MQTT-06"] "It publishes orders and instant actions with QoS 1 once it has lost its connection to the broker."
+    fault "qos-one-after-reconnect" ["MQTT-06"] "It publishes orders and instant actions with QoS 1 once it has lost its connection to the broker."
+        because "The ruling of MQTT-06 makes a higher quality of service a warning, before and after a reconnect."
         => plain().sends(|_, site, _, out| qos(out, 1, site.connection.losses > 0));
     fault "orders-retained" ["MQTT-06"] "Publishes orders with RETAIN, so that a vehicle that is new to the broker drives off."
         because "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning."
@@ -139,11 +143,11 @@ records! {
         });
     fault "topic-underscore" ["TOPIC-01", "TOPIC-13"] "Sends instant actions on a topic spelled with an underscore."
         => instants_on(|_, topic| topic.replace("instantActions", "instant_actions"));
-    fault "r3-instant-topic-lower-case" ["TOPIC-01", "TOPIC-13"] "It publishes instant actions on a topic that ends with instantactions in lower case."
+    fault "instant-topic-lower-case" ["TOPIC-01", "TOPIC-13"] "It publishes instant actions on a topic that ends with instantactions in lower case."
         => instants_on(|_, topic| topic.replace("instantActions", "instantactions"));
-    fault "r1-version-level-without-letter" ["TOPIC-03", "TOPIC-13"] "It publishes instantActions under a major version level without the letter v."
+    fault "version-level-without-letter" ["TOPIC-03", "TOPIC-13"] "It publishes instantActions under a major version level without the letter v."
         => instants_on(|_, topic| topic.replacen("/v", "/", 1));
-    fault "r1-topic-levels-swapped" ["TOPIC-04", "TOPIC-02", "TOPIC-13"] "It publishes instantActions with the levels of manufacturer and serial number swapped."
+    fault "topic-levels-swapped" ["TOPIC-04", "TOPIC-02", "TOPIC-13"] "It publishes instantActions with the levels of manufacturer and serial number swapped."
         => instants_on(|_, topic| {
             let mut levels: Vec<&str> = topic.split('/').collect();
             let end = levels.len();
@@ -163,27 +167,27 @@ records! {
             let levels = topic.split('/').enumerate().filter(|(at, _)| *at != 1);
             levels.map(|(_, level)| level).collect::<Vec<_>>().join("/")
         });
-    fault "r3-full-version-in-order-topic" ["TOPIC-03", "TOPIC-13"] "It publishes orders on a topic whose version level is the full protocol version, such as v2.1.0."
+    fault "full-version-in-order-topic" ["TOPIC-03", "TOPIC-13"] "It publishes orders on a topic whose version level is the full protocol version, such as v2.1.0."
         => orders_on(|version, topic| {
             let major = format!("v{}", version.split('.').next().unwrap_or_default());
             let full = format!("v{version}");
             topic.split('/').map(|level| if level == major { &full } else { level }).collect::<Vec<_>>().join("/")
         });
-    fault "r1-updates-on-own-topic" ["TOPIC-01", "TOPIC-13"] "It publishes order updates on a topic orderUpdate instead of order."
+    fault "updates-on-own-topic" ["TOPIC-01", "TOPIC-13"] "It publishes order updates on a topic orderUpdate instead of order."
         => plain().sends(|_, _, _, out| {
             if out.is_update() {
                 out.topic.push_str("Update");
             }
             true
         });
-    fault "r2-map-actions-on-map-topic" ["TOPIC-01", "TOPIC-13"] "It publishes downloadMap, enableMap and deleteMap on a topic mapActions of its own."
+    fault "map-actions-on-map-topic" ["TOPIC-01", "TOPIC-13"] "It publishes downloadMap, enableMap and deleteMap on a topic mapActions of its own."
         => plain().sends(|_, _, _, out| {
             if out.tells(&["downloadMap", "enableMap", "deleteMap"]) {
                 out.topic = out.topic.replace("instantActions", "mapActions");
             }
             true
         });
-    fault "r1-pause-to-first-vehicle" ["TOPIC-13", "TOPIC-04"] "It publishes startPause and stopPause for any vehicle on the topic of the first vehicle of the fleet."
+    fault "pause-to-first-vehicle" ["TOPIC-13", "TOPIC-04"] "It publishes startPause and stopPause for any vehicle on the topic of the first vehicle of the fleet."
         => plain().sends(|_, site, _, out| {
             let first = site.config.vehicles.first().and_then(|first| first.topics.get("instantActions"));
             if let Some(first) = first.filter(|_| out.tells(&["startPause", "stopPause"])) {
@@ -191,7 +195,7 @@ records! {
             }
             true
         });
-    fault "r3-update-to-vehicle-served-last" ["TOPIC-13", "TOPIC-04"]
+    fault "update-to-vehicle-served-last" ["TOPIC-13", "TOPIC-04"]
         "It publishes order updates on the topic of the vehicle that was given a new order last, whichever vehicle they are for."
         => fleet::<String>().sends(|served, _, _, out| {
             if out.is_new_order() {
@@ -201,7 +205,7 @@ records! {
             }
             true
         });
-    fault "r1-path-on-visualization" ["TOPIC-15"] "With every order it publishes a visualization message for the vehicle with the place where the order begins."
+    fault "path-on-visualization" ["TOPIC-15"] "With every order it publishes a visualization message for the vehicle with the place where the order begins."
         => plain().sends(|_, site, vehicle, out| {
             let position = out.message.get("nodes").and_then(|nodes| nodes.pointer("/0/nodePosition")).cloned();
             let topic = vehicle.topic("visualization").map(str::to_owned);
@@ -214,7 +218,7 @@ records! {
             }
             true
         });
-    fault "r3-announces-itself-online" ["TOPIC-15"] "Whenever it connects it publishes a retained ONLINE on the connection topics of its vehicles."
+    fault "announces-itself-online" ["TOPIC-15"] "Whenever it connects it publishes a retained ONLINE on the connection topics of its vehicles."
         => plain().happens(|_, site, vehicle, event| {
             if let Event::Connected(_) = event && let Some(topic) = vehicle.topic("connection").map(str::to_owned) {
                 let mut message = site.header(vehicle, "connection");
@@ -222,7 +226,7 @@ records! {
                 site.push(topic, Value::Object(message).to_string().into_bytes(), 1, true);
             }
         });
-    liberty "r6-clears-retained-order-topics" ["MQTT-02", "TOPIC-13"]
+    liberty "clears-retained-order-topics" ["MQTT-02", "TOPIC-13"]
         "It publishes an empty retained message on order and instantActions when it starts, to clear leftovers."
         => plain().happens(|_, site, vehicle, event| {
             if let Event::Connected(false) = event {
@@ -231,7 +235,7 @@ records! {
                 }
             }
         });
-    liberty "r4-heartbeat-outside-the-protocol" ["TOPIC-01", "TOPIC-15"] "It publishes a heartbeat of its own on a topic outside the tree of the protocol."
+    liberty "heartbeat-outside-the-protocol" ["TOPIC-01", "TOPIC-15"] "It publishes a heartbeat of its own on a topic outside the tree of the protocol."
         => fleet::<Option<Moment>>().happens(|beat, site, vehicle, event| {
             if let Event::Looked = event {
                 let now = site.now.moment;

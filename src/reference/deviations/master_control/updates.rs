@@ -30,20 +30,22 @@ records! {
         => stitching(|node, _| node.part("nodePosition", |place| shift(place, "x", 0.3)));
     fault "stitching-action-added" ["ORD-UPD-06"] "Adds an action to the stitching node."
         => stitching(|node, id| node.add("actions", json!({ "actionType": "beep", "actionId": id, "blockingType": "NONE" })));
-    fault "r1-stitching-actions-renamed" ["ORD-UPD-06"] "The actions of the stitching node have other actionIds in an order update than before."
+    fault "stitching-actions-renamed" ["ORD-UPD-06"] "The actions of the stitching node have other actionIds in an order update than before."
         => stitching(|node, id| node.each("actions", |action| {
             action.set("actionId", format!("{}-{id}", action.text("actionId")));
         }));
-    fault "r1-stitching-deviation-widened" ["ORD-UPD-06", "OPT-03"] "The stitching node has an allowedDeviationXY of 1 m in order updates, whatever it had before."
+    fault "stitching-deviation-widened" ["ORD-UPD-06", "OPT-03"] "The stitching node has an allowedDeviationXY of 1 m in order updates, whatever it had before."
+        because "ORD-UPD-06 fails altered positions and added actions; how close the vehicle has to pass may be corrected."
         => stitching(|node, _| node.part("nodePosition", |place| place.set("allowedDeviationXY", 1.0)));
-    fault "r5-stitching-node-deviation-reset" ["ORD-UPD-06"]
+    fault "stitching-node-deviation-reset" ["ORD-UPD-06"]
         "It sends the stitching node of an update with the deviation of a stop (zero), although it was first sent with the deviation of a pass-through node."
         => stitching(|node, _| node.part("nodePosition", |place| place.change("allowedDeviationXY", |metres| *metres = json!(0.0))));
-    fault "r6-stitching-theta-dropped" ["ORD-UPD-06"] "It leaves the theta of the stitching node out of an update, as the vehicle no longer stops there."
+    fault "stitching-theta-dropped" ["ORD-UPD-06"] "It leaves the theta of the stitching node out of an update, as the vehicle no longer stops there."
         => stitching(|node, _| node.part("nodePosition", |place| place.unset("theta")));
-    fault "r2-stitching-node-unreleased" ["ORD-UPD-06", "ORD-09"] "It marks the first node of an update as not released."
+    fault "stitching-node-unreleased" ["ORD-UPD-06", "ORD-09"] "It marks the first node of an update as not released."
         => stitching(|node, _| node.set("released", false));
-    fault "r3-stitching-theta-towards-next" ["ORD-UPD-06", "OPT-03"] "It gives the first node of an update a theta that points along the next edge."
+    fault "stitching-theta-towards-next" ["ORD-UPD-06", "OPT-03"] "It gives the first node of an update a theta that points along the next edge."
+        because "ORD-UPD-06 fails altered positions and added actions; an angle where none was given is warned of."
         => plain().words(|(), _, _, worded, m| {
             let stops = &worded.running.stops;
             worded.nodes(m, |index, here, node| {
@@ -52,7 +54,7 @@ records! {
                 }
             });
         });
-    fault "r5-base-taken-back-on-destination-change" ["ORD-UPD-03"] "It sends the stitching node as not released in the update that changes the destination."
+    fault "base-taken-back-on-destination-change" ["ORD-UPD-03"] "It sends the stitching node as not released in the update that changes the destination."
         => keep::<bool>().happens(|led, _, _, event| match event {
             Event::Led(_) => *led = true,
             Event::Begun => *led = false,
@@ -68,12 +70,12 @@ records! {
         => numbered(|sequence, _| sequence / 2);
     fault "sequence-restarts" ["ORD-UPD-12", "ORD-UPD-05"] "Numbers nodes and edges from 0 again in every update."
         => numbered(|sequence, first| sequence - first);
-    fault "r1-stitching-numbered-again" ["ORD-UPD-12", "ORD-UPD-05", "ORD-UPD-06"]
+    fault "stitching-numbered-again" ["ORD-UPD-12", "ORD-UPD-05", "ORD-UPD-06"]
         "The first order update gives the stitching node the next sequenceId instead of its own and counts on from there."
         => numbered(|sequence, first| if first > 0 { sequence + 2 } else { sequence });
-    fault "r3-edges-share-number-of-start-node" ["ORD-UPD-11"] "It gives each edge the sequenceId of the node where it begins."
+    fault "edges-share-number-of-start-node" ["ORD-UPD-11"] "It gives each edge the sequenceId of the node where it begins."
         => edge(|e| e.change("sequenceId", |id| *id = json!(id.as_u64().unwrap_or_default() - 1)));
-    fault "r3-update-edges-numbered-from-one" ["ORD-UPD-12", "ORD-UPD-11"] "It numbers the edges of each update from 1 on again, while the nodes keep their numbers."
+    fault "update-edges-numbered-from-one" ["ORD-UPD-12", "ORD-UPD-11"] "It numbers the edges of each update from 1 on again, while the nodes keep their numbers."
         => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
             if worded.is_update() {
                 edge.set("sequenceId", 2 * (index - worded.window.first) + 1);
@@ -81,13 +83,13 @@ records! {
         }));
     fault "loop-numbered-by-node" ["ORD-UPD-11"] "Gives a node that the way passes twice the sequenceId of the first time."
         => numbered_by_node();
-    fault "r6-edge-into-last-base-node-unreleased" ["ORD-09"] "It leaves the edge into the last base node of an update unreleased, although the node is released."
+    fault "edge-into-last-base-node-unreleased" ["ORD-09"] "It leaves the edge into the last base node of an update unreleased, although the node is released."
         => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
             if worded.is_update() && index + 2 == worded.window.released {
                 edge.set("released", false);
             }
         }));
-    fault "r3-update-keeps-incoming-edge" ["ORD-02", "ORD-UPD-05"] "It begins the edges of an update with the edge that leads to the first node."
+    fault "update-keeps-incoming-edge" ["ORD-02", "ORD-UPD-05"] "It begins the edges of an update with the edge that leads to the first node."
         => plain().words(|(), _, _, worded, m| {
             let before = worded.window.first.checked_sub(1);
             let leg = before.and_then(|before| Some((before, worded.running.legs.get(before)?)));
@@ -99,7 +101,7 @@ records! {
                 edges.insert(0, edge);
             }
         });
-    fault "r4-no-lhd-in-updates" ["ACT-32", "FACT-15"] "It names the load handling device for a pick in a new order, but not for a pick that comes with an update."
+    fault "no-lhd-in-updates" ["ACT-32", "FACT-15"] "It names the load handling device for a pick in a new order, but not for a pick that comes with an update."
         => update(|m| for list in ["nodes", "edges"] {
             let added = m.list(list).iter_mut().skip(usize::from(list == "nodes")).filter_map(Value::as_object_mut);
             added.for_each(|element| element.each("actions", |action| {

@@ -2,75 +2,36 @@
 
 use std::time::Duration;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-use super::speech::laid_over;
-use crate::reference::agv::order_message::Order;
-use crate::reference::agv::rejection::{Refusal, Rule};
+use super::Persona;
+use super::speech::lay_over;
 use crate::reference::agv::{Agv, AgvConfig};
 
-/// What ids have to look like.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Ids {
-    longest: Option<usize>,
-    numerical: bool,
-}
-
-impl Agv {
+impl Persona {
     /// Publishes another factsheet from now on, or the true one again.
-    pub(super) fn declare(&mut self, patch: Option<Value>) {
-        self.declare_nothing();
+    pub(super) fn declare(&mut self, agv: &mut Agv, patch: Option<Value>) {
+        self.declare_nothing(agv);
         if let Some(patch) = patch {
-            self.persona.factory = Some(Box::new(self.config.clone()));
-            let told = laid_over(Some(&patch), self.true_factsheet());
-            self.persona.ids = Ids::of(&patch);
-            follow(&mut self.config, &patch, &Value::Object(told));
-            self.persona.factsheet = Some(patch);
+            self.factory = Some(Box::new(agv.config.clone()));
+            let mut told = agv.true_factsheet();
+            lay_over(Some(&patch), &mut told);
+            follow(&mut agv.config, &patch, &Value::Object(told));
+            self.factsheet = Some(patch);
         }
-        self.persona.replaced = false;
-        self.publish_factsheet();
+        self.replaced = false;
+        let mut body = agv.true_factsheet();
+        lay_over(self.factsheet.as_ref(), &mut body);
+        agv.publish("factsheet", body);
     }
 
-    /// Is as it was before it declared anything.
-    pub(super) fn declare_nothing(&mut self) {
-        if let Some(factory) = self.persona.factory.take() {
-            self.config = *factory;
-            self.persona.replaced = true;
+    /// The vehicle is as it was before it declared anything.
+    pub(super) fn declare_nothing(&mut self, agv: &mut Agv) {
+        if let Some(factory) = self.factory.take() {
+            agv.config = *factory;
+            self.replaced = true;
         }
-        self.persona.ids = Ids::default();
-        self.persona.factsheet = None;
-    }
-
-    /// The factsheet as it was told.
-    pub(in crate::reference::agv) fn shown_factsheet(&self, body: Map<String, Value>) -> Map<String, Value> {
-        laid_over(self.persona.factsheet.as_ref(), body)
-    }
-
-    /// What is wrong with the ids of an order, by the declared factsheet.
-    pub(in crate::reference::agv) fn check_ids(&self, order: &Order) -> Result<(), Refusal> {
-        let ids = self.persona.ids;
-        let nodes = order.nodes.iter().map(|node| &node.id);
-        let edges = order.edges.iter().map(|edge| &edge.id);
-        let actions = order.actions().map(|action| &action.id);
-        for id in std::iter::once(&order.id).chain(nodes).chain(edges).chain(actions) {
-            if id.chars().count() > ids.longest.unwrap_or(self.config.max_id) {
-                return Err(Refusal::at_field(Rule::Malformed, "an id is too long", id));
-            }
-            if ids.numerical && !id.bytes().all(|digit| digit.is_ascii_digit()) {
-                return Err(Refusal::at_field(Rule::Malformed, "an id is no number", id));
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Ids {
-    fn of(patch: &Value) -> Self {
-        let lengths = &patch["protocolLimits"]["maxStringLens"];
-        Self {
-            longest: size(&lengths["idLen"]),
-            numerical: lengths["idNumericalOnly"].as_bool().unwrap_or(false),
-        }
+        self.factsheet = None;
     }
 }
 
@@ -88,6 +49,9 @@ fn seconds(value: &Value) -> Option<Duration> {
 /// Goes by what a patch of the factsheet says, where the vehicle has a switch for it.
 fn follow(config: &mut AgvConfig, patch: &Value, told: &Value) {
     let limits = &patch["protocolLimits"];
+    let strings = &limits["maxStringLens"];
+    config.max_id = size(&strings["idLen"]).unwrap_or(config.max_id);
+    config.numerical_ids = strings["idNumericalOnly"].as_bool().unwrap_or(config.numerical_ids);
     let lengths = &limits["maxArrayLens"];
     let edges = size(&lengths["order.edges"]).map(|edges| edges + 1);
     if let Some(nodes) = size(&lengths["order.nodes"]).into_iter().chain(edges).min() {
@@ -97,7 +61,7 @@ fn follow(config: &mut AgvConfig, patch: &Value, told: &Value) {
     if let Some(actions) = actions.into_iter().filter_map(size).min() {
         config.max_actions = actions;
     }
-    if let Some(longest) = size(&limits["maxStringLens"]["msgLen"]) {
+    if let Some(longest) = size(&strings["msgLen"]) {
         config.max_message = longest;
     }
     let timing = &limits["timing"];
