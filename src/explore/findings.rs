@@ -96,10 +96,8 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
                 continue;
             };
             // Steps of a shared state name its file, and belong to the stimulus before them.
-            let own = test.steps.iter().filter(|step| step.place.contains(&file.id));
-            let step = own
-                .filter(|step| step.journal.is_some_and(|(first, _)| first <= seq))
-                .next_back();
+            let mut own = test.steps.iter().filter(|step| step.place.contains(&file.id));
+            let step = own.rfind(|step| step.journal.is_some_and(|(first, _)| first <= seq));
             let at = step.and_then(|step| file.stimulus_at(line(&step.place)?));
             let cut = chain.until(at.unwrap_or(0));
             note(

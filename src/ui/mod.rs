@@ -3,6 +3,7 @@
 //! [`Progress`] is what a run tells; [`Terminal`] shows it, and a [`Desk`] is where a person is asked. Texts of the device are shown
 //! escaped, because they may hold anything. What is told is decided elsewhere.
 
+mod full_screen;
 mod listing;
 mod output;
 mod progress;
@@ -10,6 +11,7 @@ mod prompt;
 mod terminal;
 mod watching;
 
+pub use full_screen::FullScreen;
 pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, RunTitle, TestLine};

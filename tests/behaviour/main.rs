@@ -31,5 +31,6 @@ mod selecting;
 mod simulating;
 mod tool;
 mod transcripts;
+mod validating;
 mod watching;
 mod websockets;
