@@ -1,4 +1,4 @@
-//! Brokers of customers: with logins, access rules, certificates and WebSockets. What they refuse is said in plain words.
+//! Brokers of customers: with logins, access rules, certificates and `WebSocket`s. What they refuse is said in plain words.
 
 use std::path::Path;
 use std::process::Command;

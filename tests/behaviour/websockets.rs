@@ -58,6 +58,7 @@ fn server(folder: &Path) -> ServerConfig {
 }
 
 #[expect(clippy::result_large_err, reason = "the shape of the library")]
+#[expect(clippy::unnecessary_wraps, reason = "this is what the handshake calls")]
 fn with_protocol(request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
     if let Some(protocol) = request.headers().get("Sec-WebSocket-Protocol") {
         response
