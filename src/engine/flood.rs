@@ -15,7 +15,7 @@ const WINDOW: Duration = Duration::from_secs(30);
 /// What a device may do in that time. With a tap a message counts twice: on its way to the broker and from there.
 const IN_WINDOW: Amount = Amount {
     events: 10_000,
-    bytes: 100 << 20,
+    bytes: 400 << 20,
 };
 /// What it may do more for each mock vehicle it commands.
 const FOR_EACH_VEHICLE: u64 = 100;
@@ -23,7 +23,7 @@ const FOR_EACH_VEHICLE: u64 = 100;
 /// as it has on the wire.
 const IN_RUN: Amount = Amount {
     events: 1_000_000,
-    bytes: 2048 << 20,
+    bytes: 6144 << 20,
 };
 
 /// What clients that are not the device may do in the same time before what they do is left out of the journal …

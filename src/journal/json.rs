@@ -9,7 +9,7 @@ use serde_json::{Map, Number, Value};
 use super::Payload;
 
 /// So deep objects and lists may lie in one another.
-const DEPTH: usize = 126;
+const DEPTH: usize = 127;
 /// How `serde_json` says that they lie deeper.
 const TOO_DEEP: &str = "recursion limit exceeded";
 

@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+pub use going_on::{judge, judged};
+
 use super::company::{Company, Part};
 use super::decide::mood;
 use super::grounds::Grounds;
@@ -586,23 +588,4 @@ fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
 
 fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
     Decision::new(requirement, Verdict::Inconclusive, clause, place, why.to_owned())
-}
-
-/// Judges a whole journal.
-pub fn judge(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunResult, JudgeError> {
-    Ok(judged(rules, entries)?.result())
-}
-
-/// The judge who has seen a whole journal. Where a run begins in it, it goes on with the one before.
-pub fn judged(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunJudge, JudgeError> {
-    let first = entries.first().ok_or(JudgeError::NoHeader)?;
-    let mut run = RunJudge::begin(rules, first)?;
-    for entry in entries {
-        if entry.seq() != first.seq() && matches!(entry.event(), Event::RunBegun { .. }) {
-            run = run.resumed(entry)?;
-        }
-        run.observe(entry)?;
-    }
-    run.break_off_run(BREAKS_OFF);
-    Ok(run)
 }

@@ -1,12 +1,14 @@
-//! A run that goes on with one that broke off.
+//! A run that goes on with one that broke off, and whole journals, in which there may be several runs.
+
+use std::sync::Arc;
 
 use super::super::joined;
-use super::super::rules::JudgeError;
+use super::super::rules::{JudgeError, Rules};
 use super::super::watches::Watched;
 use super::{BREAKS_OFF, RunJudge};
 use crate::journal::Entry;
-use crate::journal::event::RunHeader;
-use crate::result::JoinedRun;
+use crate::journal::event::{Event, RunHeader};
+use crate::result::{JoinedRun, RunResult};
 
 impl RunJudge {
     /// Goes on after a run that broke off: the first entry is that of the next run.
@@ -86,4 +88,29 @@ impl RunJudge {
             None => own,
         }
     }
+}
+
+/// Judges a whole journal.
+///
+/// # Errors
+/// When it is none of a run that these suites can judge.
+pub fn judge(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunResult, JudgeError> {
+    Ok(judged(rules, entries)?.result())
+}
+
+/// The judge who has seen a whole journal. Where a run begins in it, it goes on with the one before.
+///
+/// # Errors
+/// When it is none of a run that these suites can judge.
+pub fn judged(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunJudge, JudgeError> {
+    let first = entries.first().ok_or(JudgeError::NoHeader)?;
+    let mut run = RunJudge::begin(rules, first)?;
+    for entry in entries {
+        if entry.seq() != first.seq() && matches!(entry.event(), Event::RunBegun { .. }) {
+            run = run.resumed(entry)?;
+        }
+        run.observe(entry)?;
+    }
+    run.break_off_run(BREAKS_OFF);
+    Ok(run)
 }

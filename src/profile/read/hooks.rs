@@ -225,7 +225,7 @@ impl Reader<'_> {
                 }
                 Err(why) => {
                     let title = format!("the header `{id}` in {what} cannot be read");
-                    let hint = "a secret is taken from ${env:NAME} or ${file:PATH}".to_owned();
+                    let hint = "a value of the site is taken from ${env:NAME} or ${file:PATH}".to_owned();
                     self.complain("bad-value", value.span(), &title, &why, Some(hint));
                     return None;
                 }
