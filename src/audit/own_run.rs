@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Options;
 use super::result::{FindingResult, SideResult, VehicleResult};
-use crate::capture::{Item, Lines};
+use super::time_line::TimeLine;
+use crate::capture::{Item, Recorded};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Record, RunHeader};
 use crate::judge::{JudgeError, Observed, Rules, SideJudge};
@@ -31,7 +32,7 @@ pub fn own_run(
     options: &Options,
     recording: usize,
     first: Record,
-    lines: &mut Lines,
+    recorded: &mut Recorded,
 ) -> Result<VehicleResult, OwnRunError> {
     let header = match &first.event {
         Event::RunBegun { header } => (**header).clone(),
@@ -47,7 +48,7 @@ pub fn own_run(
     };
     let mut last = first.at;
     keep(judge.observe(&Entry::new(first)), last.utc);
-    while let Some(item) = lines.read()? {
+    while let Some(item) = recorded.read()? {
         let Item::Record(record) = item else { continue };
         last = record.at;
         if let Some(name) = topic(&record.event, &header) {
@@ -79,6 +80,7 @@ pub fn own_run(
         twice: 0,
         retained: 0,
         vantage: header.vantage,
+        time_line: TimeLine::default(),
         sides: vec![side],
     })
 }

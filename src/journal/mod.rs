@@ -10,6 +10,7 @@ pub mod file;
 pub mod json;
 mod packet;
 mod payload;
+pub mod place;
 mod plan;
 mod waiver;
 

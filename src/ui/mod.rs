@@ -3,12 +3,14 @@
 //! [`Progress`] is what a run tells; [`Terminal`] shows it, [`Quiet`] does not. Texts of the device are shown
 //! escaped, because they may hold anything. What is told is decided elsewhere.
 
+mod full_screen;
 mod listing;
 mod output;
 mod progress;
 mod terminal;
 mod watching;
 
+pub use full_screen::FullScreen;
 pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, Quiet, RunSummary, RunTitle, TestLine};

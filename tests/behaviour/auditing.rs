@@ -1,11 +1,12 @@
 //! `audit`: recordings of several tools, and what is found in them.
 
 use std::fs;
+use std::io::Write as _;
 
 use serde_json::Value;
 
 use crate::bench::{Bench, QUICK};
-use crate::tool::{Ended, run, run_in};
+use crate::tool::{Ended, Running, run, run_in, tool};
 
 fn capture(name: &str) -> String {
     format!("{}/fixtures/captures/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -128,4 +129,68 @@ fn what_holds_no_message_is_4_and_says_so() {
     run_in(bench.path(), &["audit", "log.txt"])
         .code(4)
         .prints("2 of them no message");
+}
+
+#[test]
+fn mcap_holds_what_the_lines_hold() {
+    let seen = |name: &str| -> Vec<(Value, Value, Value)> {
+        let result = result(&run(&["audit", &capture(name), "--format", "json"]).code(0));
+        let vehicles = result["vehicles"].as_array().unwrap().clone();
+        let facts = |vehicle: &Value| {
+            (
+                vehicle["topics"].clone(),
+                vehicle["messages"].clone(),
+                vehicle["protocol"].clone(),
+            )
+        };
+        vehicles.iter().map(facts).collect()
+    };
+    let lines = seen("two-versions.jsonl");
+    assert_eq!(lines.len(), 2);
+    assert_eq!(seen("site.zstd.mcap"), lines);
+    assert_eq!(seen("site.lz4.mcap"), lines);
+}
+
+#[test]
+fn a_slice_shows_its_finding_to_whoever_gets_it() {
+    let bench = Bench::new();
+    let whole = capture("horizon-missing.jsonl");
+    let sliced = bench.run(&["audit", &whole, "--slice", "STATE-12"]).code(1);
+    let lines = sliced.stdout.lines().count();
+    assert!(lines > 1 && lines < 60, "{lines} lines");
+    fs::write(bench.path().join("bug.jsonl"), &sliced.stdout).unwrap();
+    bench.run(&["audit", "bug.jsonl"]).code(1).prints("STATE-12");
+    bench
+        .run(&["audit", &whole, "--slice", "NO-SUCH"])
+        .code(2)
+        .says("NO-SUCH");
+}
+
+#[test]
+fn the_bundle_of_an_audit_is_for_programs_build_servers_and_people() {
+    let bench = Bench::new();
+    let whole = capture("horizon-missing.jsonl");
+    bench.run(&["audit", &whole, "--out", "audits/monday"]).code(1);
+    let read = |name: &str| fs::read_to_string(bench.path().join("audits/monday").join(name)).unwrap();
+    assert!(read("report.html").contains("<svg") && read("report.html").contains("STATE-12"));
+    assert!(read("junit.xml").contains("type=\"STATE-12\""));
+    let result: Value = serde_json::from_str(&read("result.json")).unwrap();
+    assert!(result["vehicles"][0]["timeLine"]["order"].is_array());
+}
+
+#[test]
+fn a_recording_that_grows_is_followed() {
+    let bench = Bench::new();
+    let whole = fs::read_to_string(capture("horizon-missing.jsonl")).unwrap();
+    let all: Vec<&str> = whole.lines().collect();
+    let path = bench.path().join("site.jsonl");
+    fs::write(&path, format!("{}\n", all[..5].join("\n"))).unwrap();
+    let mut following = Running::start(&mut tool(bench.path(), &["audit", "site.jsonl", "--follow"]));
+    let mut file = fs::OpenOptions::new().append(true).open(&path).unwrap();
+    writeln!(file, "{}", all[5..].join("\n")).unwrap();
+    following.until("a finding", |following| {
+        following.stdout().contains("STATE-12").then_some(())
+    });
+    following.interrupt();
+    following.end().code(1).prints("1 vehicle;");
 }

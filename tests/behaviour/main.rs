@@ -24,4 +24,5 @@ mod scripted;
 mod selecting;
 mod simulating;
 mod tool;
+mod validating;
 mod watching;

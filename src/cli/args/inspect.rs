@@ -86,13 +86,14 @@ const VALIDATE_HELP: &str = "\
 Examples:
   vda5050-tck validate device.toml hall.lif.json
   vda5050-tck validate state.json --topic state
+  vda5050-tck validate states.jsonl messages/   one message a line, and all JSON files of a folder
   vda5050-tck validate suites/agv/order-rejection/*.yaml";
 
 /// `validate`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = VALIDATE_HELP)]
 pub struct Validate {
-    /// Files to check; `-` is standard input
+    /// Files to check, or folders with messages; `-` is standard input
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Take messages for this protocol version; their own header says it unless given
