@@ -94,6 +94,7 @@ impl Stamp {
 pub struct WallClock {
     origin: std::time::Instant,
     utc: jiff::Timestamp,
+    first: Moment,
 }
 
 impl WallClock {
@@ -103,7 +104,14 @@ impl WallClock {
         Self {
             origin: std::time::Instant::now(),
             utc: jiff::Timestamp::now(),
+            first: Moment::START,
         }
+    }
+
+    /// Goes on now with a run that broke off: its time begins with this moment.
+    #[must_use]
+    pub fn going_on(first: Moment) -> Self {
+        Self { first, ..Self::start() }
     }
 
     /// The present moment. The wall clock part is derived from the start of the run, so that a
@@ -117,7 +125,7 @@ impl WallClock {
     #[must_use]
     pub fn origin_stamp(&self) -> Stamp {
         Stamp {
-            moment: Moment::START,
+            moment: self.first,
             utc: self.utc,
         }
     }
@@ -125,6 +133,6 @@ impl WallClock {
     /// The standard library instant of `moment`, for timers.
     #[must_use]
     pub fn instant(&self, moment: Moment) -> std::time::Instant {
-        self.origin + moment.since(Moment::START)
+        self.origin + moment.since(self.first)
     }
 }

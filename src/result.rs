@@ -45,6 +45,9 @@ pub struct RunResult {
     pub suites_modified: bool,
     /// Where the journal is, beside this file.
     pub journal: String,
+    /// The runs that broke off and that this one goes on with, the first one first; their journal is the beginning of this.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joined: Vec<JoinedRun>,
     /// Tests in the order they ran; not applicable ones after them.
     pub tests: Vec<TestResult>,
     /// Monitors.
@@ -62,6 +65,24 @@ pub struct RunResult {
     pub deviations: BTreeMap<String, String>,
     /// Effective settings with their origins.
     pub settings: Vec<Setting>,
+}
+
+/// A run that broke off, and with which another one goes on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JoinedRun {
+    /// Identifier of the run.
+    pub run: String,
+    /// Start in UTC, RFC 3339 with milliseconds.
+    pub started: String,
+    /// Length in seconds.
+    pub seconds: f64,
+    /// Why it broke off.
+    pub reason: String,
+    /// How many of its tests are kept, because they were decided.
+    pub kept: usize,
+    /// How many records of the journal are its own.
+    pub records: u64,
 }
 
 /// How a master control commanded its vehicles (MQTT-11; informative).
@@ -212,9 +233,37 @@ pub struct TestResult {
     /// Lasting mistakes of the device that would have stood in the way, and what else had to be done to get here.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub allowances: Vec<String>,
+    /// Every time it was run, where the run was told to repeat tests; all else is of the worst of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub repetitions: Vec<Repetition>,
+}
+
+/// One of several times that a test was run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Repetition {
+    /// Which, counted from 1.
+    pub number: u32,
+    /// Its verdict.
+    pub verdict: Option<Verdict>,
+    /// How long it took.
+    pub seconds: f64,
+    /// Why the verdict is not a pass, in one line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// First and last journal number.
+    pub journal: Option<(u64, u64)>,
 }
 
 impl TestResult {
+    /// Whether its repetitions have different verdicts.
+    #[must_use]
+    pub fn is_flaky(&self) -> bool {
+        self.repetitions
+            .windows(2)
+            .any(|pair| pair[0].verdict != pair[1].verdict)
+    }
+
     /// The decisions that are not a pass.
     pub fn findings(&self) -> impl Iterator<Item = &Decision> {
         self.decisions

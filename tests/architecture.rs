@@ -34,7 +34,7 @@ const LAYERS: [(&str, u8); 33] = [
     ("pattern", 2),
     ("checks", 2),
     ("journal", 2),
-    ("capture", 2),
+    ("capture", 3),
     ("pack", 1),
     ("profile", 1),
     ("course", 1),

@@ -7,27 +7,35 @@
 
 mod arrival;
 mod arrived;
+mod cause;
 mod continuity;
 mod news;
+mod outcome;
 mod own_run;
 pub mod page;
 pub mod result;
 mod scope;
 mod side;
+mod single;
+pub mod slice;
 mod topics;
 mod vehicle;
+mod wires;
 
 use std::collections::BTreeMap;
 
-use crate::capture::{Message, Place};
+use crate::capture::{Message, Place, Told, Wire, WireEvent};
+use crate::journal::event::Packet;
 use crate::judge::Rules;
 use crate::suite::model::Monitor;
 
 pub use news::{Address, Found};
 pub use own_run::{OwnRunError, own_run};
 use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
-use topics::Topics;
+pub use single::{Flaw, single};
+use topics::{Named, Topics};
 use vehicle::Vehicle;
+use wires::Wires;
 
 /// How many vehicles are judged; messages of further ones are counted.
 const VEHICLES: usize = 10_000;
@@ -78,6 +86,11 @@ pub enum AuditError {
     NoMonitor(String),
 }
 
+/// Whether a topic of this name is the master control's.
+fn is_command(name: &str) -> bool {
+    matches!(name, "order" | "instantActions")
+}
+
 /// What all vehicles share.
 #[derive(Clone, Copy)]
 struct Scene<'a> {
@@ -94,6 +107,7 @@ pub struct Audit<'r> {
     options: Options,
     topics: Topics,
     vehicles: BTreeMap<String, Vehicle>,
+    wires: Wires,
     messages: u64,
     elsewhere: u64,
     beyond: u64,
@@ -125,6 +139,7 @@ impl<'r> Audit<'r> {
             rules,
             options,
             vehicles: BTreeMap::new(),
+            wires: Wires::default(),
             messages: 0,
             elsewhere: 0,
             beyond: 0,
@@ -200,8 +215,51 @@ impl<'r> Audit<'r> {
                 places: &self.places,
                 live: self.live,
             };
-            vehicle.observe(self.messages, &named.name, message, scene);
+            let carried = message.carried;
+            let counts = vehicle.observe(self.messages, &named.name, message, scene);
+            if let Some(carried) = carried.filter(|_| counts) {
+                self.wires.carried(carried, &named.key);
+            }
             if self.live {
+                self.news.append(&mut vehicle.news());
+            }
+        }
+    }
+
+    /// Shows it what is told next.
+    pub fn take(&mut self, told: Told) {
+        match told {
+            Told::Message(message) => self.observe(message),
+            Told::Wire(wire) => self.wire(wire),
+        }
+    }
+
+    /// Shows it something of a connection.
+    pub fn wire(&mut self, wire: Wire) {
+        let named = match &wire.event {
+            WireEvent::Packet {
+                packet: Packet::Publish { topic, .. },
+                sent: true,
+            } => self.topics.read(topic),
+            _ => None,
+        };
+        let wanted = |named: &&Named| self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        let key = named.as_ref().filter(wanted);
+        let key = key.map(|named| (named.key.clone(), named.name.as_str()));
+        let scene = Scene {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            live: self.live,
+        };
+        let missing = self.wires.take(wire, self.messages + 1, key, &mut self.vehicles, scene);
+        for key in missing {
+            if let Some(vehicle) = self.vehicles.get_mut(&key) {
+                vehicle.interrupted(scene);
+            }
+        }
+        if self.live {
+            for vehicle in self.vehicles.values_mut() {
                 self.news.append(&mut vehicle.news());
             }
         }
@@ -225,13 +283,17 @@ impl<'r> Audit<'r> {
 
     /// The result; the recording is at its end.
     #[must_use]
-    pub fn finish(self, recordings: Vec<Recording>) -> AuditResult {
+    pub fn finish(mut self, recordings: Vec<Recording>) -> AuditResult {
         let scene = Scene {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
             live: false,
         };
+        for vehicle in self.vehicles.values_mut() {
+            vehicle.ready(scene);
+        }
+        self.wires.finish(&mut self.vehicles, scene);
         let vehicles: Vec<_> = self
             .vehicles
             .into_values()
@@ -254,3 +316,5 @@ impl<'r> Audit<'r> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod wires_tests;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Options;
 use super::result::{FindingResult, SideResult, VehicleResult};
-use crate::capture::{Item, Lines};
+use crate::capture::{Item, Recorded};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Record, RunHeader};
 use crate::judge::{JudgeError, Observed, Rules, SideJudge};
@@ -31,7 +31,7 @@ pub fn own_run(
     options: &Options,
     recording: usize,
     first: Record,
-    lines: &mut Lines,
+    recorded: &mut Recorded,
 ) -> Result<VehicleResult, OwnRunError> {
     let header = match &first.event {
         Event::RunBegun { header } => (**header).clone(),
@@ -47,7 +47,7 @@ pub fn own_run(
     };
     let mut last = first.at;
     keep(judge.observe(&Entry::new(first)), last.utc);
-    while let Some(item) = lines.read()? {
+    while let Some(item) = recorded.read()? {
         let Item::Record(record) = item else { continue };
         last = record.at;
         if let Some(name) = topic(&record.event, &header) {

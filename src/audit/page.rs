@@ -12,7 +12,12 @@ use crate::verdict::Verdict;
 pub fn page(result: &AuditResult) -> String {
     let mut text = String::new();
     for recording in &result.recordings {
-        let _ = write!(text, "{}: {}", line(&recording.name), counted(recording.lines, "line"));
+        let _ = write!(
+            text,
+            "{}: {}",
+            line(&recording.name),
+            counted(recording.lines, &recording.unit)
+        );
         if recording.skipped > 0 {
             let _ = write!(text, ", {} of them no message", recording.skipped);
         }

@@ -45,6 +45,8 @@ pub struct AuditResult {
 pub struct Recording {
     /// Its name.
     pub name: String,
+    /// What it consists of: `line`, or `frame` of captured traffic.
+    pub unit: String,
     /// Lines in all.
     pub lines: u64,
     /// Lines that hold no message.

@@ -11,6 +11,8 @@ pub(super) enum Use {
     Unbroken,
     /// As the one before, and only where the recording says when messages came.
     UnbrokenInTime,
+    /// Only on packets between a client and its broker.
+    Packets,
     /// Not at all; a recording of a subscriber cannot show it.
     Never(&'static str),
 }
@@ -142,29 +144,34 @@ const UNBROKEN_IN_TIME: &[&str] = &[
     "visualization/rate",
 ];
 
-const PACKETS: &str = "only the packets between device and broker show it";
+/// Why what needs packets is not judged.
+pub(super) const PACKETS: &str = "only the packets between device and broker show it";
 const FLEET: &str = "it needs to be known what was asked of the master control, and which vehicles it has";
 const ABSENT: &str = "that something never came is not shown by a recording, which may lack it";
 const AWAY: &str = "the message that ends the absence may be missing";
 
+const OF_PACKETS: &[&str] = &[
+    "connection/says-offline",
+    "connection/values",
+    "mqtt/connect",
+    "mqtt/quality",
+    "mqtt/quality-of-commands",
+    "mqtt/version-of-commands",
+];
+
+const WHOLE: &str = "only all packets of a vehicle from the beginning show it";
 const NEVER: &[(&str, &str)] = &[
-    ("commands/alive", PACKETS),
-    ("commands/listens", PACKETS),
+    ("commands/alive", WHOLE),
+    ("commands/listens", WHOLE),
     ("commands/while-away", AWAY),
-    ("connection/online-after-connect", PACKETS),
-    ("connection/says-offline", PACKETS),
-    ("connection/stays", PACKETS),
-    ("connection/values", PACKETS),
+    ("connection/online-after-connect", WHOLE),
+    ("connection/stays", WHOLE),
     ("fleet/commanded", FLEET),
-    ("fleet/each-heard", PACKETS),
+    ("fleet/each-heard", WHOLE),
     ("fleet/own-orders", FLEET),
-    ("mqtt/connect", PACKETS),
-    ("mqtt/quality", PACKETS),
-    ("mqtt/quality-of-commands", PACKETS),
-    ("mqtt/version-of-commands", PACKETS),
-    ("topic/heard", PACKETS),
+    ("topic/heard", WHOLE),
     ("topic/names", ABSENT),
-    ("topic/own-side", PACKETS),
+    ("topic/own-side", WHOLE),
     ("visualization/published", ABSENT),
 ];
 
@@ -178,6 +185,9 @@ pub(super) fn of(monitor: &str) -> Option<Use> {
     }
     if UNBROKEN_IN_TIME.contains(&monitor) {
         return Some(Use::UnbrokenInTime);
+    }
+    if OF_PACKETS.contains(&monitor) {
+        return Some(Use::Packets);
     }
     let never = NEVER.iter().find(|(name, _)| *name == monitor);
     never.map(|(_, why)| Use::Never(why))
@@ -193,7 +203,7 @@ mod tests {
         let library = Library::load(None).expect("library");
         let monitors = &library.rules.suites.monitors;
         for monitor in monitors {
-            let lists = [EACH_MESSAGE, UNBROKEN, UNBROKEN_IN_TIME];
+            let lists = [EACH_MESSAGE, UNBROKEN, UNBROKEN_IN_TIME, OF_PACKETS];
             let listed = lists.iter().filter(|list| list.contains(&monitor.id.as_str())).count();
             let never = NEVER.iter().filter(|(name, _)| *name == monitor.id).count();
             assert_eq!(
@@ -203,7 +213,8 @@ mod tests {
                 monitor.id
             );
         }
-        let all = [EACH_MESSAGE.len(), UNBROKEN.len(), UNBROKEN_IN_TIME.len(), NEVER.len()];
-        assert_eq!(all.iter().sum::<usize>(), monitors.len());
+        let lists = [EACH_MESSAGE, UNBROKEN, UNBROKEN_IN_TIME, OF_PACKETS];
+        let all = lists.iter().map(|list| list.len()).chain([NEVER.len()]);
+        assert_eq!(all.sum::<usize>(), monitors.len());
     }
 }

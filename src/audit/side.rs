@@ -3,15 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use super::Scene;
 use super::news::Found;
+use super::outcome::Outcome;
 use super::result::{FindingResult, Undecided};
-use super::scope::{self, Use};
+use super::scope::{self, PACKETS, Use};
+use super::{Scene, cause};
 use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Record, RunHeader, Source};
 use crate::judge::{Observed, SideJudge};
 use crate::pack::{Pack, Role};
+use crate::result::MonitorFinding;
 use crate::suite::model::Monitor;
 use crate::verdict::Verdict;
 
@@ -19,6 +21,12 @@ use crate::verdict::Verdict;
 const OPEN: usize = 256;
 /// How many different findings a side keeps.
 const DIFFERENT: usize = 512;
+
+/// How many causes are told apart, of one requirement.
+const CAUSES: usize = 16;
+
+/// Monitor, requirement and verdict, and the cause.
+type Key = ((String, String, Verdict), String);
 
 /// See the module.
 pub(super) struct Side {
@@ -30,7 +38,7 @@ pub(super) struct Side {
     each: SideJudge,
     /// Those that need an unbroken record, from where it is one.
     unbroken: Option<SideJudge>,
-    kept: BTreeMap<(String, String, Verdict), FindingResult>,
+    kept: BTreeMap<Key, FindingResult>,
     /// What holds only if nothing turns out to be missing: since when, and what.
     open: VecDeque<(Moment, Observed, jiff::Timestamp)>,
     judged: BTreeMap<String, u64>,
@@ -118,7 +126,7 @@ impl Side {
 
     fn keep(&mut self, observed: Observed, utc: jiff::Timestamp, scene: Scene<'_>) {
         let Observed { monitor, finding } = observed;
-        let key = (monitor.clone(), finding.requirement.clone(), finding.verdict);
+        let key = self.key(&monitor, &finding);
         let last = format!("{utc:.3}");
         let message = finding.first.first().copied().unwrap_or_default();
         if scene.live {
@@ -163,6 +171,29 @@ impl Side {
         self.kept.insert(key, finding);
     }
 
+    /// Takes over what was found of its connections.
+    pub fn wired(&mut self, outcome: Outcome, scene: Scene<'_>) {
+        for (id, judged) in outcome.judged {
+            *self.judged.entry(id).or_default() += judged;
+        }
+        self.decided.extend(outcome.decided);
+        for (observed, utc) in outcome.found {
+            self.keep(observed, utc, scene);
+        }
+    }
+
+    /// What a finding is counted with: others of the same cause, or all others where there are too many causes.
+    fn key(&self, monitor: &str, finding: &MonitorFinding) -> Key {
+        let group = (monitor.to_owned(), finding.requirement.clone(), finding.verdict);
+        let key = (group, cause::of(&finding.message));
+        let causes = self.kept.range((key.0.clone(), String::new())..);
+        let causes = causes.take_while(|(known, _)| known.0 == key.0).count();
+        if self.kept.contains_key(&key) || causes < CAUSES {
+            return key;
+        }
+        (key.0, String::new())
+    }
+
     fn absorb(&mut self, judge: &SideJudge) {
         for (id, judged) in judge.judged() {
             *self.judged.entry(id).or_default() += judged;
@@ -188,6 +219,7 @@ impl Side {
             let why = match scope::of(&id) {
                 Some(Use::Never(why)) => why,
                 Some(Use::UnbrokenInTime) if !self.timed => "the recording does not say when messages came",
+                Some(Use::Packets) if self.judged.get(&id).is_none_or(|judged| *judged == 0) => PACKETS,
                 _ if self.judged.get(&id).is_none_or(|judged| *judged == 0) => "nothing came that it could judge",
                 _ => continue,
             };
@@ -201,13 +233,13 @@ impl Side {
     }
 }
 
-fn start(header: &RunHeader, scene: Scene<'_>, used: &dyn Fn(&str) -> bool) -> Option<SideJudge> {
+pub(super) fn start(header: &RunHeader, scene: Scene<'_>, used: &dyn Fn(&str) -> bool) -> Option<SideJudge> {
     let wanted = |monitor: &Monitor| used(&monitor.id) && scene.options.wants_monitor(monitor);
     SideJudge::begin(scene.rules, header, &wanted).ok()
 }
 
 /// The record that every journal begins with.
-fn first(header: &RunHeader, at: Stamp) -> Arc<Entry> {
+pub(super) fn first(header: &RunHeader, at: Stamp) -> Arc<Entry> {
     Entry::new(Record {
         seq: 0,
         at,

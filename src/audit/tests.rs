@@ -8,7 +8,7 @@ use crate::run::{Library, VirtualRun, run_silently};
 use crate::verdict::Verdict;
 
 /// What a faultless device and the harness said in a run of these tests, as a subscriber hears it.
-fn traffic(library: &Library, pack: &Pack, role: Role, tests: &str, faults: &[&str]) -> Vec<Message> {
+pub(super) fn traffic(library: &Library, pack: &Pack, role: Role, tests: &str, faults: &[&str]) -> Vec<Message> {
     let mut run = VirtualRun::of_role(role, library, pack);
     run.tests.retain(|test| test.id.starts_with(tests));
     run.faults = faults.iter().map(|fault| (*fault).to_owned()).collect();
@@ -34,6 +34,7 @@ fn traffic(library: &Library, pack: &Pack, role: Role, tests: &str, faults: &[&s
             retain: Some(*retain && !sent),
             place: Place::default(),
             after_gap: false,
+            carried: None,
         });
     }
     all
@@ -184,6 +185,7 @@ fn a_version_without_rules_is_named_and_not_judged() {
         retain: Some(false),
         place: Place::default(),
         after_gap: false,
+        carried: None,
     };
     let foreign = audited(&library, vec![message(r#"{"version":"9.1.0"}"#)]);
     assert_eq!((foreign.verdict, foreign.vehicles[0].sides.len()), (None, 0));

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
@@ -10,6 +11,7 @@ use super::arrival::{Known, Sorted};
 use super::arrived::{Arrived, is_at_rest, of_side, timestamp, version};
 use super::continuity::{Continuity, Step};
 use super::news::Found;
+use super::outcome::Outcome;
 use super::result::VehicleResult;
 use super::side::Side;
 use super::topics::Named;
@@ -23,6 +25,8 @@ use crate::profile::TimeLimits;
 
 /// How many messages wait until the vehicle has said which version it speaks.
 const WAITING: usize = 64;
+/// How long a topic is believed to be seen at its sender.
+const FIRST_HAND: Duration = Duration::from_secs(60);
 /// How often the version of a vehicle may change; a vehicle that changes it more often is judged by the last one.
 const STRETCHES: usize = 16;
 
@@ -54,6 +58,10 @@ pub(super) struct Vehicle {
     counts: BTreeMap<String, u64>,
     twice: u64,
     stale: u64,
+    /// When a message of this topic was seen last on its way from its sender.
+    first_hand: BTreeMap<String, Option<jiff::Timestamp>>,
+    /// Whether its connections were judged.
+    wired: bool,
     /// What came out while it spoke another version.
     earlier: Vec<VehicleResult>,
     /// What was found of those.
@@ -80,20 +88,25 @@ impl Vehicle {
             counts: BTreeMap::new(),
             twice: 0,
             stale: 0,
+            first_hand: BTreeMap::new(),
+            wired: false,
             earlier: Vec::new(),
             news: Vec::new(),
         }
     }
 
-    /// Takes in a message.
-    pub fn observe(&mut self, number: u64, name: &str, message: Message, scene: Scene<'_>) {
+    /// Takes in a message; says whether it was worth something.
+    pub fn observe(&mut self, number: u64, name: &str, message: Message, scene: Scene<'_>) -> bool {
+        if self.is_copy(name, &message) {
+            return false;
+        }
         *self.counts.entry(name.to_owned()).or_default() += 1;
         let is_first = self.begun.insert(name.to_owned());
         // Where the recording does not say it, the first message of a topic may be one that was stored.
         let stale = message.retain.unwrap_or(is_first);
         if !stale && self.known.again(name, &message.payload) {
             self.twice += 1;
-            return;
+            return true;
         }
         self.stale += u64::from(stale);
         let payload = Payload::keep(message.payload);
@@ -137,6 +150,36 @@ impl Vehicle {
         due.sort_by_key(|arrived| arrived.at.moment);
         for arrived in due {
             self.pass(arrived, scene);
+        }
+        true
+    }
+
+    /// Whether a broker hands on what is seen at its sender, too.
+    fn is_copy(&mut self, name: &str, message: &Message) -> bool {
+        let Some(carried) = message.carried else { return false };
+        if carried.sent {
+            self.first_hand.insert(name.to_owned(), message.at);
+            return false;
+        }
+        let is_recent = |at: &Option<jiff::Timestamp>| match (at, message.at) {
+            (Some(at), Some(now)) => now.duration_since(*at).unsigned_abs() <= FIRST_HAND,
+            _ => true,
+        };
+        self.first_hand.get(name).is_some_and(is_recent)
+    }
+
+    /// The header of a judge of one of its sides, once its version is known.
+    pub fn own_header(&self, role: Role) -> Option<RunHeader> {
+        let sides = self.sides.as_ref()?;
+        Some(self.header(role, &sides.pack))
+    }
+
+    /// Takes over what was found of a connection.
+    pub fn wired(&mut self, role: Role, outcome: Outcome, scene: Scene<'_>) {
+        let mut sides = self.sides.iter_mut().flat_map(|sides| &mut sides.all);
+        if let Some(side) = sides.find(|side| side.role == role) {
+            self.wired = true;
+            side.wired(outcome, scene);
         }
     }
 
@@ -360,11 +403,19 @@ impl Vehicle {
         }
     }
 
-    /// What came out, version by version.
-    pub fn finish(mut self, scene: Scene<'_>) -> Vec<VehicleResult> {
+    /// Nothing comes any more that would say which version it speaks.
+    pub fn ready(&mut self, scene: Scene<'_>) {
         for arrived in self.held() {
             self.pass(arrived, scene);
         }
+        if self.sides.is_none() && self.foreign.is_none() {
+            self.settle(scene, true);
+        }
+    }
+
+    /// What came out, version by version.
+    pub fn finish(mut self, scene: Scene<'_>) -> Vec<VehicleResult> {
+        self.ready(scene);
         let last = self.conclude(scene);
         self.earlier.push(last);
         self.earlier
@@ -407,7 +458,7 @@ impl Vehicle {
             holes: std::mem::take(&mut self.continuity).holes,
             twice: std::mem::take(&mut self.twice),
             retained: std::mem::take(&mut self.stale),
-            vantage: "subscriber".to_owned(),
+            vantage: if self.wired { "tap" } else { "subscriber" }.to_owned(),
             sides,
         }
     }

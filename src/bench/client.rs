@@ -7,12 +7,13 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use rumqttc::{
-    AsyncClient, Event, EventLoop, Incoming, LastWill, MqttOptions, NetworkOptions, QoS, SubscribeFilter,
-    SubscribeReasonCode, TlsConfiguration, Transport,
+    AsyncClient, ConnectReturnCode, ConnectionError, Event, EventLoop, Incoming, LastWill, MqttOptions, NetworkOptions,
+    QoS, StateError, SubscribeFilter, SubscribeReasonCode,
 };
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
+use super::dial::{Bridge, dial, unreachable};
 use super::endpoint::Endpoint;
 use crate::bench::Outgoing;
 
@@ -75,9 +76,30 @@ impl Client {
     #[must_use]
     pub fn open(options: &ClientOptions) -> (Self, mpsc::Receiver<ClientEvent>) {
         let (events, receiver) = mpsc::channel(256);
-        let (requests, event_loop) = connection(options);
-        let subscriptions = options.subscriptions.clone();
-        let running = tokio::spawn(run(event_loop, requests.clone(), subscriptions, events));
+        let endpoint = &options.endpoint;
+        // rumqttc knows TCP only; the rest is ours, so that broker, tap and client have one way to be secured.
+        let bridge = match (&endpoint.tls, &endpoint.websocket) {
+            (None, None) => Ok(None),
+            _ => Bridge::open().map(Some),
+        };
+        let at = match &bridge {
+            Ok(Some(bridge)) => ("127.0.0.1".to_owned(), bridge.port()),
+            _ => (endpoint.host.clone(), endpoint.port),
+        };
+        let (requests, event_loop) = connection(options, at);
+        let run = Run {
+            endpoint: endpoint.clone(),
+            requests: requests.clone(),
+            subscriptions: options.subscriptions.clone(),
+            events,
+        };
+        let running = tokio::spawn(async move {
+            match bridge {
+                Ok(None) => run.carry_on(event_loop).await,
+                Ok(Some(bridge)) => run.over(bridge, event_loop).await,
+                Err(error) => run.lost(error.to_string()).await,
+            }
+        });
         (Self { requests, running }, receiver)
     }
 
@@ -113,12 +135,8 @@ fn quality(qos: u8) -> QoS {
     }
 }
 
-fn connection(options: &ClientOptions) -> (AsyncClient, EventLoop) {
-    let mut mqtt = MqttOptions::new(
-        options.client_id.clone(),
-        options.endpoint.host.clone(),
-        options.endpoint.port,
-    );
+fn connection(options: &ClientOptions, (host, port): (String, u16)) -> (AsyncClient, EventLoop) {
+    let mut mqtt = MqttOptions::new(options.client_id.clone(), host, port);
     mqtt.set_max_packet_size(LARGEST_PACKET, LARGEST_PACKET);
     // rumqttc panics on fractions of the first second.
     mqtt.set_keep_alive(Duration::from_secs(options.keep_alive.as_secs()));
@@ -135,9 +153,6 @@ fn connection(options: &ClientOptions) -> (AsyncClient, EventLoop) {
     if let Some(credentials) = &options.endpoint.credentials {
         mqtt.set_credentials(credentials.username.clone(), credentials.password.clone());
     }
-    if let Some(tls) = &options.endpoint.tls {
-        mqtt.set_transport(Transport::Tls(TlsConfiguration::Rustls(tls.clone())));
-    }
     let (client, mut event_loop) = AsyncClient::new(mqtt, REQUESTS);
     let mut network = NetworkOptions::new();
     network.set_tcp_nodelay(true);
@@ -145,49 +160,156 @@ fn connection(options: &ClientOptions) -> (AsyncClient, EventLoop) {
     (client, event_loop)
 }
 
-async fn run(
-    mut event_loop: EventLoop,
+/// A connection from its beginning to its end.
+struct Run {
+    endpoint: Endpoint,
     requests: AsyncClient,
     subscriptions: Vec<(String, u8)>,
     events: mpsc::Sender<ClientEvent>,
-) {
-    let lost = async |reason: String| {
-        let _ = events.send(ClientEvent::Lost(reason)).await;
-    };
-    loop {
-        let event = match event_loop.poll().await {
-            Ok(event) => event,
-            Err(error) => return lost(error.to_string()).await,
+}
+
+/// Ends a task when it is dropped.
+struct Ending(JoinHandle<()>);
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+impl Run {
+    async fn lost(&self, reason: String) {
+        tracing::debug!(broker = self.endpoint.address(), reason, "a connection is lost");
+        let _ = self.events.send(ClientEvent::Lost(reason)).await;
+    }
+
+    /// Over a connection that the client cannot open by itself.
+    async fn over(self, bridge: Bridge, event_loop: EventLoop) {
+        let stream = match dial(&self.endpoint).await {
+            Ok(stream) => stream,
+            Err(reason) => return self.lost(reason).await,
         };
-        let told = match event {
-            Event::Incoming(Incoming::ConnAck(_)) if subscriptions.is_empty() => ClientEvent::Connected,
-            Event::Incoming(Incoming::ConnAck(_)) => {
-                let filters = subscriptions
-                    .iter()
-                    .map(|(filter, qos)| SubscribeFilter::new(filter.clone(), quality(*qos)));
-                if let Err(error) = requests.try_subscribe_many(filters) {
-                    return lost(error.to_string()).await;
+        let mut bridge = Ending(tokio::spawn(bridge.carry(stream)));
+        self.carry_on(event_loop).await;
+        // What was sent last is still on its way.
+        let _ = tokio::time::timeout(GOODBYE_LIMIT, &mut bridge.0).await;
+    }
+
+    async fn carry_on(self, mut event_loop: EventLoop) {
+        let mut accepted = false;
+        loop {
+            let event = match event_loop.poll().await {
+                Ok(event) => event,
+                Err(error) => return self.lost(why(&error, accepted, &self.endpoint)).await,
+            };
+            let told = match event {
+                Event::Incoming(Incoming::ConnAck(_)) => {
+                    accepted = true;
+                    if self.subscriptions.is_empty() {
+                        ClientEvent::Connected
+                    } else {
+                        let filters = self.subscriptions.iter();
+                        let filters = filters.map(|(filter, qos)| SubscribeFilter::new(filter.clone(), quality(*qos)));
+                        if let Err(error) = self.requests.try_subscribe_many(filters) {
+                            return self.lost(error.to_string()).await;
+                        }
+                        continue;
+                    }
                 }
-                continue;
-            }
-            Event::Incoming(Incoming::SubAck(answer)) => {
-                if answer.return_codes.contains(&SubscribeReasonCode::Failure) {
-                    return lost("the broker refused a subscription".to_owned()).await;
+                Event::Incoming(Incoming::SubAck(answer)) => {
+                    let refused = answer.return_codes.iter().zip(&self.subscriptions);
+                    let refused = refused.filter(|(code, _)| **code == SubscribeReasonCode::Failure);
+                    let refused: Vec<&str> = refused.map(|(_, (filter, _))| filter.as_str()).collect();
+                    if !refused.is_empty() {
+                        return self.lost(format!("{REFUSED_SUBSCRIPTION}{}", refused.join(", "))).await;
+                    }
+                    ClientEvent::Connected
                 }
-                ClientEvent::Connected
+                Event::Incoming(Incoming::Publish(message)) => ClientEvent::Message {
+                    topic: message.topic,
+                    payload: message.payload,
+                    qos: message.qos as u8,
+                    retain: message.retain,
+                    dup: message.dup,
+                },
+                Event::Outgoing(rumqttc::Outgoing::Disconnect) => return,
+                _ => continue,
+            };
+            if self.events.send(told).await.is_err() {
+                return;
             }
-            Event::Incoming(Incoming::Publish(message)) => ClientEvent::Message {
-                topic: message.topic,
-                payload: message.payload,
-                qos: message.qos as u8,
-                retain: message.retain,
-                dup: message.dup,
-            },
-            Event::Outgoing(rumqttc::Outgoing::Disconnect) => return,
-            _ => continue,
-        };
-        if events.send(told).await.is_err() {
-            return;
         }
+    }
+}
+
+/// How a loss begins that is a refused subscription.
+pub(crate) const REFUSED_SUBSCRIPTION: &str = "it refuses the subscription to ";
+
+/// Why a connection is lost, or was never there, as the end of a sentence about the broker.
+fn why(error: &ConnectionError, accepted: bool, endpoint: &Endpoint) -> String {
+    let user = endpoint.credentials.as_ref().map(|credentials| &credentials.username);
+    match error {
+        ConnectionError::ConnectionRefused(
+            code @ (ConnectReturnCode::NotAuthorized | ConnectReturnCode::BadUserNamePassword),
+        ) => match user {
+            Some(user) => format!("it refuses the login of `{user}` ({code:?}); its password may be another one"),
+            None => format!("it lets nobody in without a login ({code:?}); give the user name with `username`"),
+        },
+        ConnectionError::ConnectionRefused(ConnectReturnCode::BadClientId) => {
+            "it does not allow the client id (BadClientId); see `client-id`".to_owned()
+        }
+        ConnectionError::ConnectionRefused(code) => format!("it refuses the connection ({code:?})"),
+        ConnectionError::Io(error) if !accepted && is_nobody_there(error) => unreachable(error),
+        ConnectionError::Io(_) | ConnectionError::MqttState(_) if !accepted => {
+            let hint = match (&endpoint.tls, &endpoint.websocket) {
+                (None, None) => "; where TLS is spoken it is mqtts://, and ws:// or wss:// with WebSocket",
+                _ => "",
+            };
+            format!("it ends the connection before it accepts it ({}){hint}", short(error))
+        }
+        other => short(other),
+    }
+}
+
+fn is_nobody_there(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind;
+    // Neither is an answer of somebody who is there.
+    !matches!(
+        error.kind(),
+        ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted | ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe
+    )
+}
+
+fn short(error: &ConnectionError) -> String {
+    match error {
+        ConnectionError::Io(error) | ConnectionError::MqttState(StateError::Io(error)) => error.to_string(),
+        ConnectionError::MqttState(StateError::Deserialization(error)) => error.to_string(),
+        ConnectionError::MqttState(error) => error.to_string(),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::endpoint::Credentials;
+
+    #[test]
+    fn a_loss_is_told_with_what_can_be_done() {
+        let mut endpoint = Endpoint::parse("mqtt://broker.local", None, None).unwrap();
+        let told = |error: ConnectionError, accepted, endpoint: &Endpoint| why(&error, accepted, endpoint);
+        let refused = || ConnectionError::ConnectionRefused(ConnectReturnCode::NotAuthorized);
+        let reset = || ConnectionError::MqttState(StateError::Io(std::io::ErrorKind::ConnectionReset.into()));
+        let nobody = || ConnectionError::Io(std::io::ErrorKind::ConnectionRefused.into());
+        assert!(told(refused(), false, &endpoint).contains("`username`"));
+        assert!(told(reset(), false, &endpoint).contains("mqtts://"));
+        assert_eq!(told(reset(), true, &endpoint), "connection reset");
+        assert!(told(nobody(), false, &endpoint).starts_with("it is not reachable"));
+        endpoint.credentials = Some(Credentials {
+            username: "me".to_owned(),
+            password: "secret".to_owned(),
+        });
+        let text = told(refused(), false, &endpoint);
+        assert!(text.contains("login of `me`") && !text.contains("secret"), "{text}");
     }
 }

@@ -1,12 +1,15 @@
 //! Where a broker is and how to get in.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tokio_rustls::rustls::ClientConfig;
 
 use crate::bench::LinkError;
 use crate::bench::tls;
+
+/// The path of a WebSocket unless said, as most brokers have it.
+const USUAL_PATH: &str = "/mqtt";
 
 /// User name and password for a broker.
 #[derive(Clone, PartialEq, Eq)]
@@ -35,6 +38,10 @@ pub struct Endpoint {
     pub port: u16,
     /// Set for TLS.
     pub tls: Option<Arc<ClientConfig>>,
+    /// Set for WebSocket: the path, with the query behind it, which may hold a token.
+    pub websocket: Option<String>,
+    /// PEM file with the authority that is trusted there, and where files are fetched from.
+    pub authority: Option<PathBuf>,
     /// How to log in.
     pub credentials: Option<Credentials>,
 }
@@ -47,21 +54,33 @@ impl Endpoint {
             host: address.ip().to_string(),
             port: address.port(),
             tls: None,
+            websocket: None,
+            authority: None,
             credentials: None,
         }
     }
 
-    /// Reads `mqtt://host:port`, `mqtts://host:port` or `host:port`; the port may be left out. `authority` is a
-    /// PEM file to check an `mqtts` broker's certificate against, instead of what the system trusts.
+    /// Reads `mqtt://host:port`, `mqtts://host:port`, `ws://host:port/path`, `wss://host:port/path` or `host:port`; port
+    /// and path may be left out. `authority` is a PEM file to check the certificate of a broker with TLS against, instead
+    /// of what the system trusts.
     ///
     /// # Errors
     /// [`LinkError::Setup`] when the address cannot be read or the certificates do not work.
     pub fn parse(url: &str, authority: Option<&Path>, credentials: Option<Credentials>) -> Result<Self, LinkError> {
         let wrong = |what: &str| LinkError::Setup(format!("`{url}` is not a broker: {what}"));
-        let (secure, rest) = match url.split_once("://") {
-            None | Some(("mqtt" | "tcp", _)) => (false, url.rsplit("://").next().unwrap_or(url)),
-            Some(("mqtts" | "ssl" | "tls", rest)) => (true, rest),
-            Some((scheme, _)) => return Err(wrong(&format!("`{scheme}` is not supported, use mqtt:// or mqtts://"))),
+        let (secure, web, rest) = match url.split_once("://") {
+            None | Some(("mqtt" | "tcp", _)) => (false, false, url.rsplit("://").next().unwrap_or(url)),
+            Some(("mqtts" | "ssl" | "tls", rest)) => (true, false, rest),
+            Some(("ws", rest)) => (false, true, rest),
+            Some(("wss", rest)) => (true, true, rest),
+            Some((scheme, _)) => {
+                let what = format!("`{scheme}` is not supported, use mqtt://, mqtts://, ws:// or wss://");
+                return Err(wrong(&what));
+            }
+        };
+        let (rest, path) = match rest.find('/').filter(|_| web) {
+            Some(slash) if slash + 1 < rest.len() => rest.split_at(slash),
+            _ => (rest, USUAL_PATH),
         };
         let rest = rest.strip_suffix('/').unwrap_or(rest);
         if rest.contains(['@', '/', '?']) {
@@ -69,13 +88,19 @@ impl Endpoint {
                 "only host and port belong there; user and password are given apart",
             ));
         }
+        let usual_port = match (web, secure) {
+            (false, false) => 1883,
+            (false, true) => 8883,
+            (true, false) => 80,
+            (true, true) => 443,
+        };
         let (host, port) = match rest.rsplit_once(':') {
             Some((host, port)) if !host.ends_with(':') && (!host.contains(':') || host.ends_with(']')) => (
                 host,
                 port.parse()
                     .map_err(|_| wrong("the port is not a number up to 65535"))?,
             ),
-            _ => (rest, if secure { 8883 } else { 1883 }),
+            _ => (rest, usual_port),
         };
         let host = host.trim_start_matches('[').trim_end_matches(']');
         if host.is_empty() {
@@ -85,6 +110,8 @@ impl Endpoint {
             host: host.to_owned(),
             port,
             tls: if secure { Some(tls::client(authority)?) } else { None },
+            websocket: web.then(|| path.to_owned()),
+            authority: authority.map(Path::to_path_buf),
             credentials,
         })
     }
@@ -125,6 +152,21 @@ mod tests {
             let endpoint = Endpoint::parse(url, None, None).unwrap();
             assert_eq!((endpoint.host.as_str(), endpoint.port), (host, port), "{url}");
         }
+    }
+
+    #[test]
+    fn a_websocket_has_a_path() {
+        let read = |url| {
+            let endpoint = Endpoint::parse(url, None, None).unwrap();
+            (endpoint.address(), endpoint.websocket.unwrap())
+        };
+        let expected = |address: &str, path: &str| (address.to_owned(), path.to_owned());
+        assert_eq!(read("ws://broker.local"), expected("broker.local:80", "/mqtt"));
+        assert_eq!(read("ws://broker.local:9001/"), expected("broker.local:9001", "/mqtt"));
+        assert_eq!(
+            read("ws://[::1]:9001/a/b?token=c"),
+            expected("[::1]:9001", "/a/b?token=c")
+        );
     }
 
     #[test]

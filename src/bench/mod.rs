@@ -2,11 +2,16 @@
 //! connections to a broker, certificates and ports.
 
 pub mod client;
+pub(crate) mod dial;
 pub mod endpoint;
 mod heard;
 pub(crate) mod inbox;
 pub(crate) mod listen;
+pub mod own;
+pub(crate) mod stream;
 pub mod tls;
+pub(crate) mod web;
+mod websocket;
 
 use crate::suite::model::ServeBehaviour;
 
@@ -18,6 +23,17 @@ pub enum Vantage {
     Tap,
     /// Only what the broker delivers.
     Subscriber,
+}
+
+impl Vantage {
+    /// The word used in records and results.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Tap => "tap",
+            Self::Subscriber => "subscriber",
+        }
+    }
 }
 
 /// A message the harness publishes.
@@ -47,12 +63,12 @@ pub struct Offer {
 /// Why a link could not do what it was asked.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The broker is gone or was never there.
-    #[error("the broker at {address} is not reachable: {reason}")]
+    /// The broker is gone, was never there, or lets nobody in.
+    #[error("the broker at {address} cannot be used: {reason}")]
     Broker {
         /// Where it should be.
         address: String,
-        /// What the transport said.
+        /// Why, as the end of a sentence about the broker.
         reason: String,
     },
     /// A port could not be opened.
@@ -62,6 +78,18 @@ pub enum LinkError {
         address: String,
         /// What the system said.
         reason: String,
+    },
+    /// The broker does not allow what the harness has to do.
+    #[error(
+        "the broker at {address} does not allow {what}; these are the access rules it needs, as mosquitto has them:\n{rules}"
+    )]
+    Forbidden {
+        /// Where it is.
+        address: String,
+        /// What it refuses.
+        what: String,
+        /// What would allow it.
+        rules: String,
     },
     /// The link cannot do that from its vantage.
     #[error("{what} needs the tap, and this run only has vantage `subscriber`")]

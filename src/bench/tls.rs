@@ -56,7 +56,7 @@ pub(crate) fn client(authority: Option<&Path>) -> Result<Arc<ClientConfig>, Link
     Ok(Arc::new(config))
 }
 
-fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, LinkError> {
+pub(super) fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, LinkError> {
     let all = CertificateDer::pem_file_iter(path).map_err(|error| unreadable(path, &error))?;
     let all: Vec<_> = all
         .collect::<Result<_, _>>()

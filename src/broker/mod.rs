@@ -13,7 +13,7 @@ use tokio::task::JoinHandle;
 
 use crate::bench::LinkError;
 
-pub use self_test::self_test;
+pub use self_test::{Tested, self_test};
 
 mod self_test;
 

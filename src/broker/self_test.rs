@@ -7,21 +7,36 @@ use bytes::Bytes;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use crate::bench::client::{Client, ClientEvent, ClientOptions};
+use crate::bench::client::{Client, ClientEvent, ClientOptions, REFUSED_SUBSCRIPTION};
 use crate::bench::endpoint::Endpoint;
+use crate::bench::own::OwnNames;
 use crate::bench::{LinkError, Outgoing};
 
 /// How long each message may take.
 const LIMIT: Duration = Duration::from_secs(5);
 
+/// What a self-test found out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Tested {
+    /// The broker keeps the rules.
+    Keeps,
+    /// It does not let the harness use topics of its own, so that nothing could be tested.
+    Forbids(String),
+}
+
 /// Tests QoS, retained messages and wills of a broker, on topics of its own that are cleaned up afterwards.
 ///
 /// # Errors
 /// [`LinkError::Broker`] when it cannot be reached, [`LinkError::Setup`] naming the rule it breaks.
-pub async fn self_test(endpoint: &Endpoint) -> Result<(), LinkError> {
-    let base = format!("vda5050-tck/self-test/{}", uuid::Uuid::new_v4().simple());
-    let mut watcher = Tester::connect(endpoint, "watcher", None, vec![(format!("{base}/#"), 2)]).await?;
-    let result = check(endpoint, &base, &mut watcher).await;
+pub async fn self_test(endpoint: &Endpoint, own: &OwnNames) -> Result<Tested, LinkError> {
+    let base = format!("{}/self-test/{}", own.topics, uuid::Uuid::new_v4().simple());
+    let mut watcher = match Tester::connect((endpoint, own), "watcher", None, vec![(format!("{base}/#"), 2)]).await {
+        Err(LinkError::Broker { reason, .. }) if reason.starts_with(REFUSED_SUBSCRIPTION) => {
+            return Ok(Tested::Forbids(format!("the subscription to {base}/#")));
+        }
+        watcher => watcher?,
+    };
+    let result = check((endpoint, own), &base, &mut watcher).await;
     // Whatever came out of it, nothing stays behind on the broker.
     for name in ["retained", "will"] {
         watcher.publish(message(&format!("{base}/{name}"), "", 1, true))?;
@@ -30,9 +45,19 @@ pub async fn self_test(endpoint: &Endpoint) -> Result<(), LinkError> {
     result
 }
 
-async fn check(endpoint: &Endpoint, base: &str, watcher: &mut Tester<'_>) -> Result<(), LinkError> {
+async fn check(
+    (endpoint, own): (&Endpoint, &OwnNames),
+    base: &str,
+    watcher: &mut Tester<'_>,
+) -> Result<Tested, LinkError> {
+    let topic = format!("{base}/qos");
+    if !watcher.is_heard(&topic).await? {
+        return Ok(Tested::Forbids(format!(
+            "messages of client {} on {topic}",
+            watcher.client_id
+        )));
+    }
     for qos in 0..=2 {
-        let topic = format!("{base}/qos");
         watcher.publish(message(&topic, "x", qos, false))?;
         let got = watcher.message(&format!("a message published with QoS {qos}")).await?;
         if got.qos != qos {
@@ -50,7 +75,7 @@ async fn check(endpoint: &Endpoint, base: &str, watcher: &mut Tester<'_>) -> Res
     }
     watcher.publish(message(&topic, "new", 1, true))?;
     watcher.message("a second retained message").await?;
-    let mut fresh = Tester::connect(endpoint, "fresh", None, vec![(topic.clone(), 2)]).await?;
+    let mut fresh = Tester::connect((endpoint, own), "fresh", None, vec![(topic.clone(), 2)]).await?;
     let stored = fresh.message("the stored message for a fresh subscriber").await?;
     if !stored.retain || stored.qos != 1 || stored.payload != "new" {
         let text = format!(
@@ -63,9 +88,15 @@ async fn check(endpoint: &Endpoint, base: &str, watcher: &mut Tester<'_>) -> Res
     }
     fresh.client.disconnect().await;
     let topic = format!("{base}/will");
-    let orderly = Tester::connect(endpoint, "orderly", Some(message(&topic, "orderly", 1, true)), vec![]).await?;
+    let orderly = Tester::connect(
+        (endpoint, own),
+        "orderly",
+        Some(message(&topic, "orderly", 1, true)),
+        vec![],
+    )
+    .await?;
     orderly.client.disconnect().await;
-    let gone = Tester::connect(endpoint, "gone", Some(message(&topic, "gone", 1, true)), vec![]).await?;
+    let gone = Tester::connect((endpoint, own), "gone", Some(message(&topic, "gone", 1, true)), vec![]).await?;
     drop(gone);
     let will = watcher.message("the last will of a connection that broke off").await?;
     if will.payload != "gone" {
@@ -77,11 +108,12 @@ async fn check(endpoint: &Endpoint, base: &str, watcher: &mut Tester<'_>) -> Res
             &format!("a last will with QoS 1 arrives with QoS {}", will.qos),
         ));
     }
-    Ok(())
+    Ok(Tested::Keeps)
 }
 
 struct Tester<'a> {
     endpoint: &'a Endpoint,
+    client_id: String,
     client: Client,
     events: mpsc::Receiver<ClientEvent>,
     early: VecDeque<Got>,
@@ -105,14 +137,15 @@ impl Got {
 
 impl<'a> Tester<'a> {
     async fn connect(
-        endpoint: &'a Endpoint,
+        (endpoint, own): (&'a Endpoint, &OwnNames),
         name: &str,
         will: Option<Outgoing>,
         subscriptions: Vec<(String, u8)>,
     ) -> Result<Self, LinkError> {
+        let client_id = own.client(name);
         let (client, events) = Client::open(&ClientOptions {
             endpoint: endpoint.clone(),
-            client_id: format!("tck-{name}-{}", uuid::Uuid::new_v4().simple()),
+            client_id: client_id.clone(),
             keep_alive: Duration::from_secs(30),
             clean_session: true,
             will,
@@ -120,6 +153,7 @@ impl<'a> Tester<'a> {
         });
         let mut tester = Self {
             endpoint,
+            client_id,
             client,
             events,
             early: VecDeque::new(),
@@ -145,6 +179,17 @@ impl<'a> Tester<'a> {
             Ok(())
         } else {
             Err(self.endpoint.lost("the connection ended"))
+        }
+    }
+
+    /// Whether a message comes back at all. A broker with access rules drops what it does not allow without a word.
+    async fn is_heard(&mut self, topic: &str) -> Result<bool, LinkError> {
+        self.publish(message(topic, "is anybody there?", 1, false))?;
+        match timeout(LIMIT, self.events.recv()).await {
+            Ok(Some(ClientEvent::Message { .. })) => Ok(true),
+            Ok(Some(ClientEvent::Lost(reason))) => Err(self.endpoint.lost(reason)),
+            Ok(Some(ClientEvent::Connected) | None) => Err(self.endpoint.lost("the connection ended")),
+            Err(_) => Ok(false),
         }
     }
 

@@ -40,8 +40,6 @@ pub struct Lines {
     counted: Counted,
     /// Lines that were read ahead in vain.
     ahead: std::collections::VecDeque<Vec<u8>>,
-    /// What was read and given back.
-    back: Option<Item>,
 }
 
 /// What comes next of a recording.
@@ -57,15 +55,7 @@ impl Lines {
             mapping,
             counted: Counted::default(),
             ahead: std::collections::VecDeque::new(),
-            back: None,
         }
-    }
-
-    /// Gives back what was read last, to be read again.
-    #[must_use]
-    pub fn again(mut self, item: Option<Item>) -> Self {
-        self.back = item;
-        self
     }
 
     /// How much was read so far.
@@ -88,9 +78,6 @@ impl Lines {
     /// # Errors
     /// What the operating system or the unpacking says.
     pub fn read(&mut self) -> Read {
-        if let Some(item) = self.back.take() {
-            return Ok(Some(item));
-        }
         while let Some(line) = self.line()? {
             self.counted.lines += 1;
             if let Some(item) = self.item(&line)? {
@@ -154,6 +141,7 @@ impl Lines {
             retain: None,
             place,
             after_gap: false,
+            carried: None,
         })))
     }
 
@@ -191,6 +179,7 @@ impl Lines {
             retain,
             place,
             after_gap: false,
+            carried: None,
         }))
     }
 

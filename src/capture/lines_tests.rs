@@ -18,6 +18,7 @@ fn shown(items: &[Item]) -> Vec<String> {
     let messages = items.iter().map(|item| match item {
         Item::Message(message) => format!("{} {}", message.topic, String::from_utf8_lossy(&message.payload)),
         Item::Record(record) => format!("record {}", record.seq),
+        Item::Wire(_) => "wire".to_owned(),
     });
     messages.collect()
 }
@@ -25,7 +26,7 @@ fn shown(items: &[Item]) -> Vec<String> {
 fn message(item: &Item) -> &Message {
     match item {
         Item::Message(message) => message,
-        Item::Record(_) => panic!("a record"),
+        Item::Record(_) | Item::Wire(_) => panic!("no message"),
     }
 }
 

@@ -1,20 +1,30 @@
-//! Recordings of other tools: what was published on a broker, told line by line.
+//! Recordings of other tools: what was published on a broker, or captured on a network.
 //!
-//! [`Lines`] reads one recording and yields a [`Message`] for each line that holds one; what holds none is counted.
+//! [`Lines`] reads a recording in lines and yields a [`Message`] for each that holds one; what holds none is counted.
+//! [`Packets`] reads a capture of network traffic, where connections are seen as well, and [`Mcap`] the container of that
+//! name. [`Recorded`] is one of them,
 //! [`input`] opens files and standard input, packed or not, [`merge`] makes one stream of several recordings.
 //! What the messages mean is left to others.
 
 mod clock_text;
 pub mod input;
 mod lines;
+mod mcap;
 mod members;
 pub mod merge;
+pub(crate) mod packets;
+mod recorded;
+pub mod taped;
 
 use bytes::Bytes;
 
 pub use lines::{Counted, Lines, Read};
+pub use mcap::Mcap;
+pub use packets::Packets;
+pub use recorded::Recorded;
 
 use crate::journal::Record;
+use crate::journal::event::{Close, Packet};
 
 /// Where a message stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +52,80 @@ pub struct Message {
     pub place: Place,
     /// Whether the recorder says that it saw nothing for a while before this message.
     pub after_gap: bool,
+    /// The connection it came by, where packets were captured.
+    pub carried: Option<Carried>,
+}
+
+/// How a message came by a captured connection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Carried {
+    /// Number of the connection.
+    pub connection: u64,
+    /// Whether the client sent it; otherwise its broker handed it on.
+    pub sent: bool,
+}
+
+/// What is seen of a connection between a client and its broker.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wire {
+    /// When.
+    pub at: Option<jiff::Timestamp>,
+    /// Number of the connection.
+    pub connection: u64,
+    /// Whether it is certain which end is the client.
+    pub certain: bool,
+    /// What.
+    pub event: WireEvent,
+}
+
+/// What happens on a connection.
+#[derive(Clone, Debug, PartialEq)]
+pub enum WireEvent {
+    /// A packet.
+    Packet {
+        /// The packet.
+        packet: Packet,
+        /// Whether the client sent it.
+        sent: bool,
+    },
+    /// Something is missing in one direction.
+    Gap {
+        /// Whether the client sent it.
+        sent: bool,
+    },
+    /// The end.
+    Closed {
+        /// How.
+        how: Close,
+    },
+}
+
+/// What comes next of several recordings.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    /// A message.
+    Message(Message),
+    /// Something of a connection.
+    Wire(Wire),
+}
+
+impl Carried {
+    /// How a subscriber beside the tap hears what somebody may have sent through the tap.
+    pub const BESIDE_TAP: Self = Self {
+        connection: 0,
+        sent: false,
+    };
+}
+
+impl Told {
+    /// When.
+    #[must_use]
+    pub fn at(&self) -> Option<jiff::Timestamp> {
+        match self {
+            Self::Message(message) => message.at,
+            Self::Wire(wire) => wire.at,
+        }
+    }
 }
 
 /// What a line holds.
@@ -51,6 +135,8 @@ pub enum Item {
     Message(Message),
     /// A record of one of our own journals.
     Record(Box<Record>),
+    /// Something of a connection.
+    Wire(Box<Wire>),
 }
 
 /// Names of the members that hold time, topic and payload, where a recording has names of its own. A dot leads inside:

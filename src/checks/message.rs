@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::orders::Malformed;
-use super::traffic::{HEADER, Traffic, broken, quote, remark};
+use super::traffic::{Traffic, broken, quote, remark};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::journal::Entry;
 use crate::journal::json::JsonProblem;
-use crate::pack::{Finding, FindingKind};
+use crate::pack::{Finding, FindingKind, Pack};
 
 /// `message/schema`.
 pub(super) const SCHEMA: Check = Check {
@@ -229,7 +229,7 @@ impl Running for Schema {
                 continue;
             }
             let text = format!("{topic}{}: {}", finding.path, finding.message);
-            for id in requirements(topic, &finding, value) {
+            for id in requirements(context.pack, topic, &finding, value) {
                 findings.push(broken(id, seq, text.clone()));
             }
             deep_misspelling(topic, &finding, value, seq, findings);
@@ -267,7 +267,7 @@ fn deep_misspelling(topic: &str, finding: &Finding, value: &Value, seq: u64, fin
 }
 
 /// Every requirement that a schema finding breaks; none for what another check judges by a milder ruling.
-fn requirements(topic: &str, finding: &Finding, value: &Value) -> Vec<&'static str> {
+fn requirements<'p>(pack: &'p Pack, topic: &str, finding: &Finding, value: &Value) -> Vec<&'p str> {
     let path: Vec<&str> = finding.path.split('/').skip(1).collect();
     if finding.kind == FindingKind::Pattern && matches!(path[..], ["timestamp" | "version"]) {
         return Vec::new();
@@ -284,7 +284,7 @@ fn requirements(topic: &str, finding: &Finding, value: &Value) -> Vec<&'static s
         FindingKind::Type => Some("JSON-06"),
         FindingKind::Missing | FindingKind::Pattern | FindingKind::Other => None,
     });
-    all.extend(of_field(topic, &path, finding.kind));
+    all.extend(pack.requirement_of(topic, &path, finding.kind));
     if topic == "visualization" && !all.contains(&"VIS-01") {
         all.push("VIS-01");
     }
@@ -303,81 +303,6 @@ fn special(text: &str) -> bool {
     ["nan", "inf", "infinity"]
         .iter()
         .any(|name| text.eq_ignore_ascii_case(name))
-}
-
-fn of_field(topic: &str, path: &[&str], kind: FindingKind) -> Option<&'static str> {
-    let first = *path.first()?;
-    let missing = kind == FindingKind::Missing;
-    if path.len() == 1 && HEADER.contains(&first) {
-        return missing.then_some("HDR-01");
-    }
-    match (topic, first) {
-        ("connection", "connectionState") => Some("CONN-10"),
-        ("visualization", _) => Some("VIS-01"),
-        ("state", "operatingMode") if !missing => Some("MODE-01"),
-        ("state", _) if path.len() == 1 => Some("STATE-MSG-01"),
-        ("state", "errors") if path.contains(&"errorReferences") => Some("ERR-05"),
-        ("state", "errors") => Some("ERR-02"),
-        ("state", "information") => Some("INFO-01"),
-        ("state", "actionStates") => Some("STATE-MSG-14"),
-        ("state", "maps") => Some("MAP-12"),
-        ("state", "batteryState") => Some("STATE-MSG-15"),
-        ("state", "agvPosition" | "velocity") => Some("STATE-MSG-05"),
-        // A check of its own tells apart what is wrong with a trajectory.
-        ("state", "edgeStates") if path.contains(&"trajectory") => None,
-        ("state", "nodeStates" | "edgeStates") => Some("STATE-MSG-13"),
-        ("order" | "instantActions", _) => of_command(topic, path, kind),
-        ("factsheet", _) if path.len() == 1 && missing => Some("FACT-02"),
-        ("factsheet", "typeSpecification") => Some("FACT-03"),
-        ("factsheet", "physicalParameters") => Some("FACT-04"),
-        ("factsheet", "protocolLimits") => Some("FACT-05"),
-        ("factsheet", "protocolFeatures") if path.contains(&"agvActions") => Some("FACT-07"),
-        ("factsheet", "protocolFeatures") => Some("FACT-06"),
-        ("factsheet", "agvGeometry") => Some("FACT-08"),
-        ("factsheet", "loadSpecification") => Some("FACT-09"),
-        ("factsheet", "vehicleConfig") => Some("FACT-10"),
-        _ => None,
-    }
-}
-
-/// Fields of orders and instant actions. Arrays that are left out, parameters, trajectories, corridors and the ranges
-/// of positions have checks of their own.
-fn of_command(topic: &str, path: &[&str], kind: FindingKind) -> Option<&'static str> {
-    let missing = kind == FindingKind::Missing;
-    let in_action = path
-        .iter()
-        .rposition(|name| *name == "actions")
-        .map(|at| &path[at + 1..]);
-    match (topic, path) {
-        ("order", ["zoneSetId", ..]) => Some("ORD-MSG-03"),
-        ("order", ["edges"]) if missing => None,
-        ("order", [_]) => Some("ORD-MSG-01"),
-        ("instantActions", ["actions"]) => Some("IACT-01"),
-        _ if path
-            .iter()
-            .any(|name| matches!(*name, "actionParameters" | "trajectory" | "corridor")) =>
-        {
-            None
-        }
-        _ if in_action.is_some_and(|rest| !rest.is_empty()) => Some(match kind {
-            FindingKind::Enumeration => "ORD-MSG-16",
-            _ => "ORD-MSG-15",
-        }),
-        (_, [.., "actions"]) if missing => None,
-        ("order", ["nodes", _, "nodePosition", ..]) if kind == FindingKind::Range => None,
-        ("order", ["nodes", ..]) => Some("ORD-MSG-05"),
-        ("order", ["edges", _, "orientationType"]) => Some("ORD-MSG-16"),
-        (
-            "order",
-            ["edges", _]
-            | [
-                "edges",
-                _,
-                "edgeId" | "sequenceId" | "released" | "startNodeId" | "endNodeId" | "actions",
-            ],
-        ) => Some("ORD-MSG-18"),
-        _ => None,
-    }
 }
 
 #[derive(Default)]
@@ -399,8 +324,8 @@ impl Running for Encoding {
         for problem in parsed.problems().iter().take(8) {
             let text = format!("{topic}: {}", quote(&problem.to_string()));
             match problem {
-                // Too big to be kept is a limit of ours.
-                JsonProblem::TooBig { .. } => judged = false,
+                // Too big to be kept and too deep to be parsed are limits of ours.
+                JsonProblem::TooBig { .. } | JsonProblem::TooDeep => judged = false,
                 // Nothing, retained, clears a topic; a subscriber does not see which it was.
                 JsonProblem::Empty if message.retain.unwrap_or(matches!(topic, "connection" | "factsheet")) => {
                     judged = false;

@@ -30,6 +30,8 @@ mod header_id;
 mod instant_answers;
 mod instant_queued;
 mod instant_requests;
+#[cfg(test)]
+mod known_members;
 mod linked_state;
 mod message;
 mod motion;

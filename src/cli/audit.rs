@@ -1,14 +1,15 @@
 //! `audit`: judge what was recorded.
 
-use std::path::Path;
+use indicatif::{ProgressBar, ProgressStyle};
 
-use super::args::{Audit as Arguments, Format};
+use super::args::Audit as Arguments;
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::audit::result::{Recording, verdict_of};
-use crate::audit::{Audit, Options, own_run, page};
+use super::recordings::{broken, in_time, open, show};
+use crate::audit::result::{Recording, VehicleResult, verdict_of};
+use crate::audit::{Audit, Options, own_run};
 use crate::capture::merge::Merged;
-use crate::capture::{CaptureError, Item, Lines, Mapping, input};
+use crate::capture::{CaptureError, Item, Told};
 use crate::diagnostic::Diagnostic;
 use crate::journal::Record;
 use crate::journal::event::Event;
@@ -22,43 +23,60 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
         vehicles: arguments.vehicle.clone(),
         only: arguments.only.clone(),
     };
-    let usage = |text: String| Problem::from(Diagnostic::whole("audit", text));
     let mut audit = Audit::new(&library.rules, options.clone()).map_err(|error| usage(error.to_string()))?;
     let mut runs = Vec::new();
+    let recordings = read(arguments, &library, &options, &mut audit, &mut runs)?;
+    let mut result = audit.finish(recordings);
+    result.vehicles.extend(runs);
+    result.verdict = verdict_of(&result.vehicles);
+    if let Some(wanted) = &arguments.slice {
+        return super::slice::slice(arguments, &library, &options, &result, wanted);
+    }
+    show(&result, arguments.format)
+}
+
+/// Reads all recordings. The journals of runs are judged by themselves, the rest by the audit.
+fn read(
+    arguments: &Arguments,
+    library: &Library,
+    options: &Options,
+    audit: &mut Audit<'_>,
+    runs: &mut Vec<VehicleResult>,
+) -> Result<Vec<Recording>, Problem> {
     let mut names = Vec::new();
+    let mut units = Vec::new();
     let mut recordings = Vec::new();
     let mut of_runs = Vec::new();
     for (number, path) in arguments.captures.iter().enumerate() {
         let name = path.display().to_string();
         names.push(name.clone());
-        let mut lines = open(path, number, arguments)?;
-        match lines.read().map_err(|source| unreadable(&name, source))? {
+        let mut recorded = open(path, number, arguments)?;
+        units.push(recorded.unit());
+        match recorded.read().map_err(|source| unreadable(&name, source))? {
             Some(Item::Record(first)) if is_run(&first) => {
-                let found = own_run(&library.rules, &options, number, *first, &mut lines)
+                let found = own_run(&library.rules, options, number, *first, &mut recorded)
                     .map_err(|error| usage(format!("{name}: {error}")))?;
                 runs.push(found);
-                of_runs.push((number, lines.counted()));
+                of_runs.push((number, recorded.counted()));
             }
-            first => recordings.push((number, name, lines.again(first))),
+            first => recordings.push((number, name, recorded.again(first))),
         }
     }
     let numbers: Vec<usize> = recordings.iter().map(|(number, ..)| *number).collect();
-    let all = recordings.into_iter().map(|(_, name, lines)| (name, lines));
+    let all = recordings.into_iter().map(|(_, name, recorded)| (name, recorded));
     let mut merged = Merged::new(all.collect()).map_err(broken)?;
     let bounded = arguments.from.is_some() || arguments.to.is_some();
-    while let Some(message) = merged.read().map_err(broken)? {
-        let Some(at) = message.at else {
-            if bounded {
-                let place = format!("{}:{}", names[message.place.file], message.place.line);
-                let text = format!("{place} does not say when the message came: it can be neither before nor after");
-                return Err(usage(text));
-            }
-            audit.observe(message);
-            continue;
-        };
-        if arguments.from.is_none_or(|from| at >= from) && arguments.to.is_none_or(|to| at <= to) {
-            audit.observe(message);
+    let progress = Counting::begin();
+    while let Some(told) = merged.read().map_err(broken)? {
+        if let (true, None, Told::Message(message)) = (bounded, told.at(), &told) {
+            let place = format!("{}:{}", names[message.place.file], message.place.line);
+            let text = format!("{place} does not say when the message came: it can be neither before nor after");
+            return Err(usage(text));
         }
+        if in_time(told.at(), arguments) {
+            audit.take(told);
+        }
+        progress.one();
     }
     let counted = numbers
         .into_iter()
@@ -67,33 +85,40 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
     counted.sort_by_key(|(number, _)| *number);
     let counted = counted.into_iter().map(|(number, counted)| Recording {
         name: names[number].clone(),
+        unit: units[number].to_owned(),
         lines: counted.lines,
         skipped: counted.skipped,
     });
-    let mut result = audit.finish(counted.collect());
-    result.vehicles.extend(runs);
-    result.verdict = verdict_of(&result.vehicles);
-    match arguments.format {
-        Format::Text => super::print(&page::page(&result))?,
-        Format::Json => {
-            let text =
-                serde_json::to_string_pretty(&result).map_err(|error| Problem::Environment(error.to_string()))?;
-            super::print(&format!("{text}\n"))?
-        }
-    };
-    Ok(match result.verdict {
-        None if !result.vehicles.is_empty() => Exit::Undecided,
-        verdict => Exit::of(verdict),
-    })
+    Ok(counted.collect())
 }
 
-fn open(path: &Path, number: usize, arguments: &Arguments) -> Result<Lines, Problem> {
-    let mapping = Mapping {
-        time: arguments.time.clone(),
-        topic: arguments.topic.clone(),
-        payload: arguments.payload.clone(),
-    };
-    Ok(Lines::new(input::open(path).map_err(broken)?, number, mapping))
+/// How far the reader is, for a person who waits.
+struct Counting(ProgressBar);
+
+impl Counting {
+    fn begin() -> Self {
+        let bar = if console::user_attended_stderr() {
+            ProgressBar::new_spinner()
+        } else {
+            ProgressBar::hidden()
+        };
+        let style = ProgressStyle::with_template("{human_pos} messages, {per_sec}");
+        Self(bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner())))
+    }
+
+    fn one(&self) {
+        self.0.inc(1);
+    }
+}
+
+impl Drop for Counting {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+fn usage(text: String) -> Problem {
+    Diagnostic::whole("audit", text).into()
 }
 
 /// Whether it is the first record of one of our own runs.
@@ -106,8 +131,4 @@ fn unreadable(name: &str, source: std::io::Error) -> Problem {
         name: name.to_owned(),
         source,
     })
-}
-
-fn broken(error: CaptureError) -> Problem {
-    Diagnostic::whole("unreadable", error.to_string()).into()
 }

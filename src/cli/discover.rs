@@ -43,7 +43,7 @@ pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
 /// `init`.
 pub fn init(arguments: &Init) -> Result<Exit, Problem> {
     if let Some(folder) = &arguments.suites {
-        return export(folder);
+        return export(folder, arguments.format);
     }
     if arguments.file.exists() && !arguments.force {
         let title = format!("{} is there already", arguments.file.display());
@@ -68,6 +68,12 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
     let wishes = Wishes {
         broker: arguments.listen.at.broker.clone(),
         username: arguments.listen.at.username.clone(),
+        tls_ca: arguments
+            .listen
+            .at
+            .tls_ca
+            .as_ref()
+            .map(|file| file.display().to_string()),
         lif: arguments.lif.clone(),
         vehicle_type: arguments.vehicle_type.clone(),
     };
@@ -75,6 +81,12 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
     let shown = arguments.file.display().to_string();
     std::fs::write(&arguments.file, text)
         .map_err(|error| Problem::Environment(format!("cannot write {shown}: {error}")))?;
+    if arguments.format == Format::Json {
+        return super::print(&format!(
+            "{:#}\n",
+            json!({ "format": "vda5050-tck.init/1", "file": shown, "device": device })
+        ));
+    }
     super::print(&format!(
         "{}{shown} is written; next: vda5050-tck run --profile {shown} --plan\n",
         describe(device)
@@ -82,7 +94,7 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
 }
 
 /// Writes what the program was built with, so that tests of one's own can begin with it.
-fn export(folder: &Path) -> Result<Exit, Problem> {
+fn export(folder: &Path, format: Format) -> Result<Exit, Problem> {
     if folder.exists() {
         let title = format!("{} is there already", folder.display());
         return Err(Diagnostic::whole("exists", title)
@@ -102,6 +114,10 @@ fn export(folder: &Path) -> Result<Exit, Problem> {
             .map_err(|error| Problem::Environment(format!("cannot write {}: {error}", path.display())))?;
     }
     let shown = folder.display();
+    if format == Format::Json {
+        let written = json!({ "format": "vda5050-tck.init/1", "folder": shown.to_string() });
+        return super::print(&format!("{written:#}\n"));
+    }
     super::print(&format!(
         "{shown}/agv and {shown}/master-control hold the tests, {shown}/monitors the monitors, {shown}/requirements the \
          catalogue, {shown}/schemas the schemas, {shown}/default.toml every setting with its default; \

@@ -24,6 +24,9 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
     if arguments.uncovered && arguments.what != Listing::Coverage {
         return Err(Diagnostic::whole("usage", "`--uncovered` is about `list coverage`").into());
     }
+    if arguments.filter.is_some() && arguments.what != Listing::Tests {
+        return Err(Diagnostic::whole("usage", "`--filter` is about `list tests`").into());
+    }
     if arguments.page && arguments.what != Listing::Requirements {
         return Err(Diagnostic::whole("usage", "`--page` is about `list requirements`").into());
     }
@@ -33,12 +36,19 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         .role
         .map_or_else(|| vec![Role::Agv, Role::MasterControl], |role| vec![role]);
     let text = match (arguments.what, arguments.format) {
-        (Listing::Tests, Format::Text) => roles.iter().map(|role| tests(&library, &pack, *role)).collect(),
-        (Listing::Tests, Format::Json) => {
-            let all = roles.iter().flat_map(|role| library.tests(*role, &pack.id)).map(|test| {
-                json!({ "id": test.id, "title": test.title, "role": test.device.word(), "moves": test.moves, "requirements": test.requirements() })
-            });
-            lines(all)
+        (Listing::Tests, format) => {
+            let all = roles.iter().map(|role| Ok((*role, filtered(arguments, &library, &pack, *role)?)));
+            let all: Vec<_> = all.collect::<Result<_, Diagnostic>>()?;
+            if all.iter().all(|(_, tests)| tests.is_empty()) {
+                return Err(Problem::NothingToDo("no test is like that".to_owned()));
+            }
+            match format {
+                Format::Text => all.iter().map(|(role, all)| tests(all, *role)).collect(),
+                Format::Json => lines(all.iter().flat_map(|(_, all)| all).map(|test| {
+                    json!({ "id": test.id, "title": test.title, "role": test.device.word(), "moves": test.moves,
+                        "tags": test.tags(), "requirements": test.requirements() })
+                })),
+            }
         }
         (Listing::Requirements, Format::Text) if arguments.page => {
             let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
@@ -116,12 +126,30 @@ fn lines(all: impl Iterator<Item = serde_json::Value>) -> String {
     })
 }
 
-fn tests(library: &Library, pack: &Pack, role: Role) -> String {
-    let all = library.tests(role, &pack.id);
+/// The tests of a role for which the filter holds. A term may be about the other role alone.
+fn filtered(arguments: &List, library: &Library, pack: &Pack, role: Role) -> Result<Vec<Arc<Test>>, Diagnostic> {
+    let own = library.tests(role, &pack.id);
+    let Some(filter) = &arguments.filter else {
+        return Ok(own);
+    };
+    let quoted = sources(&library.rules.catalogue, &library.rules.suites, pack);
+    let mut all = own.clone();
+    if arguments.role.is_none() {
+        for other in [Role::Agv, Role::MasterControl]
+            .into_iter()
+            .filter(|other| *other != role)
+        {
+            all.extend(library.tests(other, &pack.id));
+        }
+    }
+    super::expression::meant(filter, &all, &own, &quoted)
+}
+
+fn tests(all: &[Arc<Test>], role: Role) -> String {
     let mut text = String::new();
     let mut group = "";
     let mut table = "";
-    for test in &all {
+    for test in all {
         // The cases that a run draws from are listed as one.
         if test.drawn.is_some() && test.table() == table {
             continue;
@@ -293,6 +321,9 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
         return Err(Diagnostic::whole("unknown-id", format!("nothing is called `{id}`"))
             .hint(hint)
             .into());
+    }
+    if arguments.format == Format::Json {
+        return super::print(&lines(super::explained::all(id, &library, &pack).into_iter()));
     }
     super::print(&text)
 }

@@ -2,17 +2,24 @@
 
 pub mod args;
 mod audit;
+mod browser;
 mod certify;
 mod device;
 mod discover;
+mod events;
 pub mod exit;
+mod explained;
 mod explore;
+mod expression;
 mod list;
+mod log;
+mod messages;
 mod papers;
 mod pipeline;
 mod plan;
 mod problem;
 mod qualify;
+mod recordings;
 mod report;
 mod run;
 mod screen;
@@ -21,6 +28,7 @@ mod selection;
 mod shell;
 mod signals;
 mod simulate;
+mod slice;
 mod validate;
 mod watch;
 
@@ -30,7 +38,7 @@ use std::sync::Arc;
 use clap::Parser as _;
 
 use crate::diagnostic::Diagnostic;
-use crate::pack::Pack;
+use crate::pack::{Pack, Packs};
 use crate::report::text::Color;
 use crate::run::Library;
 use args::{Cli, Command, Format};
@@ -44,11 +52,16 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are no mistakes; a reader that has gone away is none either.
-            let _ = error.print();
+            if error.use_stderr() && wants_json() {
+                eprintln!("{}", mistyped(&error).to_json());
+            } else {
+                let _ = error.print();
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let outcome = match &cli.command {
+    let logs = log::begin(cli.log_file.as_deref(), cli.command.verbose());
+    let outcome = logs.and_then(|()| match &cli.command {
         Command::Run(arguments) => run::run_command(arguments),
         Command::Certify(arguments) => certify::certify(arguments),
         Command::List(arguments) => list::list(arguments),
@@ -64,7 +77,7 @@ pub fn main() -> ExitCode {
         Command::Init(arguments) => discover::init(arguments),
         Command::Completions(arguments) => shell::completions(arguments),
         Command::Man(arguments) => shell::man(arguments),
-    };
+    });
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();
         match cli.command.format() {
@@ -74,6 +87,24 @@ pub fn main() -> ExitCode {
         problem.exit()
     });
     ExitCode::from(exit.code())
+}
+
+/// Whether a command line that cannot be read asks for JSON.
+fn wants_json() -> bool {
+    let words: Vec<String> = std::env::args().collect();
+    let asked = words.windows(2).any(|pair| pair[0] == "--format" && pair[1] == "json");
+    let by_variable = || std::env::var("VDA5050_TCK_FORMAT").is_ok_and(|format| format == "json");
+    asked || words.iter().any(|word| word == "--format=json") || by_variable()
+}
+
+/// What is wrong with a command line, as any other mistake.
+fn mistyped(error: &clap::Error) -> Problem {
+    let text = error.render().to_string();
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let title = lines.next().unwrap_or("the command line cannot be read");
+    let rest: Vec<&str> = lines.collect();
+    let title = title.strip_prefix("error: ").unwrap_or(title);
+    Diagnostic::whole("usage", title).hint(rest.join("\n")).into()
 }
 
 /// Whether results on standard output are coloured.
@@ -88,7 +119,11 @@ fn color() -> Color {
 
 /// The pack of a version; the newest one unless said.
 fn pack(library: &Library, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
-    let packs = &library.rules.packs;
+    pack_among(&library.rules.packs, protocol)
+}
+
+/// The same where suites and catalogue are not needed, which take a while to be read.
+fn pack_among(packs: &Packs, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
     let Some(wanted) = protocol else {
         return Ok(Arc::clone(packs.latest()));
     };

@@ -75,10 +75,12 @@ fn intact(folder: &Path, library: &Library) -> Result<(RunResult, String), Probl
         );
         return Err(Diagnostic::whole("manifest", title).into());
     }
-    let Recording { journal, .. } = file::read(&folder.join("journal.jsonl"))
-        .map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string())))?;
-    let result = judge::judge(&library.rules, journal.entries())
+    let journal_path = file::find(folder);
+    let Recording { journal, .. } =
+        file::read(&journal_path).map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string())))?;
+    let mut result = judge::judge(&library.rules, journal.entries())
         .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
+    result.journal = file::name_of(&journal_path);
     let path = folder.join("result.json");
     let saved = json::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
     if saved != result {

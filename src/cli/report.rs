@@ -8,14 +8,11 @@ use super::args::{Format, Report};
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
-use crate::journal::file::{self, Recording};
+use crate::journal::file::{self, NAME, PACKED, Recording};
 use crate::judge;
 use crate::report::{compare, json as result_file, manifest, overview, side_by_side};
 use crate::result::RunResult;
 use crate::run::{Bundle, Library, sources, write_all};
-
-/// The evidence in a bundle.
-const JOURNAL: &str = "journal.jsonl";
 
 /// `report`.
 pub fn report(arguments: &Report) -> Result<Exit, Problem> {
@@ -39,14 +36,16 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     }
     let mut library = Library::load(arguments.suites.own())?;
     library.add(&own_tests(folder)?)?;
-    let Recording { journal, torn } = file::read(&folder.join(JOURNAL)).map_err(|error| {
+    let path = file::find(folder);
+    let Recording { journal, torn } = file::read(&path).map_err(|error| {
         Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
     })?;
     if torn {
         eprintln!("the last line of the journal is cut off, as after a crash; everything before it is used");
     }
-    let result = judge::judge(&library.rules, journal.entries())
+    let mut result = judge::judge(&library.rules, journal.entries())
         .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
+    result.journal = file::name_of(&path);
     if arguments.rejudge {
         return rejudge(folder, &result, arguments.format);
     }
@@ -119,7 +118,8 @@ fn unchanged(folder: &Path) -> Result<(), Problem> {
     }
     let found = manifest::Manifest::verify(folder)
         .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
-    let is_there = !found.missing.iter().any(|file| file == JOURNAL);
+    let name = file::name_of(&file::find(folder));
+    let is_there = !found.missing.iter().any(|file| [NAME, PACKED].contains(&file.as_str()));
     if found.root_holds && found.changed.is_empty() && found.extra.is_empty() && is_there {
         return Ok(());
     }
@@ -128,7 +128,7 @@ fn unchanged(folder: &Path) -> Result<(), Problem> {
         folder.display(),
         found.text().trim_end()
     );
-    let hint = format!("copy `{JOURNAL}` alone into another folder, and give that one; `--rejudge` writes nothing");
+    let hint = format!("copy `{name}` alone into another folder, and give that one; `--rejudge` writes nothing");
     Err(Diagnostic::whole("manifest", title).hint(hint).into())
 }
 

@@ -1,33 +1,44 @@
 //! `run`: test a device, write the evidence, say the verdict.
 
 mod conclude;
+mod resume;
 
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use resume::Earlier;
+
 use super::args;
 use super::device::{check_faults, pack_of, tolerate};
+use super::events::{About, Followed};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::screen::{Screen, Show};
 use super::signals::Signals;
+use crate::bench::Vantage;
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
+use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::link::mqtt::BrokerChoice;
 use crate::pack::Participant;
 use crate::pack::{Pack, Role};
 use crate::profile::{self, Effective, Surroundings};
+use crate::report::statement::many;
 use crate::run::{
-    Bundle, Library, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, run_virtually, write_result,
+    Bundle, Library, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
+    write_result,
 };
 use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
+use crate::ui::{Desk, put_terminal_back};
 
 /// What `run` and `certify` have in common.
 struct Job {
+    desk: Desk,
     library: Library,
     pack: Arc<Pack>,
     effective: Effective,
@@ -35,6 +46,8 @@ struct Job {
     output: args::OutputArgs,
     no_motion: bool,
     certifies: bool,
+    /// The run that this one goes on with.
+    earlier: Option<Earlier>,
     /// How many mock AGVs are asked for when a master control is tested.
     vehicles: Option<usize>,
 }
@@ -51,14 +64,21 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     let all = library.tests(role, &pack.id);
-    let mut tests = super::selection::selected(
-        &all,
-        &arguments.tests,
-        &arguments.selection,
-        &arguments.output.out,
-        &library,
-        &pack,
-    )?;
+    let earlier = match &arguments.selection.resume {
+        Some(folder) => Some(Earlier::read(folder, &all, &library)?),
+        None => None,
+    };
+    let mut tests = match &earlier {
+        Some(earlier) => earlier.tests.clone(),
+        None => super::selection::selected(
+            &all,
+            &arguments.tests,
+            &arguments.selection,
+            &arguments.output.out,
+            &library,
+            &pack,
+        )?,
+    };
     if let Some(shard) = arguments.shard {
         let mut place = 0;
         tests.retain(|_| {
@@ -75,7 +95,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         None => random.simple().to_string()[..8].to_owned(),
     };
     // Whoever names a single case means it; the parts of one run have to draw the same.
-    let whole = arguments.thorough || arguments.tests.iter().any(|pattern| pattern.contains('['));
+    let whole = arguments.thorough || earlier.is_some() || arguments.tests.iter().any(|pattern| pattern.contains('['));
     let draw = match arguments.seed {
         _ if whole => None,
         Some(seed) => Some(seed),
@@ -104,14 +124,18 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
             .into());
     }
     check_faults(role, &arguments.fault)?;
-    let job = Job {
+    let mut job = Job {
+        desk: Desk::new(watch::channel(false).0),
         request: Request {
-            complete: tests.len() == all.len(),
+            complete: earlier
+                .as_ref()
+                .map_or(tests.len() == all.len(), |earlier| earlier.complete),
             tests,
             draw,
             run,
             command: std::env::args().collect(),
             fail_fast: arguments.selection.fail_fast,
+            repeat: arguments.selection.repeat,
             certifies: arguments.certifies,
         },
         library,
@@ -121,6 +145,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         no_motion: arguments.device.no_motion,
         certifies: arguments.certifies,
         vehicles: arguments.vehicles.map(|count| count as usize),
+        earlier,
     };
     if arguments.selection.plan {
         return job.plan(arguments, built_in, &surroundings);
@@ -134,8 +159,12 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         .enable_all()
         .build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
+    let mut desk = job.desk.clone();
     let outcome = runtime.block_on(async {
-        let interrupt = interrupts()?;
+        let stop = stop()?;
+        let interrupt = stop.subscribe();
+        job.desk = Desk::new(stop);
+        desk = job.desk.clone();
         if arguments.in_virtual_time {
             job.virtually(arguments, interrupt).await
         } else if built_in {
@@ -146,20 +175,37 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     });
     // Sockets of a silent peer must not keep the process from ending.
     runtime.shutdown_background();
+    desk.at_rest();
     outcome
 }
 
 /// A signal once ends the run in good order, twice at once.
 pub(super) fn interrupts() -> Result<watch::Receiver<bool>, Problem> {
-    let (sender, receiver) = watch::channel(false);
+    Ok(stop()?.subscribe())
+}
+
+/// The same, and what else ends the run in good order.
+pub(super) fn stop() -> Result<watch::Sender<bool>, Problem> {
+    let (sender, mut stopped) = watch::channel(false);
     let mut signals = Signals::listen()?;
+    let stop = sender.clone();
     tokio::spawn(async move {
+        tokio::select! {
+            () = signals.next() => {}
+            _ = stopped.wait_for(|stopped| *stopped) => {}
+        }
+        stop.send_replace(true);
         signals.next().await;
-        let _ = sender.send(true);
-        signals.next().await;
+        put_terminal_back();
         std::process::exit(i32::from(Exit::Interrupted.code()));
     });
-    Ok(receiver)
+    Ok(sender)
+}
+
+/// The desk, where somebody sits there who can be asked.
+pub(super) fn person(desk: &Desk) -> Option<Arc<dyn Person>> {
+    let attended = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+    attended.then(|| Arc::new(desk.clone()) as Arc<dyn Person>)
 }
 
 impl Job {
@@ -198,7 +244,7 @@ impl Job {
             folder: profile
                 .and_then(Path::parent)
                 .map_or_else(PathBuf::new, Path::to_path_buf),
-            attended: console::user_attended(),
+            person: person(&self.desk),
             vehicles: self.vehicles,
         };
         let mut run = SocketRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
@@ -209,9 +255,10 @@ impl Job {
     async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
+        self.is_resumable(device.subject(), Vantage::Tap)?;
         let bundle = self.bundle(device.subject(), utc)?;
-        let writer = bundle.journal().map_err(environment)?;
-        let mut terminal = self.screen(device.subject());
+        let writer = self.journal(&bundle)?;
+        let mut terminal = self.screen(device.subject(), &bundle)?;
         let mut run = VirtualRun::of_role(device.role(), &self.library, &self.pack);
         run.device = device;
         run.faults.clone_from(&arguments.fault);
@@ -223,6 +270,8 @@ impl Job {
         run.run.clone_from(&self.request.run);
         run.command.clone_from(&self.request.command);
         run.fail_fast = self.request.fail_fast;
+        run.repeat = self.request.repeat;
+        run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
         if self.no_motion {
             run.motion = Err(NO_MOTION.to_owned());
         }
@@ -285,10 +334,20 @@ impl Job {
             run.device.stand_still(NO_MOTION);
         }
         run.request = self.request.clone();
+        if let Some(earlier) = &self.earlier {
+            let vantage = if run.options.tap {
+                Vantage::Tap
+            } else {
+                Vantage::Subscriber
+            };
+            self.is_resumable(&run.device.subject, vantage)?;
+            run.options.clock = WallClock::going_on(going_on_at(Some(&earlier.journal)));
+            run.earlier = Some(earlier.journal.clone());
+        }
         let bundle = self.bundle(&run.device.subject, run.options.clock.origin_stamp().utc)?;
-        let writer = bundle.journal().map_err(environment)?;
+        let writer = self.journal(&bundle)?;
         run.device_log = Some(bundle.folder().join("device.log"));
-        let mut terminal = self.screen(&run.device.subject);
+        let mut terminal = self.screen(&run.device.subject, &bundle)?;
         let mut saved = saving(&bundle);
         let finished = run.carry_out(
             &self.library,
@@ -306,8 +365,34 @@ impl Job {
         self.conclude(&bundle, finished, terminal)
     }
 
-    fn screen(&self, device: &Participant) -> Screen {
+    /// The journal of the bundle. That of a run that is resumed begins with what is there already.
+    fn journal(&self, bundle: &Bundle) -> Result<JournalWriter, Problem> {
+        let writer = match &self.earlier {
+            Some(earlier) => bundle.journal_after(&earlier.path),
+            None => bundle.journal(),
+        };
+        writer.map_err(environment)
+    }
+
+    /// Whether the run before this one, if there is one, was about the same.
+    fn is_resumable(&self, subject: &Participant, vantage: Vantage) -> Result<(), Problem> {
+        let Some(earlier) = &self.earlier else { return Ok(()) };
+        earlier.is_about(subject, &self.pack, &self.library, vantage.word())?;
+        let (kept, left) = (earlier.kept, self.request.tests.len());
+        let verb = |count| if count == 1 { "is" } else { "are" };
+        eprintln!(
+            "resumed: {} {} kept, {} {} left",
+            many(kept, "test"),
+            verb(kept),
+            many(left, "test"),
+            verb(left)
+        );
+        Ok(())
+    }
+
+    fn screen(&self, device: &Participant, bundle: &Bundle) -> Result<Followed, Problem> {
         let show = match (self.output.format, self.output.quiet, self.output.failures) {
+            _ if self.output.speaks_events() => Show::Nothing,
             (args::Format::Json, ..) | (_, true, _) => Show::Nothing,
             (_, _, true) => Show::Failures,
             _ => Show::All,
@@ -317,7 +402,23 @@ impl Job {
                 eprintln!("{} = {}  ({})", setting.name, setting.value, setting.origin);
             }
         }
-        Screen::new(device.to_string(), self.pack.version.to_string(), show)
+        let protocol = self.pack.version.to_string();
+        let screen = Screen::new(device.to_string(), protocol.clone(), show, self.desk.clone());
+        let screen = if self.output.verbose >= 2 {
+            screen.beside_log()
+        } else {
+            screen
+        };
+        let mut followed = Followed::new(screen, self.output.events.as_deref())?;
+        followed.begun(&About {
+            run: &self.request.run,
+            role: device.role.word(),
+            protocol: &protocol,
+            manufacturer: &device.manufacturer,
+            serial_number: &device.serial_number,
+            bundle: bundle.folder(),
+        });
+        Ok(followed)
     }
 }
 

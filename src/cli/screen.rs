@@ -9,7 +9,7 @@ use crate::link::mqtt::BenchInfo;
 use crate::result::TestResult;
 use crate::run;
 use crate::suite::model::{Step, Test, Verb};
-use crate::ui::{Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};
+use crate::ui::{Desk, Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};
 use crate::verdict::{Outcome, Verdict};
 
 /// The progress of a run, for a person.
@@ -17,6 +17,7 @@ pub struct Screen {
     terminal: Terminal<io::Stdout, io::Stderr>,
     title: RunTitle,
     show: Show,
+    desk: Desk,
 }
 
 /// Which tests a person wants to see while a run goes on.
@@ -31,9 +32,9 @@ pub enum Show {
 }
 
 impl Screen {
-    /// A screen for a device.
+    /// A screen for a device, beside the desk of a person.
     #[must_use]
-    pub fn new(device: String, protocol: String, show: Show) -> Self {
+    pub fn new(device: String, protocol: String, show: Show, desk: Desk) -> Self {
         let options = TerminalOptions {
             results: show != Show::Nothing,
             ..TerminalOptions::of_process()
@@ -47,17 +48,27 @@ impl Screen {
                 not_applicable: 0,
             },
             show,
+            desk,
         }
+    }
+
+    /// Draws no bar, since the log is written to standard error.
+    #[must_use]
+    pub fn beside_log(mut self) -> Self {
+        self.terminal.without_bar();
+        self
     }
 
     /// Takes the bar away.
     pub fn finish(&mut self) {
+        self.desk.at_rest();
         self.terminal.clear();
     }
 }
 
 impl Watcher for Screen {
     fn waiting(&mut self, step: &Step) {
+        self.desk.performs(step.title.as_deref());
         let what = match &step.verb {
             Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_) => {
                 step.verb_span.text()
@@ -78,9 +89,11 @@ impl run::Progress for Screen {
             .filter(|test| matches!(test.gate, Gate::NotApplicable(_)))
             .count();
         self.terminal.run_begun(&self.title);
+        self.desk.draws(self.terminal.bar());
     }
 
     fn test_begun(&mut self, test: &Test, _number: usize, _of: usize) {
+        self.desk.runs(&test.id);
         self.terminal.test_begun(&test.id, &test.title);
     }
 
@@ -90,7 +103,10 @@ impl run::Progress for Screen {
             return;
         }
         self.terminal.test_ended(&TestLine {
-            id: result.id.clone(),
+            id: match result.repetitions.last() {
+                Some(repetition) => format!("{} (time {})", result.id, repetition.number),
+                None => result.id.clone(),
+            },
             outcome: Outcome::Judged(verdict),
             elapsed: Duration::from_secs_f64(result.seconds.clamp(0.0, 1e6)),
             reason: result.reason.clone(),

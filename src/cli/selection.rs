@@ -40,6 +40,14 @@ pub(super) fn selected(
             return Err(Problem::NothingToDo(title.to_owned()));
         }
     }
+    for filter in &wanted.filter {
+        let quoted = sources(&library.rules.catalogue, &library.rules.suites, pack);
+        tests = super::expression::meant(filter, all, &tests, &quoted)?;
+        if tests.is_empty() {
+            let title = format!("`--filter {filter}` holds for none of the selected tests");
+            return Err(Problem::NothingToDo(title));
+        }
+    }
     if wanted.last_failed {
         let failed = failed_before(&reports.join(LATEST))?;
         tests.retain(|test| failed.contains(test.id.as_str()));

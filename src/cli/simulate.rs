@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use super::args::{ConnectionArgs, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
+use super::args::{ConnectionArgs, Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
@@ -14,8 +14,7 @@ use crate::bench::endpoint::{Credentials, Endpoint};
 use crate::clock::WallClock;
 use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
-use crate::pack::{Pack, Role};
-use crate::run::Library;
+use crate::pack::{Assets, Pack, Packs, Role};
 use crate::simulate::driver::RunningDevice;
 use crate::simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl};
 
@@ -25,10 +24,8 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         Simulated::Agv(device) => &device.connection,
         Simulated::MasterControl(device) => &device.connection,
     };
-    let library = Library::load(None)?;
-    let pack = super::pack(&library, connection.protocol.as_deref())?;
-    // Suites and catalogue are not needed by a device.
-    drop(library);
+    let packs = Packs::load(&Assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
+    let pack = super::pack_among(&packs, connection.protocol.as_deref())?;
     let endpoint = endpoint(connection)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -37,8 +34,8 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     runtime.block_on(async {
         match &arguments.what {
-            Simulated::Agv(device) => agvs(device, &pack, &endpoint).await,
-            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint).await,
+            Simulated::Agv(device) => agvs(device, &pack, &endpoint, arguments.format).await,
+            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint, arguments.format).await,
         }
     })
 }
@@ -49,18 +46,15 @@ fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint, Problem> {
         username,
         password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
-    Endpoint::parse(&connection.broker, None, credentials).map_err(|error| {
+    Endpoint::parse(&connection.broker, connection.tls_ca.as_deref(), credentials).map_err(|error| {
         Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
     })
 }
 
-/// Says at once when nobody is there; later losses are the device's own business.
-async fn reach(endpoint: &Endpoint, connection: &ConnectionArgs) -> Result<(), Problem> {
-    let reached = tokio::net::TcpStream::connect((endpoint.host.as_str(), endpoint.port)).await;
-    reached.map(drop).map_err(|error| {
-        let broker = &connection.broker;
-        Problem::Environment(format!("the broker at {broker} is not reachable: {error}"))
-    })
+/// Says when the broker does not let the device in; later losses are the device's own business.
+async fn enter(device: &mut RunningDevice, endpoint: &Endpoint) -> Result<(), Problem> {
+    let entered = device.is_let_in().await;
+    entered.map_err(|reason| Problem::Environment(endpoint.lost(reason).to_string()))
 }
 
 fn start(
@@ -80,10 +74,20 @@ async fn end(device: RunningDevice) {
     device.stop().await;
 }
 
-async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> Result<Exit, Problem> {
+/// Says what is there: a text for people, a line for programs.
+fn say(format: Format, text: &str, event: &Value) -> Result<(), Problem> {
+    match format {
+        Format::Json => super::print(&format!("{event}\n")).map(drop),
+        Format::Text => {
+            eprintln!("{text}");
+            Ok(())
+        }
+    }
+}
+
+async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, format: Format) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
     let mut signals = Signals::listen()?;
-    reach(endpoint, &device.connection).await?;
     let clock = WallClock::start();
     let mut running = Vec::new();
     for number in 1..=device.count {
@@ -100,19 +104,49 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint) -> R
         }
         let mut reference = BuiltIn::from(reference);
         tolerate(&mut reference, &device.tolerance)?;
-        let agv = start(&reference, &device.fault, endpoint, clock)?;
+        let mut agv = start(&reference, &device.fault, endpoint, clock)?;
+        if number == 1 {
+            enter(&mut agv, endpoint).await?;
+        }
         for persona in &device.persona {
             agv.command(persona.word, persona.parameters.clone()).await;
         }
         running.push(agv);
     }
-    eprintln!(
-        "{} simulated AGV(s) on {}; press Ctrl-C to disconnect",
-        device.count, device.connection.broker
-    );
+    let server = match (&device.hooks, running.len()) {
+        (Some(listen), 1) => {
+            let known = BuiltIn::from(ReferenceAgv::of(device.vehicle.0, pack)).hooks();
+            let server = HookServer::start(listen, running.remove(0), known).await;
+            Some(server.map_err(|error| Problem::Environment(error.to_string()))?)
+        }
+        _ => None,
+    };
+    if let Some(server) = &server {
+        let hooks = format!("http://{}", server.address());
+        say(
+            format,
+            &format!("hooks are served at {hooks}"),
+            &json!({ "event": "hooks", "address": hooks }),
+        )?;
+    }
+    let broker = &device.connection.broker;
+    let count = device.count;
+    say(
+        format,
+        &format!("{count} simulated AGV(s) on {broker}; press Ctrl-C to disconnect"),
+        &json!({ "event": "simulating", "role": Role::Agv.word(), "count": count, "broker": broker }),
+    )?;
     signals.next().await;
+    if let Some(server) = server
+        && let Some(device) = server.stop().await
+    {
+        end(device).await;
+    }
     for device in running {
         end(device).await;
+    }
+    if format == Format::Json {
+        super::print(&format!("{}\n", json!({ "event": "disconnected" })))?;
     }
     Ok(Exit::Conforms)
 }
@@ -121,21 +155,28 @@ async fn master_control(
     device: &SimulatedMasterControl,
     pack: &Arc<Pack>,
     endpoint: &Endpoint,
+    format: Format,
 ) -> Result<Exit, Problem> {
     check_faults(Role::MasterControl, &device.fault)?;
     let mut signals = Signals::listen()?;
     let mut reference = BuiltIn::from(configured(device, pack)?);
     tolerate(&mut reference, &device.tolerance)?;
-    reach(endpoint, &device.connection).await?;
-    let running = start(&reference, &device.fault, endpoint, WallClock::start())?;
+    let mut running = start(&reference, &device.fault, endpoint, WallClock::start())?;
+    enter(&mut running, endpoint).await?;
     let server = HookServer::start(&device.hooks, running, reference.hooks()).await;
     let server = server.map_err(|error| Problem::Environment(error.to_string()))?;
-    eprintln!("hooks are served at http://{}", server.address());
+    let hooks = format!("http://{}", server.address());
     let vehicles = reference.fleet().map_or(0, |fleet| fleet.vehicles.len());
-    eprintln!(
-        "a reference master control of {vehicles} vehicle(s) on {}; press Ctrl-C to disconnect",
-        device.connection.broker
-    );
+    let broker = &device.connection.broker;
+    say(
+        format,
+        &format!(
+            "hooks are served at {hooks}\na reference master control of {vehicles} vehicle(s) on {broker}; press Ctrl-C to \
+             disconnect"
+        ),
+        &json!({ "event": "simulating", "role": Role::MasterControl.word(), "count": vehicles, "broker": broker,
+            "hooks": hooks }),
+    )?;
     signals.next().await;
     if let Some(running) = server.stop().await {
         end(running).await;

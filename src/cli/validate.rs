@@ -1,18 +1,18 @@
 //! `validate`: check files, told apart by their content.
 
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::Value;
 
 use super::args::{Format, Validate};
 use super::exit::Exit;
+use super::messages::{self, Counted};
 use super::problem::Problem;
 use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::journal::json::Parsed;
-use crate::pack::Pack;
 use crate::profile;
 use crate::report::json as result_file;
 use crate::run::Library;
@@ -21,22 +21,35 @@ use crate::run::Library;
 enum Found {
     Good(String),
     Bad(Vec<Diagnostic>),
+    /// It is wrong, and everything was said.
+    Told,
 }
 
 /// `validate`.
 pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
     let library = Library::load(None)?;
     let mut wrong = 0;
-    for path in &arguments.files {
+    for path in &expanded(&arguments.files)? {
         let name = path.display().to_string();
         let text = read(path)?;
-        let found = check(&name, &text, path, arguments, &library)?;
+        let found = if messages::is_batch(path, &text) {
+            let counted = messages::batch(&name, &text, arguments, &library)?;
+            wrong += usize::from(counted.wrong > 0);
+            summary(&name, counted, arguments.format)?;
+            continue;
+        } else {
+            check(&name, &text, path, arguments, &library)?
+        };
         match (found, arguments.format) {
             (Found::Good(what), Format::Text) => super::print(&format!("{name}: {what}\n"))?,
             (Found::Good(what), Format::Json) => super::print(&format!(
                 "{}\n",
                 serde_json::json!({ "file": name, "ok": true, "what": what })
             ))?,
+            (Found::Told, _) => {
+                wrong += 1;
+                Exit::Usage
+            }
             (Found::Bad(all), format) => {
                 wrong += 1;
                 for one in &all {
@@ -56,6 +69,51 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
     Ok(if wrong == 0 { Exit::Conforms } else { Exit::Usage })
 }
 
+/// What was counted in a file with many messages.
+fn summary(name: &str, counted: Counted, format: Format) -> Result<(), Problem> {
+    let text = match format {
+        Format::Text => format!(
+            "{name}: {} messages, {} with violations, {} with warnings\n",
+            counted.messages, counted.wrong, counted.warned
+        ),
+        Format::Json => format!(
+            "{}\n",
+            serde_json::json!({ "file": name, "ok": counted.wrong == 0, "messages": counted.messages,
+                "withViolations": counted.wrong, "withWarnings": counted.warned })
+        ),
+    };
+    super::print(&text).map(|_| ())
+}
+
+/// Every file, and of a folder all JSON files in it and below, in their order.
+fn expanded(files: &[PathBuf]) -> Result<Vec<PathBuf>, Problem> {
+    let mut all = Vec::new();
+    for path in files {
+        if !path.is_dir() {
+            all.push(path.clone());
+            continue;
+        }
+        let before = all.len();
+        let mut folders = vec![path.clone()];
+        while let Some(folder) = folders.pop() {
+            let unreadable = |error: std::io::Error| {
+                Diagnostic::whole("unreadable", format!("cannot read {}: {error}", folder.display()))
+            };
+            for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+                let path = entry.map_err(unreadable)?.path();
+                let extension = path.extension().and_then(|extension| extension.to_str());
+                if path.is_dir() && !path.is_symlink() {
+                    folders.push(path);
+                } else if matches!(extension, Some("json" | "jsonl" | "ndjson")) {
+                    all.push(path);
+                }
+            }
+        }
+        all[before..].sort();
+    }
+    Ok(all)
+}
+
 fn read(path: &Path) -> Result<Vec<u8>, Problem> {
     let read = if path.as_os_str() == "-" {
         let mut bytes = Vec::new();
@@ -69,7 +127,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Problem> {
 fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
     let parsed = Parsed::of_bytes(bytes);
     if let Some(value) = parsed.value() {
-        return json_file(name, value, bytes, &parsed, arguments, library);
+        return json_file(name, value, bytes, arguments, library);
     }
     let Ok(text) = std::str::from_utf8(bytes) else {
         return Ok(Found::Bad(vec![Diagnostic::whole(
@@ -92,16 +150,7 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
         });
     }
     if extension == "json" || text.trim_start().starts_with('{') {
-        let problems = parsed
-            .problems()
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
-            .join("; ");
-        return Ok(Found::Bad(vec![Diagnostic::whole(
-            "not-json",
-            format!("{name}: {problems}"),
-        )]));
+        return one(name, bytes, arguments, library);
     }
     Ok(match library.check_suite(name, text) {
         Ok(what) => Found::Good(what),
@@ -120,7 +169,6 @@ fn json_file(
     name: &str,
     value: &Value,
     bytes: &[u8],
-    parsed: &Parsed,
     arguments: &Validate,
     library: &Library,
 ) -> Result<Found, Problem> {
@@ -141,7 +189,17 @@ fn json_file(
             Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
         });
     }
-    message(name, value, parsed, arguments, library)
+    one(name, bytes, arguments, library)
+}
+
+/// A file with one message.
+fn one(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Result<Found, Problem> {
+    let (counted, what) = messages::alone(name, bytes, arguments, library)?;
+    Ok(if counted.wrong > 0 {
+        Found::Told
+    } else {
+        Found::Good(what)
+    })
 }
 
 /// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it.
@@ -153,69 +211,4 @@ fn layout(source: &Arc<Source>) -> Result<String, Vec<Diagnostic>> {
         said.push(format!("{nodes} nodes and {edges} edges for {vehicle_type}"));
     }
     Ok(format!("a layout with {}", said.join(", ")))
-}
-
-fn message(
-    name: &str,
-    value: &Value,
-    parsed: &Parsed,
-    arguments: &Validate,
-    library: &Library,
-) -> Result<Found, Problem> {
-    let said = value.get("version").and_then(Value::as_str);
-    let pack = match arguments.protocol.as_deref().or(said) {
-        Some(version) => super::pack(library, Some(version))?,
-        None => super::pack(library, None)?,
-    };
-    let Some(topic) = arguments.topic.as_deref().or_else(|| topic_of(value)) else {
-        let diagnostic = Diagnostic::whole(
-            "unknown-message",
-            format!("{name} is JSON, but not a message that can be told by its members"),
-        );
-        return Ok(Found::Bad(vec![diagnostic.hint("say which with --topic")]));
-    };
-    let Some(schema) = pack.schema(topic) else {
-        return Err(unknown_topic(topic, &pack).into());
-    };
-    let mut all: Vec<Diagnostic> = parsed
-        .problems()
-        .iter()
-        .map(|problem| Diagnostic::whole("json", format!("{name}: {problem}")))
-        .collect();
-    all.extend(schema.findings(value).into_iter().map(|finding| {
-        let place = if finding.path.is_empty() {
-            "the message"
-        } else {
-            &finding.path
-        };
-        Diagnostic::whole("schema", format!("{name}: {place}: {}", finding.message))
-    }));
-    Ok(if all.is_empty() {
-        Found::Good(format!("a valid {topic} message of VDA 5050 {}", pack.version))
-    } else {
-        Found::Bad(all)
-    })
-}
-
-fn unknown_topic(topic: &str, pack: &Pack) -> Diagnostic {
-    let names: Vec<&str> = pack.topics().iter().map(|rule| rule.name.as_str()).collect();
-    let diagnostic = Diagnostic::whole("unknown-topic", format!("there is no topic `{topic}`"));
-    diagnostic.hint(crate::diagnostic::did_you_mean(topic, names.iter().copied()))
-}
-
-/// The topic a message belongs to, by a member only it has.
-fn topic_of(value: &Value) -> Option<&'static str> {
-    let has = |name: &str| value.get(name).is_some();
-    [
-        ("nodeStates", "state"),
-        ("nodes", "order"),
-        ("actions", "instantActions"),
-        ("connectionState", "connection"),
-        ("typeSpecification", "factsheet"),
-        ("agvPosition", "visualization"),
-        ("velocity", "visualization"),
-    ]
-    .into_iter()
-    .find(|(member, _)| has(member))
-    .map(|(_, topic)| topic)
 }

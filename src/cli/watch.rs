@@ -1,5 +1,6 @@
 //! `watch`: judge live traffic.
 
+use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use super::args::{Format, Watch as Arguments};
@@ -8,7 +9,7 @@ use super::problem::Problem;
 use crate::audit::{Options, page};
 use crate::diagnostic::Diagnostic;
 use crate::run::Library;
-use crate::ui::{LineOptions, Lines};
+use crate::ui::{FullScreen, LineOptions, Lines};
 use crate::watch::Rotation;
 use crate::watch::session::{Settings, WatchError, run};
 
@@ -22,6 +23,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
     };
     let settings = Settings {
         endpoint: super::discover::endpoint(&arguments.at)?,
+        listen: arguments.listen.clone(),
         filters: arguments.at.filters(),
         options: Options {
             topic_template: arguments.topic_template.clone(),
@@ -40,16 +42,32 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
         .build()
         .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let json = arguments.format == Format::Json;
-    let mut lines = Lines::of_process(LineOptions {
-        every: arguments.every,
-        json,
-        summary: arguments.summary,
-        color: super::color() == crate::report::text::Color::Always,
-    });
-    let watched = runtime.block_on(async {
-        let interrupt = super::run::interrupts()?;
-        Ok::<_, Problem>(run(&library.rules, settings, &mut lines, interrupt).await)
-    });
+    let whole = !arguments.plain
+        && !json
+        && std::io::stdin().is_terminal()
+        && console::user_attended()
+        && console::user_attended_stderr();
+    let mut settings = settings;
+    let watched = if whole {
+        settings.tick = Duration::from_millis(100);
+        let mut screen = FullScreen::open(arguments.at.broker.clone())
+            .map_err(|error| Problem::Environment(format!("cannot use the whole terminal: {error}; try --plain")))?;
+        runtime.block_on(async {
+            let interrupt = super::run::interrupts()?;
+            Ok::<_, Problem>(run(&library.rules, settings, &mut screen, interrupt).await)
+        })
+    } else {
+        let mut lines = Lines::of_process(LineOptions {
+            every: arguments.every,
+            json,
+            summary: arguments.summary,
+            color: super::color() == crate::report::text::Color::Always,
+        });
+        runtime.block_on(async {
+            let interrupt = super::run::interrupts()?;
+            Ok::<_, Problem>(run(&library.rules, settings, &mut lines, interrupt).await)
+        })
+    };
     runtime.shutdown_background();
     let result = watched?.map_err(|error| problem(arguments, &error))?;
     if json {

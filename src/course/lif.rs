@@ -138,7 +138,6 @@ impl Layout {
             reader.layout(layout);
         }
         if !reader.wrong.is_empty() {
-            reader.wrong.truncate(MOST_MISTAKES);
             return Err(reader.wrong);
         }
         Ok(Self::assemble(reader.nodes, reader.edges, reader.left_out))
@@ -237,7 +236,15 @@ impl Reader<'_> {
         Span::new(self.source, range.start, range.end)
     }
 
+    /// Whether enough mistakes are known. To find the place of one takes a walk through the whole text.
+    fn is_enough(&self) -> bool {
+        self.wrong.len() >= MOST_MISTAKES
+    }
+
     fn complain(&mut self, key: &str, id: &str, title: String, label: &str, hint: &str) {
+        if self.is_enough() {
+            return;
+        }
         let diagnostic = Diagnostic::new("lif", self.span(key, id, 0), title, label);
         self.wrong.push(diagnostic.hint(hint));
     }
@@ -245,7 +252,7 @@ impl Reader<'_> {
     fn check_ids(&mut self, file: &File) {
         let mut seen = BTreeSet::new();
         for node in file.layouts.iter().flat_map(|layout| &layout.nodes) {
-            if !seen.insert(node.node_id.as_str()) {
+            if !seen.insert(node.node_id.as_str()) && !self.is_enough() {
                 let title = format!("there are two nodes `{}`", node.node_id);
                 let span = self.span("nodeId", &node.node_id, 1);
                 self.wrong.push(Diagnostic::new("lif", span, title, "the second one"));
@@ -253,7 +260,7 @@ impl Reader<'_> {
         }
         for edge in file.layouts.iter().flat_map(|layout| &layout.edges) {
             for end in [&edge.start_node_id, &edge.end_node_id] {
-                if !seen.contains(end.as_str()) {
+                if !seen.contains(end.as_str()) && !self.is_enough() {
                     let title = format!("edge `{}` ends at the unknown node `{end}`", edge.edge_id);
                     let hint = match diagnostic::closest(end, seen.iter().copied()) {
                         Some(close) => format!("did you mean `{close}`?"),

@@ -15,15 +15,21 @@ const WINDOW: Duration = Duration::from_secs(30);
 /// What a device may do in that time. With a tap a message counts twice: on its way to the broker and from there.
 const IN_WINDOW: Amount = Amount {
     events: 10_000,
-    bytes: 100 << 20,
+    bytes: 400 << 20,
 };
 /// What it may do more for each mock vehicle it commands.
 const FOR_EACH_VEHICLE: u64 = 100;
-/// What it may do in the whole run.
+/// What it may do in the whole run. Bytes are those that are held in memory: a parsed message can take sixteen times as many
+/// as it has on the wire.
 const IN_RUN: Amount = Amount {
     events: 1_000_000,
-    bytes: 1536 << 20,
+    bytes: 6144 << 20,
 };
+
+/// What clients that are not the device may do in the same time before what they do is left out of the journal …
+const OF_OTHERS: u64 = 2_000;
+/// … and before the run ends, because it cannot be left out.
+const OF_OTHERS_AT_MOST: u64 = 30_000;
 
 /// Something is counted.
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,11 +56,39 @@ pub struct FloodGuard {
     seconds: VecDeque<(u64, Amount)>,
     run: Amount,
     vehicles: u64,
+    /// The same of clients that are not the device.
+    others: VecDeque<(u64, Amount)>,
     /// Why the run has to end.
     over: Option<String>,
 }
 
 impl FloodGuard {
+    /// Whether so much came of clients that are not the device that the rest need not be kept.
+    #[must_use]
+    pub fn is_beset(&self, now: Moment) -> bool {
+        let second = now.since(Moment::START).as_secs();
+        let recent = self.others.iter().filter(|(at, _)| at + WINDOW.as_secs() > second);
+        recent.map(|(_, amount)| amount.events).sum::<u64>() >= OF_OTHERS
+    }
+
+    /// Sees an entry of a client that is not the device.
+    pub fn observe_other(&mut self, entry: &Entry) {
+        if self.over.is_some() {
+            return;
+        }
+        let bytes = entry.payload().map_or(0, |payload| payload.bytes().len() as u64);
+        let amount = Amount { events: 1, bytes };
+        let window = count(&mut self.others, entry.at().moment, amount);
+        if window.events > OF_OTHERS_AT_MOST || window.bytes > IN_WINDOW.bytes {
+            self.over = Some(format!(
+                "clients that are not the device under test flood the harness: {} packets and messages with {} MB came within \
+                 30 s; the run was ended before this machine runs out of memory, and what was found until then stands",
+                window.events,
+                window.bytes >> 20
+            ));
+        }
+    }
+
     /// Sees one entry.
     pub fn observe(&mut self, entry: &Entry) {
         if let Event::RunBegun { header } = entry.event() {
@@ -65,23 +99,11 @@ impl FloodGuard {
         }
         let bytes = entry.payload().map_or(0, |payload| payload.bytes().len() as u64);
         let amount = Amount { events: 1, bytes };
-        self.run.add(amount);
-        let second = entry.at().moment.since(Moment::START).as_secs();
-        match self.seconds.back_mut() {
-            Some((last, sum)) if *last == second => sum.add(amount),
-            _ => self.seconds.push_back((second, amount)),
-        }
-        while self
-            .seconds
-            .front()
-            .is_some_and(|(first, _)| first + WINDOW.as_secs() <= second)
-        {
-            self.seconds.pop_front();
-        }
-        let mut window = Amount::default();
-        for (_, sum) in &self.seconds {
-            window.add(*sum);
-        }
+        self.run.add(Amount {
+            events: 1,
+            bytes: entry.held(),
+        });
+        let window = count(&mut self.seconds, entry.at().moment, amount);
         let in_window = Amount {
             events: IN_WINDOW.events + FOR_EACH_VEHICLE * self.vehicles,
             ..IN_WINDOW
@@ -106,6 +128,26 @@ impl FloodGuard {
     pub fn over(&self) -> Option<&str> {
         self.over.as_deref()
     }
+}
+
+/// Adds an amount to the seconds that are looked back at; gives their sum.
+fn count(seconds: &mut VecDeque<(u64, Amount)>, now: Moment, amount: Amount) -> Amount {
+    let second = now.since(Moment::START).as_secs();
+    match seconds.back_mut() {
+        Some((last, sum)) if *last == second => sum.add(amount),
+        _ => seconds.push_back((second, amount)),
+    }
+    while seconds
+        .front()
+        .is_some_and(|(first, _)| first + WINDOW.as_secs() <= second)
+    {
+        seconds.pop_front();
+    }
+    let mut window = Amount::default();
+    for (_, sum) in seconds {
+        window.add(*sum);
+    }
+    window
 }
 
 #[cfg(test)]
@@ -151,6 +193,62 @@ mod tests {
         assert_eq!(guard.over(), None);
         after(&mut guard, 2_000, Duration::from_millis(1), 10);
         assert!(guard.over().unwrap().contains("floods"));
+    }
+
+    #[test]
+    fn a_message_counts_by_what_is_held_of_it() {
+        let mut guard = FloodGuard::default();
+        let zeros = format!("[{}0]", "0,".repeat(999));
+        let entry = Journal::new().append(Occurrence {
+            at: Stamp {
+                moment: Moment::START,
+                utc: jiff::Timestamp::UNIX_EPOCH,
+            },
+            source: Source::Link,
+            direction: Some(Direction::FromDevice),
+            event: Event::Message {
+                topic: "state".into(),
+                qos: 0,
+                retain: false,
+                dup: false,
+                payload: Payload::keep(zeros.clone().into()),
+            },
+        });
+        guard.observe(&entry);
+        let held = guard.run.bytes;
+        assert!(held > 10 * zeros.len() as u64, "{held}");
+        // The same message on its other way has no value of its own.
+        guard.observe(&crate::journal::Entry::beside(&entry, entry.record.clone()));
+        assert_eq!(guard.run.bytes - held, zeros.len() as u64);
+    }
+
+    #[test]
+    fn what_others_do_is_no_flood_of_the_device() {
+        let mut guard = FloodGuard::default();
+        let mut journal = Journal::new();
+        let mut come = |guard: &mut FloodGuard, count: u64| {
+            for _ in 0..count {
+                guard.observe_other(&journal.append(Occurrence {
+                    at: Stamp {
+                        moment: Moment::START,
+                        utc: jiff::Timestamp::UNIX_EPOCH,
+                    },
+                    source: Source::Tap,
+                    direction: Some(Direction::FromDevice),
+                    event: Event::Opened {
+                        connection: 1,
+                        peer: String::new(),
+                    },
+                }));
+            }
+        };
+        come(&mut guard, OF_OTHERS - 1);
+        assert!(!guard.is_beset(Moment::START));
+        come(&mut guard, 1);
+        assert!(guard.is_beset(Moment::START) && !guard.is_beset(Moment::START + WINDOW));
+        assert_eq!(guard.over(), None);
+        come(&mut guard, OF_OTHERS_AT_MOST);
+        assert!(guard.over().unwrap().contains("not the device"));
     }
 
     #[test]

@@ -85,6 +85,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 "the device refuses what hook `{}` asks for: {why}",
                 operator.hook
             )),
+            HookOutcome::Skipped(why) => StepEnd::Skipped(why),
             HookOutcome::Missing => StepEnd::Refused(format!("there is nobody for hook `{}`", operator.hook)),
         })
     }
@@ -228,9 +229,12 @@ impl<L: Link, O: Operator> Engine<L, O> {
         };
         let (ok, detail) = match &outcome {
             HookOutcome::Done(detail) => (true, detail.clone()),
-            HookOutcome::Failed(detail) | HookOutcome::Refused(detail) => (false, detail.clone()),
+            HookOutcome::Failed(detail) | HookOutcome::Refused(detail) | HookOutcome::Skipped(detail) => {
+                (false, detail.clone())
+            }
             HookOutcome::Missing => (false, "no such hook".to_owned()),
         };
+        tracing::debug!(hook = name, ok, detail, "was run");
         let occurrence = Occurrence {
             at: self.link.now(),
             source: Source::Operator,

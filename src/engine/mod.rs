@@ -74,6 +74,8 @@ pub struct Engine<L, O> {
     pub cancels: bool,
     /// Map files the device can read; without one, ours are served.
     pub map_files: Vec<bytes::Bytes>,
+    /// Which time a test is run, where tests are repeated.
+    pub repetition: Option<u32>,
     /// When the last order was sent.
     last_order: Option<Moment>,
     interrupt: tokio::sync::watch::Receiver<bool>,
@@ -95,6 +97,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             composer,
             cancels: true,
             map_files: Vec::new(),
+            repetition: None,
             last_order: None,
             interrupt,
         }
@@ -164,6 +167,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
         self.note(Event::TestBegun {
             test: test.id.clone(),
             bindings: Value::Object(own),
+            repetition: self.repetition,
         })?;
         let outcome = self.sections(test, watcher).await;
         self.note(Event::TestEnded { test: test.id.clone() })?;
@@ -249,6 +253,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
 
     async fn step(&mut self, step: &Step, section: Section) -> Result<(), EngineError> {
         self.drain().await?;
+        tracing::debug!(step = step.path, "begins");
         self.note(Event::StepBegun {
             path: step.path.clone(),
         })?;

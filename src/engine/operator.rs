@@ -15,6 +15,8 @@ pub enum HookOutcome {
     Failed(String),
     /// The device has understood what is wanted of it, and does not do it.
     Refused(String),
+    /// The operator leaves the test out.
+    Skipped(String),
     /// There is no such hook, and nobody to ask.
     Missing,
 }
@@ -24,6 +26,11 @@ pub enum HookOutcome {
 pub trait Operator {
     /// Names of the hooks that can be run.
     fn hooks(&self) -> Vec<String>;
+
+    /// Names of the hooks that only a person could do, and nobody is there who can be asked.
+    fn unattended(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Runs one and waits for its end.
     async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::flood::FloodGuard;
-use crate::journal::event::Occurrence;
+use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::journal::{Entry, Journal};
-use crate::judge::{JudgeError, Rules, RunJudge};
+use crate::judge::{JudgeError, Rules, RunJudge, judged};
 
 /// Why something could not be recorded.
 #[derive(Debug, thiserror::Error)]
@@ -25,17 +25,31 @@ pub struct Recorder {
     writer: Option<JournalWriter>,
     judge: RunJudge,
     guard: FloodGuard,
+    /// Whether what others do was left out once; it is said once.
+    leaves_out: bool,
 }
 
 impl Recorder {
-    /// Begins with `RunBegun`.
-    pub fn begin(rules: &Rules, mut writer: Option<JournalWriter>, first: Occurrence) -> Result<Self, RecordError> {
-        let mut journal = Journal::new();
+    /// Begins with `RunBegun`; after the records of a run that broke off, where there is one.
+    pub fn begin(
+        rules: &Rules,
+        mut writer: Option<JournalWriter>,
+        earlier: Option<Journal>,
+        first: Occurrence,
+    ) -> Result<Self, RecordError> {
+        let mut journal = earlier.unwrap_or_default();
+        let before = match journal.entries() {
+            [] => None,
+            entries => Some(judged(rules, entries)?),
+        };
         let entry = journal.append(first);
         if let Some(writer) = &mut writer {
             writer.write(&entry.record)?;
         }
-        let mut judge = RunJudge::begin(rules, &entry)?;
+        let mut judge = match before {
+            Some(before) => before.resumed(&entry)?,
+            None => RunJudge::begin(rules, &entry)?,
+        };
         judge.observe(&entry)?;
         let mut guard = FloodGuard::default();
         guard.observe(&entry);
@@ -44,17 +58,37 @@ impl Recorder {
             writer,
             judge,
             guard,
+            leaves_out: false,
         })
     }
 
-    /// Records one occurrence: file first, then the judge.
+    /// Records one occurrence: file first, then the judge. Of clients that are not the device only so much is recorded; what
+    /// is left out comes back with the number of the last record.
     pub fn record(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
+        if self.guard.is_beset(occurrence.at.moment) && self.judge.can_do_without(&occurrence) {
+            let last = self.journal.entries().last().map_or(0, |entry| entry.seq());
+            if !std::mem::replace(&mut self.leaves_out, true) {
+                let text = "clients that are not the device do more than is recorded; until they do less, what has nothing to do \
+                            with the device is left out"
+                    .to_owned();
+                self.append(Occurrence::harness(occurrence.at, Event::Note { text }))?;
+            }
+            return Ok(Entry::new(occurrence.numbered(last)));
+        }
+        self.append(occurrence)
+    }
+
+    fn append(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
         let entry = self.journal.append(occurrence);
         if let Some(writer) = &mut self.writer {
             writer.write(&entry.record)?;
         }
         self.judge.observe(&entry)?;
-        self.guard.observe(&entry);
+        if self.judge.has_left_out() {
+            self.guard.observe_other(&entry);
+        } else {
+            self.guard.observe(&entry);
+        }
         Ok(entry)
     }
 
@@ -66,11 +100,6 @@ impl Recorder {
     /// The judge of this run.
     pub fn judge(&self) -> &RunJudge {
         &self.judge
-    }
-
-    /// The judge of this run, to break it off.
-    pub fn judge_mut(&mut self) -> &mut RunJudge {
-        &mut self.judge
     }
 
     /// The records so far.

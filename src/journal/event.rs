@@ -44,6 +44,8 @@ pub enum StepEnd {
     Broken(String),
     /// The device does not do what a hook asks of it, or cannot be asked any more; the text says why.
     Refused(String),
+    /// The operator leaves the test out; the text says so.
+    Skipped(String),
 }
 
 /// One thing that happened.
@@ -77,6 +79,9 @@ pub enum Event {
         test: String,
         /// The values of all variables known at its start.
         bindings: Value,
+        /// Which time it is run, counted from 1, where tests are repeated.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        repetition: Option<u32>,
     },
     /// A test ended.
     TestEnded {

@@ -10,10 +10,49 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
+use flate2::Compression;
+use flate2::bufread::MultiGzDecoder;
+use flate2::write::GzEncoder;
 use sha2::{Digest as _, Sha256};
 
 use super::event::hex;
 use super::{Journal, Record};
+
+/// The name of a journal in a bundle.
+pub const NAME: &str = "journal.jsonl";
+
+/// The name of a journal in a bundle that was packed.
+pub const PACKED: &str = "journal.jsonl.gz";
+
+/// The journal in a bundle: as it is, or packed.
+#[must_use]
+pub fn find(folder: &Path) -> PathBuf {
+    let packed = folder.join(PACKED);
+    if packed.exists() && !folder.join(NAME).exists() {
+        return packed;
+    }
+    folder.join(NAME)
+}
+
+/// How a journal is called in its bundle.
+#[must_use]
+pub fn name_of(path: &Path) -> String {
+    let name = path.file_name();
+    name.map_or_else(|| NAME.to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Packs the journal of a bundle with gzip.
+///
+/// # Errors
+/// What the operating system says.
+pub fn pack(folder: &Path) -> io::Result<()> {
+    let draft = folder.join(format!(".{PACKED}.draft"));
+    let mut packed = GzEncoder::new(File::create(&draft)?, Compression::default());
+    io::copy(&mut File::open(folder.join(NAME))?, &mut packed)?;
+    packed.finish()?.sync_all()?;
+    std::fs::rename(&draft, folder.join(PACKED))?;
+    std::fs::remove_file(folder.join(NAME))
+}
 
 /// Writes records through to a file.
 #[derive(Debug)]
@@ -37,6 +76,26 @@ impl JournalWriter {
             last: None,
             written: 0,
         })
+    }
+
+    /// Creates the file with the records of another one in it, byte for byte, to go on with them. A last line that is cut
+    /// off is left out.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn going_on(path: &Path, before: &Path) -> io::Result<Self> {
+        let mut writer = Self::create(path)?;
+        let mut reader = open(before)?;
+        let mut line = Vec::new();
+        while reader.read_until(b'\n', &mut line)? > 0 {
+            if line.ends_with(b"\n") {
+                writer.file.write_all(&line)?;
+                writer.written += line.len() as u64;
+                writer.last = Some(hash(&line));
+            }
+            line.clear();
+        }
+        Ok(writer)
     }
 
     /// Writes one record as one line, in one call to the operating system.
@@ -127,6 +186,17 @@ pub struct Recording {
     pub torn: bool,
 }
 
+/// The lines of a journal.
+fn open(path: &Path) -> io::Result<Box<dyn BufRead>> {
+    let mut file = BufReader::new(File::open(path)?);
+    let is_packed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
+    Ok(if is_packed {
+        Box::new(BufReader::new(MultiGzDecoder::new(file)))
+    } else {
+        Box::new(file)
+    })
+}
+
 /// Reads a journal.
 ///
 /// # Errors
@@ -137,7 +207,7 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
         source,
     };
     let mut journal = Journal::new();
-    let mut reader = BufReader::new(File::open(path).map_err(io)?);
+    let mut reader = open(path).map_err(io)?;
     let mut text = Vec::new();
     let mut line = 0;
     let mut last = 0;
@@ -277,6 +347,31 @@ mod tests {
         let back = read(&path).expect("read");
         assert!(back.torn);
         assert_eq!(back.journal.entries().len(), records.len() - 1);
+    }
+
+    #[test]
+    fn a_packed_journal_reads_alike_and_can_be_gone_on_with() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join(NAME);
+        let records = some_records();
+        let mut writer = JournalWriter::create(&path).expect("create");
+        for record in &records[..2] {
+            writer.write(record).expect("write");
+        }
+        let plain = std::fs::read(&path).expect("bytes");
+        pack(folder.path()).expect("pack");
+        let packed = find(folder.path());
+        assert!(packed.ends_with(PACKED) && !path.exists());
+        assert_eq!(read(&packed).expect("read").journal.entries().len(), 2);
+        let other = folder.path().join("other.jsonl");
+        let mut writer = JournalWriter::going_on(&other, &packed).expect("go on");
+        for record in &records[2..] {
+            writer.write(record).expect("write");
+        }
+        let whole = std::fs::read(&other).expect("bytes");
+        assert!(whole.starts_with(&plain), "what was there is not what it was");
+        let back = read(&other).expect("a chain").journal;
+        assert_eq!(back.entries().len(), records.len());
     }
 
     #[test]

@@ -8,6 +8,11 @@ use serde_json::{Map, Number, Value};
 
 use super::Payload;
 
+/// So deep objects and lists may lie in one another.
+const DEPTH: usize = 127;
+/// How `serde_json` says that they lie deeper.
+const TOO_DEEP: &str = "recursion limit exceeded";
+
 /// The outcome of parsing one payload.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parsed {
@@ -23,6 +28,8 @@ pub enum JsonProblem {
         /// Length in bytes.
         length: u64,
     },
+    /// Deeper than it is parsed.
+    TooDeep,
     /// Nothing at all.
     Empty,
     /// Not UTF-8.
@@ -44,6 +51,10 @@ impl std::fmt::Display for JsonProblem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::TooBig { length } => write!(f, "{length} bytes are too many to parse"),
+            Self::TooDeep => write!(
+                f,
+                "objects and lists lie in one another more than {DEPTH} deep, which is not parsed"
+            ),
             Self::Empty => f.write_str("the payload is empty"),
             Self::NotUtf8 { at } => write!(f, "not UTF-8 from byte {at}"),
             Self::ByteOrderMark => f.write_str("starts with a byte order mark"),
@@ -106,7 +117,12 @@ impl Parsed {
                 }
             }
             Err(error) => {
-                problems.push(JsonProblem::Syntax(error.to_string()));
+                let text = error.to_string();
+                problems.push(if text.starts_with(TOO_DEEP) {
+                    JsonProblem::TooDeep
+                } else {
+                    JsonProblem::Syntax(text)
+                });
                 Self { value: None, problems }
             }
         }
@@ -118,10 +134,32 @@ impl Parsed {
         self.value.as_ref()
     }
 
+    /// About how many bytes of memory the value takes.
+    #[must_use]
+    pub fn weight(&self) -> u64 {
+        self.value.as_ref().map_or(0, weight)
+    }
+
     /// What is wrong with the bytes.
     #[must_use]
     pub fn problems(&self) -> &[JsonProblem] {
         &self.problems
+    }
+}
+
+/// A value with all that lies in it, as it is held in memory.
+fn weight(value: &Value) -> u64 {
+    const ONE: u64 = size_of::<Value>() as u64;
+    /// Hash, index and room to grow of a member.
+    const MEMBER: u64 = 3 * size_of::<String>() as u64;
+    ONE + match value {
+        Value::String(text) => text.len() as u64,
+        Value::Array(items) => items.iter().map(weight).sum(),
+        Value::Object(members) => members
+            .iter()
+            .map(|(name, value)| MEMBER + name.len() as u64 + weight(value))
+            .sum(),
+        Value::Null | Value::Bool(_) | Value::Number(_) => 0,
     }
 }
 
@@ -233,7 +271,25 @@ mod tests {
     #[test]
     fn deep_nesting_is_an_error_and_not_a_crash() {
         let deep = vec![b'['; 200_000];
-        assert!(matches!(Parsed::of_bytes(&deep).problems(), [JsonProblem::Syntax(_)]));
+        assert_eq!(Parsed::of_bytes(&deep).problems(), [JsonProblem::TooDeep]);
+    }
+
+    #[test]
+    fn what_is_too_deep_is_not_called_something_else_than_json() {
+        let nested = |levels: usize| format!("{{\"x\":{}{}}}", "[".repeat(levels), "]".repeat(levels));
+        assert_eq!(Parsed::of_bytes(nested(DEPTH - 1).as_bytes()).problems(), []);
+        assert_eq!(
+            Parsed::of_bytes(nested(DEPTH).as_bytes()).problems(),
+            [JsonProblem::TooDeep]
+        );
+    }
+
+    #[test]
+    fn a_value_weighs_what_it_holds_and_not_what_it_was_written_with() {
+        let short = format!("[{}0]", "0,".repeat(9_999));
+        let weight = Parsed::of_bytes(short.as_bytes()).weight();
+        assert!(weight > 10_000 * size_of::<Value>() as u64, "{weight}");
+        assert!(Parsed::of_bytes(b"").weight() == 0);
     }
 
     proptest! {

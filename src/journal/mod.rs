@@ -10,6 +10,7 @@ pub mod file;
 pub mod json;
 mod packet;
 mod payload;
+pub mod place;
 mod plan;
 mod waiver;
 
@@ -94,6 +95,15 @@ impl Entry {
         self.shared().map(Arc::as_ref)
     }
 
+    /// About how many bytes of memory its payload takes: its bytes, and the value they are parsed to, unless another record
+    /// has that already.
+    #[must_use]
+    pub fn held(&self) -> u64 {
+        let bytes = self.payload().map_or(0, |payload| payload.bytes().len() as u64);
+        let own = self.shared().filter(|parsed| Arc::strong_count(parsed) == 1);
+        bytes + own.map_or(0, |parsed| parsed.weight())
+    }
+
     fn shared(&self) -> Option<&Arc<Parsed>> {
         let payload = self.payload()?;
         Some(self.parsed.get_or_init(|| Arc::new(Parsed::of(payload))))
@@ -117,7 +127,7 @@ impl Entry {
 }
 
 /// The records of a run, in order.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Journal {
     entries: Vec<Arc<Entry>>,
 }

@@ -10,32 +10,21 @@
 //! stranger.
 
 mod client;
+mod influence;
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::{Direction, Event, LinkFault, Packet, Payload, Will};
+use crate::journal::event::{Direction, Event, Occurrence, Packet, Payload, Will};
 use crate::pack::{Pack, Role};
 use client::{Client, Look, Stranger, Who};
+use influence::{AFTER_COMMAND, AFTER_FORGERY, AFTER_TAKEOVER, Excuse, Influence};
 
-/// For how long what the harness did to the link excuses a device that comes back in another shape.
-const AFTER_FAULT: Duration = Duration::from_secs(60);
-/// The same of a hook.
-const AFTER_HOOK: Duration = Duration::from_secs(150);
-/// For how long a message that somebody else has sent in the name of the device may show in what is found.
-const AFTER_FORGERY: Duration = Duration::from_secs(5);
-/// The same of somebody who took the client id of the device, and threw it out.
-const AFTER_TAKEOVER: Duration = Duration::from_secs(60);
-/// The same of somebody who commanded the device.
-const AFTER_COMMAND: Duration = Duration::from_secs(120);
-/// How many messages of strangers are awaited from the broker.
-const AWAITED: usize = 20_000;
 /// How many client ids are kept in mind, and how many strangers are named.
 const KEPT: usize = 256;
 const NAMED: usize = 8;
@@ -66,14 +55,10 @@ pub(super) struct Company {
     device: BTreeMap<String, (Look, BTreeSet<String>)>,
     /// The client ids of bystanders.
     strangers: BTreeMap<String, Stranger>,
-    /// What strangers have published and the broker has not delivered yet.
-    forged: VecDeque<u64>,
     /// The peers of connections, until they say who they are.
     peers: BTreeMap<u64, String>,
-    excused: Option<Moment>,
-    disturbed: bool,
-    /// Until when findings may stem from somebody else, and from whom.
-    interference: Option<(Moment, Arc<str>)>,
+    excuse: Excuse,
+    influence: Influence,
 }
 
 impl Company {
@@ -100,15 +85,15 @@ impl Company {
     pub fn observe(&mut self, entry: &Arc<Entry>) -> Part {
         let now = entry.at().moment;
         match entry.event() {
-            Event::Fault { fault } => {
-                self.disturbed = *fault != LinkFault::Restore;
-                self.excuse(now + AFTER_FAULT);
-            }
-            Event::Hook { .. } => self.excuse(now + AFTER_HOOK),
+            Event::Fault { fault } => self.excuse.fault(fault, now),
+            Event::Hook { .. } => self.excuse.hook(now),
             Event::Opened { connection, peer } => {
                 self.peers.insert(*connection, peer.clone());
             }
-            Event::Message { topic, payload, .. } => return self.delivered(topic, payload),
+            // A stranger's, if a stranger has just sent the same.
+            Event::Message { topic, payload, .. } if self.influence.is_delivery(topic, payload) => {
+                return Part::Bystander;
+            }
             Event::Packet { connection, packet } => return self.packet(*connection, packet, entry),
             Event::Undecodable { connection, .. } => return self.part_of(*connection, entry),
             Event::Closed { connection, .. } => {
@@ -124,10 +109,29 @@ impl Company {
 
     /// Why what is found now may stem from somebody else.
     pub fn interference(&self, now: Moment) -> Option<&Arc<str>> {
-        self.interference
-            .as_ref()
-            .filter(|(until, _)| now <= *until)
-            .map(|(_, why)| why)
+        self.influence.at(now)
+    }
+
+    /// Whether nothing would be judged otherwise without an occurrence: it is of a client that is not the device, and tells
+    /// neither who that is nor what it does in the name of the device.
+    pub fn is_dispensable(&self, occurrence: &Occurrence) -> bool {
+        let is_sent = occurrence.direction != Some(Direction::ToDevice);
+        let connection = match &occurrence.event {
+            Event::Packet {
+                packet: Packet::Connect { .. } | Packet::Subscribe { .. } | Packet::Disconnect { .. },
+                ..
+            } => return false,
+            Event::Packet {
+                packet: Packet::Publish { topic, .. },
+                ..
+            } if is_sent && (self.own.contains(topic) || self.commands.contains(topic)) => return false,
+            Event::Packet { connection, .. } | Event::Undecodable { connection, .. } => *connection,
+            _ => return false,
+        };
+        match self.open.get(&connection) {
+            Some(client) => client.who != Who::Device,
+            None => self.device_beside(connection).any(|client| self.is_known(client)),
+        }
     }
 
     /// What restricts the statement.
@@ -143,20 +147,6 @@ impl Company {
             all.push(format!("{more} more clients did the like."));
         }
         all
-    }
-
-    fn excuse(&mut self, until: Moment) {
-        self.excused = self.excused.max(Some(until));
-    }
-
-    /// Whether the device may come back in another shape, or while its former connection seems open.
-    fn is_excused(&self, now: Moment) -> bool {
-        self.disturbed || self.excused.is_some_and(|until| now <= until)
-    }
-
-    fn interfere(&mut self, until: Moment, why: String) {
-        let until = self.interference.as_ref().map_or(until, |(known, _)| until.max(*known));
-        self.interference = Some((until, why.into()));
     }
 
     /// A connection of the device other than this one.
@@ -219,7 +209,7 @@ impl Company {
         let taken = self
             .device_beside(connection)
             .any(|client| client.id == id && self.is_known(client));
-        let is_excused = self.is_excused(now);
+        let is_excused = self.excuse.holds(now);
         let carries_will = will.is_some_and(|will| self.own.contains(&will.topic));
         let somebody = self.device_beside(connection).any(|client| self.is_known(client));
         let who = match is_like {
@@ -236,7 +226,7 @@ impl Company {
         }
         if taken && who == Who::Bystander {
             let why = format!("a client at {peer} took the client id of the device, {id:?}, which was thrown out");
-            self.interfere(now + AFTER_TAKEOVER, why);
+            self.influence.lasts(now + AFTER_TAKEOVER, why);
         }
         let mut client = Client::new(id, peer, look, who, entry.seq());
         if let Some((_, published)) = self.device.get(id).filter(|_| who == Who::Device) {
@@ -326,11 +316,11 @@ impl Company {
         });
         if let Some((is_alike, why)) = beside {
             let now = entry.at().moment;
-            if is_new && !is_alike && !self.is_excused(now) {
+            if is_new && !is_alike && !self.excuse.holds(now) {
                 return self.forges(connection, topic, payload, retain, entry);
             }
             if topic != self.connection {
-                self.interfere(now + AFTER_TAKEOVER, why);
+                self.influence.lasts(now + AFTER_TAKEOVER, why);
             }
         }
         self.joins(connection, entry, |client| {
@@ -341,7 +331,7 @@ impl Company {
     /// Somebody else speaks in the name of the device.
     fn forges(&mut self, connection: u64, topic: &str, payload: &Payload, retain: bool, entry: &Arc<Entry>) -> Part {
         let now = entry.at().moment;
-        self.await_delivery(topic, payload);
+        self.influence.await_delivery(topic, payload);
         if let Some(who) = self.disown(connection, topic, entry) {
             let why = format!("{who} published on {topic}, where only the device may");
             // What is stored in its name comes to every later subscriber.
@@ -350,7 +340,7 @@ impl Company {
             } else {
                 AFTER_FORGERY
             };
-            self.interfere(now + long, why);
+            self.influence.lasts(now + long, why);
         }
         Part::Bystander
     }
@@ -363,10 +353,10 @@ impl Company {
         if is_device {
             return self.part_of(connection, entry);
         }
-        self.await_delivery(topic, payload);
+        self.influence.await_delivery(topic, payload);
         if let Some(who) = self.disown(connection, topic, entry) {
             let why = format!("{who} published on {topic}, where the device is commanded");
-            self.interfere(entry.at().moment + AFTER_COMMAND, why);
+            self.influence.lasts(entry.at().moment + AFTER_COMMAND, why);
         }
         Part::Bystander
     }
@@ -380,34 +370,4 @@ impl Company {
         self.stranger(&id, &peer, entry.seq()).publishes(topic);
         Some(format!("the client {id:?} at {peer}"))
     }
-
-    fn await_delivery(&mut self, topic: &str, payload: &Payload) {
-        if self.forged.len() >= AWAITED {
-            self.forged.pop_front();
-        }
-        self.forged.push_back(trace(topic, payload));
-    }
-
-    /// A message came from the broker: a stranger's, if a stranger has just sent the same.
-    fn delivered(&mut self, topic: &str, payload: &Payload) -> Part {
-        if self.forged.is_empty() {
-            return Part::Judged;
-        }
-        let trace = trace(topic, payload);
-        match self.forged.iter().position(|known| *known == trace) {
-            Some(at) => {
-                self.forged.remove(at);
-                Part::Bystander
-            }
-            None => Part::Judged,
-        }
-    }
-}
-
-/// What tells messages apart.
-fn trace(topic: &str, payload: &Payload) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    topic.hash(&mut hasher);
-    payload.bytes().hash(&mut hasher);
-    hasher.finish()
 }

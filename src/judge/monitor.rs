@@ -22,7 +22,7 @@ use crate::suite::model::{Monitor, Need, Rule};
 use crate::verdict::{Accumulated, Verdict};
 
 /// How many occurrences of a finding are kept by number.
-const FIRST: usize = 5;
+pub(super) const FIRST: usize = 5;
 /// How many different findings a monitor keeps.
 const DIFFERENT: usize = 64;
 

@@ -11,13 +11,13 @@ use super::timeline::Place;
 const MOST: usize = 1_000_000;
 
 /// What is measured.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Reactions {
     vehicles: Vec<OfVehicle>,
     measured: usize,
 }
 
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct OfVehicle {
     serial_number: String,
     /// When it said its last state.
@@ -57,6 +57,25 @@ impl Reactions {
             }
             _ => {}
         }
+    }
+
+    /// Together with what was measured in the run before.
+    pub fn after(&self, before: &Self) -> Self {
+        let mut all = before.clone();
+        for own in &self.vehicles {
+            let known = all
+                .vehicles
+                .iter_mut()
+                .find(|known| known.serial_number == own.serial_number);
+            match known {
+                Some(known) => {
+                    known.orders += own.orders;
+                    known.times.extend(&own.times);
+                }
+                None => all.vehicles.push(own.clone()),
+            }
+        }
+        all
     }
 
     /// What was measured; `None` when an AGV is tested.

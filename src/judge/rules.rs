@@ -30,6 +30,9 @@ pub enum JudgeError {
     /// It is about a side of the interface nobody knows.
     #[error("the journal is about the role `{0}`, which there is not")]
     Role(String),
+    /// A run goes on in it with one that was about something else.
+    #[error("the journal goes on with a run about another device, version or vantage, or with other suites")]
+    AnotherRun,
     /// It names a test the suites do not have.
     #[error("the journal names the test `{0}`, which the suites do not have")]
     UnknownTest(String),

@@ -4,17 +4,23 @@
 //! result at any time. Nothing but the journal and the suites enters it, so judging a journal again gives
 //! the same result, byte for byte.
 
+mod going_on;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde_json::Value;
 
+pub use going_on::{judge, judged};
+
 use super::company::{Company, Part};
 use super::decide::mood;
 use super::grounds::Grounds;
 use super::hidden::Hidden;
+use super::joined;
 use super::mend::mended;
+use super::opinions::Opinions;
 use super::reactions::Reactions;
 use super::rules::{JudgeError, Rules};
 use super::test::{Ground, TestJudge};
@@ -22,14 +28,17 @@ use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
 use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
-use crate::journal::event::{Event, Gate, Plan, Reading, RunHeader, Waiver};
+use crate::journal::event::{Event, Gate, Occurrence, Plan, Reading, RunHeader, Waiver};
 use crate::pack::{Decided, Role};
-use crate::result::{Capability, Decision, DeviceIdentity, Given, RequirementResult, RunResult, TestResult};
+use crate::result::{Capability, Decision, DeviceIdentity, Repetition, RequirementResult, RunResult, TestResult};
 use crate::suite::model::{Monitor, Test};
 use crate::verdict::{Accumulated, Verdict};
 
 /// Format of `result.json`.
 pub const RESULT_FORMAT: &str = "vda5050-tck.result/1";
+
+/// Why a run without an end is over.
+const BREAKS_OFF: &str = "the journal breaks off here";
 
 /// A run being judged.
 pub struct RunJudge {
@@ -39,16 +48,24 @@ pub struct RunJudge {
     ground: Ground,
     begun: Stamp,
     last: Stamp,
+    /// The number of the last record.
+    records: u64,
     timeline: Timeline,
     watches: Watches,
     /// Who is on the tap, where that is known.
     company: Option<Company>,
+    /// Whether the last entry was left out.
+    left_out: bool,
     reactions: Reactions,
     /// The instant actions the harness has sent: type by id.
     instants: BTreeMap<String, String>,
     last_order: Option<(Moment, String)>,
     current: Option<TestJudge>,
     done: Vec<TestResult>,
+    /// Which repetition of the running test it is, where tests are repeated.
+    repetition: Option<u32>,
+    /// The run that broke off and that this one goes on with.
+    earlier: Option<Box<Self>>,
     plan: Plan,
     end: Option<(bool, Option<String>)>,
     /// Another device spoke than the one that was to be judged.
@@ -86,6 +103,7 @@ impl RunJudge {
             ground,
             begun: first.at(),
             last: first.at(),
+            records: first.seq(),
             watches,
             company,
             reactions,
@@ -93,16 +111,34 @@ impl RunJudge {
             last_order: None,
             current: None,
             done: Vec::new(),
+            repetition: None,
+            earlier: None,
             plan: Plan::default(),
             end: None,
             is_stranger: false,
+            left_out: false,
         })
+    }
+
+    /// Whether the last entry was left out, because it is of somebody who is not the device.
+    pub fn has_left_out(&self) -> bool {
+        self.left_out
+    }
+
+    /// Whether nothing would be judged otherwise without this: somebody who is not the device does something that has
+    /// nothing to do with it.
+    pub fn can_do_without(&self, occurrence: &Occurrence) -> bool {
+        self.company
+            .as_ref()
+            .is_some_and(|company| company.is_dispensable(occurrence))
     }
 
     /// Shows it the next entry.
     pub fn observe(&mut self, entry: &Arc<Entry>) -> Result<(), JudgeError> {
         self.last = entry.at();
-        if self.is_of_bystander(entry) {
+        self.records = entry.seq();
+        self.left_out = self.is_of_bystander(entry);
+        if self.left_out {
             return Ok(());
         }
         let subject = self.timeline.add(entry);
@@ -123,9 +159,14 @@ impl RunJudge {
                 bindings.set(name, value.clone());
                 self.ground.bindings = Arc::new(bindings.to_map());
             }
-            Event::TestBegun { test, bindings } => {
+            Event::TestBegun {
+                test,
+                bindings,
+                repetition,
+            } => {
                 self.break_off("the run went on without ending this test");
                 let found = self.test(test).ok_or_else(|| JudgeError::UnknownTest(test.clone()))?;
+                self.repetition = *repetition;
                 self.current = Some(TestJudge::begin(&found, &self.ground, entry, bindings));
             }
             Event::RunEnded {
@@ -203,13 +244,31 @@ impl RunJudge {
             let mut decisions = result.decisions.iter();
             decisions.any(|decision| decision.verdict() != Verdict::Inconclusive)
         };
-        let before = self.done.iter().position(|done| done.id == result.id && !decided(done));
+        self.number(&mut result);
+        let number = |result: &TestResult| result.repetitions.first().map(|one| one.number);
+        let same = |done: &TestResult| done.id == result.id && number(done) == number(&result);
+        let before = self.done.iter().position(|done| same(done) && !decided(done));
         if let Some(before) = before {
             let before = self.done.remove(before);
             let why = before.reason.unwrap_or_else(|| "it decided nothing".to_owned());
             result.allowances.push(format!("tried again, since at first: {why}"));
         }
         self.done.push(result);
+    }
+
+    /// Notes which repetition a result is of.
+    fn number(&self, result: &mut TestResult) {
+        result.repetitions = self
+            .repetition
+            .map(|number| Repetition {
+                number,
+                verdict: result.verdict,
+                seconds: result.seconds,
+                reason: result.reason.clone(),
+                journal: result.journal,
+            })
+            .into_iter()
+            .collect();
     }
 
     /// What the vehicle says of itself: the last state of its present connection, read as it is meant.
@@ -249,7 +308,9 @@ impl RunJudge {
     fn break_off(&mut self, why: &str) {
         if let Some(mut current) = self.current.take() {
             current.hide(hidden(&self.watches, &self.ground.waivers));
-            self.done.push(current.break_off(self.last.moment, why, &self.ground));
+            let mut result = current.break_off(self.last.moment, why, &self.ground);
+            self.number(&mut result);
+            self.done.push(result);
         }
     }
 
@@ -287,26 +348,33 @@ impl RunJudge {
         &self.ground
     }
 
-    /// The result as it stands.
-    pub fn result(&self) -> RunResult {
-        // Which order they were run in is the harness's own business.
-        let mut tests = self.done.clone();
-        let places: BTreeMap<&str, usize> = self
-            .rules
-            .suites
-            .tests
-            .iter()
-            .enumerate()
-            .map(|(at, test)| (test.id.as_str(), at))
-            .collect();
-        tests.sort_by_key(|test| places.get(test.id.as_str()).copied());
-        tests.extend(self.set_aside());
-        let watched = if self.is_stranger {
-            tests.clear();
+    /// The tests that were planned, as this run and the one before it left them: what was run, in the order of the suites,
+    /// and then what was not.
+    fn tests(&self) -> Vec<TestResult> {
+        let mut tests = if self.is_stranger {
             Vec::new()
         } else {
-            self.watches.results()
+            let mut tests = joined::repetitions(&self.done);
+            tests.extend(self.set_aside());
+            tests
         };
+        if let Some(earlier) = &self.earlier {
+            tests = joined::tests(earlier.tests(), tests);
+        }
+        // Which order they were run in is the harness's own business.
+        let suites = self.rules.suites.tests.iter().enumerate();
+        let places: BTreeMap<&str, usize> = suites.map(|(at, test)| (test.id.as_str(), at)).collect();
+        tests.sort_by_key(|test| match test.journal {
+            Some(_) => (false, places.get(test.id.as_str()).copied()),
+            None => (true, None),
+        });
+        tests
+    }
+
+    /// The result as it stands.
+    pub fn result(&self) -> RunResult {
+        let tests = self.tests();
+        let watched = self.watched();
         let all = tests
             .iter()
             .filter_map(|test| test.verdict)
@@ -325,13 +393,19 @@ impl RunJudge {
         let unknown = (partial && !self.is_stranger).then_some(Verdict::Inconclusive);
         let verdict = verdict.into_iter().chain(unknown).collect::<Accumulated>().get();
         let header = &self.header;
+        let joined = self.joined();
+        let fleet = match &self.earlier {
+            Some(earlier) => self.reactions.after(&earlier.reactions).result(),
+            None => self.reactions.result(),
+        };
         RunResult {
             format: RESULT_FORMAT.to_owned(),
             tool: header.tool.clone(),
             run: header.run.clone(),
             mode: header.mode.clone(),
             started: format!("{:.3}", self.begun.utc),
-            seconds: self.last.moment.since(self.begun.moment).as_secs_f64(),
+            seconds: joined.iter().map(|run| run.seconds).sum::<f64>()
+                + self.last.moment.since(self.begun.moment).as_secs_f64(),
             role: header.role.clone(),
             protocol: header.protocol.clone(),
             partial,
@@ -346,6 +420,7 @@ impl RunJudge {
             suites_sha256: header.suites.clone(),
             suites_modified: header.modified,
             journal: "journal.jsonl".to_owned(),
+            joined,
             requirements: self.requirements(&tests, &watched),
             tests,
             monitors: watched.into_iter().map(|watched| watched.result).collect(),
@@ -359,7 +434,7 @@ impl RunJudge {
                     source: capability.source.clone(),
                 })
                 .collect(),
-            fleet: self.reactions.result(),
+            fleet,
             limits: self.limits(),
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
@@ -377,6 +452,9 @@ impl RunJudge {
             ));
         }
         limits.extend(self.company.iter().flat_map(Company::limits));
+        let before = self.earlier.iter().flat_map(|earlier| earlier.limits());
+        let before: Vec<String> = before.filter(|limit| !limits.contains(limit)).collect();
+        limits.extend(before);
         limits
     }
 
@@ -401,6 +479,7 @@ impl RunJudge {
                 decisions: Vec::new(),
                 steps: Vec::new(),
                 allowances: Vec::new(),
+                repetitions: Vec::new(),
             };
             let why = match &planned.gate {
                 Gate::NotApplicable(why) => {
@@ -492,50 +571,6 @@ impl RunJudge {
     }
 }
 
-/// What tests and monitors say about one requirement.
-#[derive(Default)]
-struct Opinions {
-    /// Of those that ran.
-    run: Accumulated,
-    /// Of tests that were set aside before they began: for a hook that is missing, or motion that is not permitted.
-    aside: Accumulated,
-    by: Vec<String>,
-    given: BTreeMap<Verdict, Vec<String>>,
-}
-
-impl Opinions {
-    fn add(&mut self, verdict: Verdict, by: &str, ran: bool) {
-        if ran {
-            self.run.add(verdict);
-        } else {
-            self.aside.add(verdict);
-        }
-        let given = self.given.entry(verdict).or_default();
-        for list in [&mut self.by, given] {
-            if !list.iter().any(|known| known == by) {
-                list.push(by.to_owned());
-            }
-        }
-    }
-
-    /// What could not be tried does not make undecided what was decided.
-    fn verdict(&self) -> Option<Verdict> {
-        self.run.get().or(self.aside.get())
-    }
-
-    /// All of them, the worst first; nothing where they agree.
-    fn verdicts(&self) -> Vec<Given> {
-        if self.given.len() < 2 {
-            return Vec::new();
-        }
-        let given = self.given.iter().rev().map(|(verdict, by)| Given {
-            verdict: *verdict,
-            by: by.clone(),
-        });
-        given.collect()
-    }
-}
-
 /// What shows nothing in a test: what was found in it, and what is known from before.
 fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
     let mut all = watches.hidden();
@@ -553,15 +588,4 @@ fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
 
 fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
     Decision::new(requirement, Verdict::Inconclusive, clause, place, why.to_owned())
-}
-
-/// Judges a whole journal.
-pub fn judge(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunResult, JudgeError> {
-    let first = entries.first().ok_or(JudgeError::NoHeader)?;
-    let mut run = RunJudge::begin(rules, first)?;
-    for entry in entries {
-        run.observe(entry)?;
-    }
-    run.break_off_run("the journal breaks off here");
-    Ok(run.result())
 }

@@ -130,6 +130,7 @@ impl TestJudge {
                 decisions: Vec::new(),
                 steps: Vec::new(),
                 allowances: Vec::new(),
+                repetitions: Vec::new(),
             },
             departure: Departure::default(),
             interference: ground.interference.clone(),
@@ -269,7 +270,7 @@ impl TestJudge {
         let cut_short = match end {
             StepEnd::Decided | StepEnd::Deadline => None,
             StepEnd::Interrupted => Some("the run was interrupted".to_owned()),
-            StepEnd::Broken(why) | StepEnd::Refused(why) => Some(why.clone()),
+            StepEnd::Broken(why) | StepEnd::Refused(why) | StepEnd::Skipped(why) => Some(why.clone()),
         };
         let at = entry.at().moment;
         let outcome = evaluator.end(at, cut_short.as_deref(), &self.scene(timeline, ground));
@@ -281,7 +282,7 @@ impl TestJudge {
         }
         match end {
             StepEnd::Broken(why) => self.broken(section, &step, why),
-            StepEnd::Refused(why) => self.refused(section, &step, why),
+            StepEnd::Refused(why) | StepEnd::Skipped(why) => self.refused(section, &step, why),
             _ => {}
         }
         for (name, value) in &outcome.saves {
@@ -354,7 +355,7 @@ impl TestJudge {
         }
     }
 
-    /// A device that does not do what it is asked for leaves the test undecided; it is nobody's breakdown.
+    /// A device that does not do what it is asked for, or an operator who skips the test, leaves the test undecided; it is nobody's breakdown.
     fn refused(&mut self, section: Section, step: &Step, why: &str) {
         match section {
             Section::Given => self.preamble = Err(format!("the precondition was not reached: {}: {why}", step.path)),
@@ -373,6 +374,7 @@ impl TestJudge {
         let word = match (end, &outcome.reached) {
             (StepEnd::Broken(_), _) => "broken",
             (StepEnd::Interrupted, _) => "interrupted",
+            (StepEnd::Skipped(_), _) => "skipped",
             (StepEnd::Refused(_), _) | (_, Some(Err(_))) => "failed",
             _ => "done",
         };

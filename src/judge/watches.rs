@@ -9,7 +9,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use super::hidden::Hidden;
-use super::monitor::MonitorJudge;
+use super::monitor::{FIRST, MonitorJudge};
 use super::test::Ground;
 use super::timeline::Timeline;
 use crate::checks::{FleetSeen, Shared};
@@ -91,6 +91,19 @@ impl Watched {
             all.extend(bound.map(|binding| (binding.requirement.as_str().to_owned(), Verdict::Inconclusive)));
         }
         all
+    }
+
+    /// Puts together what it found in a run and in the one after it.
+    pub fn go_on(&mut self, later: Self) {
+        for finding in &later.result.findings {
+            let own = self.result.findings.iter_mut();
+            let mut same = own.filter(|own| own.requirement == finding.requirement && own.verdict == finding.verdict);
+            if let Some(known) = same.next() {
+                let room = FIRST.saturating_sub(known.first.len());
+                known.first.extend(finding.first.iter().take(room));
+            }
+        }
+        self.absorb(later.result, later.judged);
     }
 
     fn absorb(&mut self, other: MonitorResult, judged: Vec<String>) {

@@ -9,6 +9,7 @@ mod assets;
 mod breakage;
 mod catalogue;
 mod catalogue_file;
+mod fields;
 mod participant;
 mod protocol;
 mod schema;

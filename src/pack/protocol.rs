@@ -7,6 +7,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::fields::{self, FieldRule};
+use super::schema::FindingKind;
 use super::{AssetFile, Assets, MessageSchema, Role, Version};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::yaml;
@@ -61,6 +63,7 @@ struct Protocol {
     topic_template: String,
     topic: Vec<TopicRule>,
     features: BTreeMap<String, bool>,
+    fields: Vec<FieldRule>,
 }
 
 /// One protocol version as data.
@@ -76,6 +79,7 @@ pub struct Pack {
     words: Arc<Map<String, Value>>,
     topic_template: String,
     features: BTreeMap<String, bool>,
+    fields: Vec<FieldRule>,
 }
 
 /// Why a pack could not be read.
@@ -143,6 +147,7 @@ impl Pack {
             schemas,
             topic_template: protocol.topic_template,
             features: protocol.features,
+            fields: protocol.fields,
         })
     }
 
@@ -219,6 +224,20 @@ impl Pack {
         }
         filled.push_str(rest);
         filled
+    }
+
+    /// Which requirement a field of a message breaks that has such a mistake, beside those about types and values in general;
+    /// `None` where none does, or a check of its own judges the field.
+    #[must_use]
+    pub fn requirement_of(&self, topic: &str, path: &[&str], kind: FindingKind) -> Option<&str> {
+        fields::requirement(&self.fields, topic, path, kind)
+    }
+
+    /// The members and requirements that the table of fields names.
+    pub fn fields(&self) -> impl Iterator<Item = (Vec<&str>, Option<&str>)> {
+        self.fields
+            .iter()
+            .map(|rule| (rule.names().collect(), rule.requirement()))
     }
 
     /// Whether the version has a feature (`[features]` of `protocol.toml`): what reference devices switch on.

@@ -191,6 +191,8 @@ impl Taken<'_> {
                 listen: self.text("bench.listen").unwrap_or_default(),
                 tap: self.flag("bench.tap").unwrap_or(true),
                 broker: self.text("bench.broker"),
+                own_topics: self.text("bench.own-topics").unwrap_or_default(),
+                client_id: self.text("bench.client-id").unwrap_or_default(),
                 maps_listen: self.text("bench.maps-listen").unwrap_or_default(),
                 maps_host: self.text("bench.maps-host"),
                 tls_cert: self.path("bench.tls-cert"),

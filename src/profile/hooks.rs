@@ -9,6 +9,8 @@ use std::time::Duration;
 use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::Value;
 
+use super::secret::{Password, PasswordError, SecretText};
+use super::surroundings::Surroundings;
 use crate::diagnostic::Span;
 use crate::pack::Role;
 
@@ -45,6 +47,11 @@ const fn master_control(name: &'static str, parameters: &'static [&'static str],
 
 /// Every hook there is, by role.
 pub const HOOKS: &[HookInfo] = &[
+    agv(
+        "after-start",
+        &[],
+        "Give the vehicle what it needs after every start, before anything else: a position, a login.",
+    ),
     agv("power-cycle", &[], "Switch the vehicle off hard and on again."),
     agv(
         "shutdown",
@@ -125,6 +132,11 @@ pub const HOOKS: &[HookInfo] = &[
     ),
     agv("clear-error", &[], "Clear the fault."),
     agv("confirm", &["question"], "Look, and answer the question with yes."),
+    master_control(
+        "after-start",
+        &[],
+        "Give the master control what it needs before anything else, such as a login.",
+    ),
     master_control(
         "dispatch",
         &["vehicle", "from", "to", "loadType", "action", "parameters"],
@@ -221,6 +233,8 @@ pub enum HookAction {
         url: String,
         /// Body, if there is one.
         body: Option<String>,
+        /// Headers beside the usual ones.
+        headers: Vec<(String, SecretText)>,
     },
     /// A text for a person.
     Prompt(String),
@@ -269,8 +283,21 @@ impl HookAction {
             Self::Run(arguments) => Self::Run(arguments.iter().map(|text| fill(text, values, verbatim)).collect()),
             Self::Prompt(text) => Self::Prompt(fill(text, values, verbatim)),
             Self::RestartDevice | Self::StopDevice | Self::StartDevice | Self::NaturalTraffic => self.clone(),
-            Self::Http { method, url, body } => Self::Http {
+            Self::Http {
+                method,
+                url,
+                body,
+                headers,
+            } => Self::Http {
                 method: method.clone(),
+                headers: headers
+                    .iter()
+                    .map(|(name, value)| {
+                        // A value of the device must not begin a header of its own.
+                        let visible = |value: &str| value.replace(|c: char| c.is_control(), " ");
+                        (name.clone(), value.with_texts(|text| fill(text, values, visible)))
+                    })
+                    .collect(),
                 url: fill(url, values, |value| {
                     utf8_percent_encode(value, NON_ALPHANUMERIC).to_string()
                 }),
@@ -282,6 +309,28 @@ impl HookAction {
         }
     }
 
+    /// The action with the secrets of its headers.
+    ///
+    /// # Errors
+    /// When one is not where it is said to be.
+    pub fn resolved(&self, surroundings: &Surroundings) -> Result<Self, PasswordError> {
+        let mut action = self.clone();
+        if let Self::Http { headers, .. } = &mut action {
+            for (_, value) in headers {
+                *value = value.resolved(surroundings)?;
+            }
+        }
+        Ok(action)
+    }
+
+    /// The secrets in it, once resolved.
+    pub fn secrets(&self) -> Vec<Password> {
+        match self {
+            Self::Http { headers, .. } => headers.iter().flat_map(|(_, value)| value.secrets()).collect(),
+            _ => Vec::new(),
+        }
+    }
+
     /// Every text that may hold placeholders.
     #[must_use]
     pub fn texts(&self) -> Vec<&str> {
@@ -289,11 +338,11 @@ impl HookAction {
             Self::Run(arguments) => arguments.iter().map(String::as_str).collect(),
             Self::Prompt(text) => vec![text],
             Self::RestartDevice | Self::StopDevice | Self::StartDevice | Self::NaturalTraffic => Vec::new(),
-            Self::Http { url, body, .. } => [Some(url), body.as_ref()]
-                .into_iter()
-                .flatten()
-                .map(String::as_str)
-                .collect(),
+            Self::Http { url, body, headers, .. } => {
+                let texts = [Some(url), body.as_ref()].into_iter().flatten().map(String::as_str);
+                let headers = headers.iter().flat_map(|(_, value)| value.texts());
+                texts.chain(headers).collect()
+            }
         }
     }
 }
@@ -372,6 +421,7 @@ mod tests {
             method: "POST".into(),
             url: "http://bench/mode/{mode}".into(),
             body: Some(r#"{"mode": "{mode}", "by": "${mode}"}"#.into()),
+            headers: Vec::new(),
         };
         let HookAction::Http { url, body, .. } = hook.filled(&values(&[("mode", "a\"/?b")])) else {
             panic!("still a request");

@@ -33,7 +33,7 @@ pub enum Kind {
     Files,
     /// `host:port`.
     Address,
-    /// `mqtt://host:port` or `mqtts://host:port`.
+    /// `mqtt://host:port`, or with `mqtts`; `ws://host:port/path`, or with `wss`.
     Broker,
     /// A topic prefix with placeholders.
     Template,
@@ -345,6 +345,8 @@ pub const KEYS: &[Key] = &[
     key("bench.listen", Kind::Address),
     key("bench.tap", Kind::Flag),
     key("bench.broker", Kind::Broker),
+    key("bench.own-topics", Kind::Template),
+    key("bench.client-id", Kind::Text),
     key("bench.maps-listen", Kind::Address),
     key("bench.maps-host", Kind::Text),
     key("bench.tls-cert", Kind::File),

@@ -1,49 +1,31 @@
 //! Finding the sources of settings, and laying them over one another.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::effective::{Effective, effective};
 use super::key::{KEYS, Key, PASSWORD_VARIABLE};
 use super::layer::{Layer, Origin, Setter};
+use super::surroundings::Surroundings;
 use super::value::Value;
 use super::{DEFAULT_TOML, read};
 use crate::diagnostic::{self, Diagnostic, Source};
 
-/// What a process finds around itself. A value, so that tests need no real environment.
-#[derive(Clone, Debug, Default)]
-pub struct Surroundings {
-    /// Where the project file is looked for, here and above.
-    pub directory: PathBuf,
-    /// Environment variables.
-    pub environment: BTreeMap<String, String>,
-}
-
 /// Variables that belong to flags which are no settings of a device.
-const OTHER_VARIABLES: [&str; 5] = [
+const OTHER_VARIABLES: [&str; 7] = [
     PASSWORD_VARIABLE,
     "VDA5050_TCK_PROFILE",
     "VDA5050_TCK_OUT",
     "VDA5050_TCK_FORMAT",
     "VDA5050_TCK_SUITES",
+    "VDA5050_TCK_LOG",
+    "VDA5050_TCK_LOG_FILE",
 ];
 
 /// Name of the project file.
 const PROJECT_FILE: &str = "vda5050-tck.toml";
 
 impl Surroundings {
-    /// Those of this process. Variables that are not text are left out.
-    #[must_use]
-    pub fn of_process() -> Self {
-        Self {
-            directory: std::env::current_dir().unwrap_or_default(),
-            environment: std::env::vars_os()
-                .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)))
-                .collect(),
-        }
-    }
-
     fn project_file(&self) -> Option<PathBuf> {
         self.directory
             .ancestors()

@@ -13,6 +13,8 @@ mod key;
 mod layer;
 mod load;
 mod read;
+mod secret;
+mod surroundings;
 #[cfg(test)]
 mod tests;
 mod time;
@@ -35,7 +37,9 @@ pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
     Statement,
 };
-pub use load::{Surroundings, check, load};
+pub use load::{check, load};
+pub use secret::{Password, PasswordError, PasswordSource, SecretText, Secrets};
+pub use surroundings::Surroundings;
 pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 pub use vehicle::{VEHICLE_WORDS, VehicleWord, find as find_vehicle_word};
 
@@ -212,8 +216,12 @@ pub struct Bench {
     pub listen: String,
     /// Whether the device connects through the tap.
     pub tap: bool,
-    /// A broker other than the built-in one, as `mqtt://…` or `mqtts://…`.
+    /// A broker other than the built-in one, as `mqtt://…`, `mqtts://…`, `ws://…` or `wss://…`.
     pub broker: Option<String>,
+    /// How the topics begin that the harness keeps for itself.
+    pub own_topics: String,
+    /// How the client ids of the harness begin.
+    pub client_id: String,
     /// Where map files are served, as `host:port`.
     pub maps_listen: String,
     /// Host name in the links to map files; that of `maps_listen` when absent.
@@ -228,75 +236,6 @@ pub struct Bench {
     pub username: Option<String>,
     /// Where the password is.
     pub password: PasswordSource,
-}
-
-/// Where a password is found; the password itself is never part of a profile.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum PasswordSource {
-    /// In [`PASSWORD_VARIABLE`], if that is set.
-    Usual,
-    /// In this environment variable, which has to be set.
-    Environment(String),
-    /// In this file, which holds nothing else.
-    File(PathBuf),
-}
-
-/// A password. It has no `Debug` or `Display` that shows it.
-#[derive(Clone, PartialEq, Eq)]
-pub struct Password(String);
-
-impl Password {
-    /// The password, for the CONNECT packet and nothing else.
-    #[must_use]
-    pub fn reveal(&self) -> &str {
-        &self.0
-    }
-}
-
-impl std::fmt::Debug for Password {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Password(…)")
-    }
-}
-
-/// Why a password could not be had.
-#[derive(Debug, thiserror::Error)]
-pub enum PasswordError {
-    /// `password-env` names a variable that is not set.
-    #[error("the environment variable {0} that should hold the password is not set")]
-    NotSet(String),
-    /// `password-file` cannot be read.
-    #[error("the password file {file} cannot be read: {reason}")]
-    Unreadable {
-        /// The file.
-        file: String,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-}
-
-impl PasswordSource {
-    /// The password, if there is one.
-    ///
-    /// # Errors
-    /// When the profile says where it is and it is not there.
-    pub fn password(&self, surroundings: &Surroundings) -> Result<Option<Password>, PasswordError> {
-        let variable = |name: &str| surroundings.environment.get(name).cloned().map(Password);
-        match self {
-            Self::Usual => Ok(variable(PASSWORD_VARIABLE)),
-            Self::Environment(name) => match variable(name) {
-                Some(password) => Ok(Some(password)),
-                None => Err(PasswordError::NotSet(name.clone())),
-            },
-            Self::File(file) => match std::fs::read_to_string(file) {
-                Ok(text) => Ok(Some(Password(text.trim_end_matches(['\r', '\n']).to_owned()))),
-                Err(reason) => Err(PasswordError::Unreadable {
-                    file: file.display().to_string(),
-                    reason,
-                }),
-            },
-        }
-    }
 }
 
 /// `[motion]`.

@@ -159,9 +159,11 @@ fn the_schema_for_editors_refuses_what_a_schema_can_refuse() {
         "slow-after-react",
         "statements-contradict",
     ];
-    const ALSO_BEYOND: [&str; 5] = [
+    const ALSO_BEYOND: [&str; 7] = [
         "action-claimed",
         "action-claimed-absent",
+        "hook-header",
+        "hook-listen-and-timeout",
         "no-tap-no-broker",
         "topic-template-placeholder",
         "vehicle-type-of-nothing",
@@ -264,6 +266,32 @@ fn a_full_profile_arrives_whole() {
     assert_eq!(setting(&effective, "hooks.set-mode"), Some(("http", "device.toml")));
     assert_eq!(setting(&effective, "time.react"), Some(("10 s", "device.toml")));
     assert_eq!(setting(&effective, "time.slow"), Some(("5 s", "default")));
+}
+
+#[test]
+fn a_hook_may_listen_or_carry_headers() {
+    let text = "[hooks.shutdown]\nlisten = \"5 min\"\n[hooks.start]\nhttp = { url = \"https://fleet.site/{vehicle}\", headers = \
+                { Authorization = \"Bearer ${env:TOKEN}\", X-Vehicle = \"{vehicle}\" } }\n";
+    let profile = check_text(text).expect("good").profile;
+    let listens = &profile.hooks["shutdown"];
+    assert_eq!(listens.action, HookAction::NaturalTraffic);
+    assert_eq!(listens.timeout, std::time::Duration::from_secs(300));
+    let mut surroundings = Surroundings::default();
+    let start = &profile.hooks["start"].action;
+    assert!(start.resolved(&surroundings).is_err(), "there is no TOKEN");
+    surroundings
+        .environment
+        .insert("TOKEN".to_owned(), "{vehicle}".to_owned());
+    let values = BTreeMap::from([("vehicle".to_owned(), "mock\r\n1".to_owned())]);
+    let HookAction::Http { url, headers, .. } = start.resolved(&surroundings).expect("TOKEN").filled(&values) else {
+        panic!("still a request");
+    };
+    assert_eq!(url, "https://fleet.site/mock%0D%0A1");
+    let headers: Vec<String> = headers
+        .iter()
+        .map(|(name, value)| format!("{name}: {}", value.reveal()))
+        .collect();
+    assert_eq!(headers, ["Authorization: Bearer {vehicle}", "X-Vehicle: mock  1"]);
 }
 
 #[test]

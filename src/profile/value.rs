@@ -336,10 +336,11 @@ fn address(text: &str) -> Result<String, String> {
 
 fn broker(text: &str) -> Result<Value, Refusal> {
     let expected = |label: &str| Refusal::bad(label).hint(format!("expected {}", Kind::Broker.hint()));
-    let rest = text
-        .strip_prefix("mqtt://")
-        .or_else(|| text.strip_prefix("mqtts://"))
-        .ok_or_else(|| expected("neither mqtt:// nor mqtts://"))?;
+    let (scheme, rest) = text.split_once("://").unwrap_or_default();
+    let is_web = matches!(scheme, "ws" | "wss");
+    if !is_web && !matches!(scheme, "mqtt" | "mqtts") {
+        return Err(expected("neither mqtt:// nor mqtts://, ws:// or wss://"));
+    }
     if rest.contains('@') {
         return Err(Refusal {
             code: "credentials",
@@ -347,7 +348,10 @@ fn broker(text: &str) -> Result<Value, Refusal> {
                 .hint("use `username`, and `password-env` or `password-file`")
         });
     }
-    let place = rest.strip_suffix('/').unwrap_or(rest);
+    let place = match rest.find('/').filter(|_| is_web) {
+        Some(path) => &rest[..path],
+        None => rest.strip_suffix('/').unwrap_or(rest),
+    };
     let has_port = place.rsplit_once(':').is_some_and(|(_, port)| !port.ends_with(']'));
     let with_port = if has_port {
         place.to_owned()
@@ -420,6 +424,8 @@ mod tests {
             "mqtt://[::1]:1883",
             "mqtt://[::1]",
             "mqtt://host:1/",
+            "ws://host",
+            "wss://host:8084/mqtt",
         ] {
             assert!(read(Kind::Broker, good).is_ok(), "{good}");
         }
@@ -428,6 +434,7 @@ mod tests {
             Err("credentials")
         );
         assert!(read(Kind::Broker, "http://host:80").is_err() && read(Kind::Broker, "mqtt://").is_err());
+        assert!(read(Kind::Broker, "mqtt://host/path").is_err() && read(Kind::Broker, "ws:///mqtt").is_err());
     }
 
     #[test]

@@ -21,6 +21,7 @@ use askama::filters::Escaper as _;
 use super::clean;
 use super::findings::{Finding, findings};
 use super::html::Escape;
+use super::repeated;
 use super::sources::Sources;
 use super::statement::{self, Gap};
 use crate::result::{Decision, MonitorResult, RequirementResult, RunResult, TestResult};
@@ -284,6 +285,11 @@ fn test_case(test: &TestResult, how: Inconclusive) -> TestCase {
         (_, None, Some(decision)) => decision.message.as_str(),
         (_, None, None) => "the test decided nothing",
     };
+    let repeated = repeated::summary(test);
+    let message = match &repeated {
+        Some(repeated) if test.is_flaky() => &format!("{repeated}: {message}"),
+        _ => message,
+    };
     let mut findings: Vec<&Decision> = test.decisions.iter().filter(|d| d.verdict() != Verdict::Pass).collect();
     findings.sort_by_key(|decision| std::cmp::Reverse(decision.verdict()));
     let details = findings
@@ -296,7 +302,10 @@ fn test_case(test: &TestResult, how: Inconclusive) -> TestCase {
         class: test.id.split_once('/').map_or("tests", |(group, _)| group),
         seconds: test.seconds,
         outcome: outcome(verdict, kind, message, &details, how),
-        out: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{details}")),
+        out: match verdict {
+            Some(Verdict::Warning) => Some(format!("warning: {message}\n\n{details}")),
+            _ => repeated,
+        },
     }
     .build()
 }

@@ -21,6 +21,7 @@ pub mod known;
 pub mod manifest;
 pub mod markdown;
 pub mod overview;
+pub mod repeated;
 pub mod sequence;
 pub mod side_by_side;
 pub mod sources;

@@ -6,6 +6,7 @@ use super::advice::advice;
 use super::clean::{line, short};
 use super::findings::{Finding, findings};
 use super::headline::reference;
+use super::repeated;
 use super::sources::Sources;
 use super::statement::{self, Counts, many, seconds};
 use super::text::{Color, tag};
@@ -55,6 +56,13 @@ pub fn overview(
         text.push_str("\nFindings:\n");
         for finding in &found {
             row(finding, journal, color, &mut text);
+        }
+    }
+    let flaky = repeated::flaky(result);
+    if !flaky.is_empty() {
+        text.push_str("\nFlaky:\n");
+        for line in flaky {
+            let _ = writeln!(text, "      {line}");
         }
     }
     to_decide_more(result, color, &mut text);

@@ -249,6 +249,7 @@ mod tests {
             spec: ">=1".parse().expect("range"),
             needs: Vec::new(),
             moves: false,
+            tags: Vec::new(),
             maturity: Maturity::Open,
             why: "because".to_owned(),
             given: Vec::new(),

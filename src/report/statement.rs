@@ -237,12 +237,27 @@ pub fn statement(result: &RunResult) -> String {
         }
         None => format!("Nothing was decided about {who} and {standard}."),
     };
+    let joined = match result.joined.as_slice() {
+        [] => String::new(),
+        runs => {
+            let kept: usize = runs.iter().map(|run| run.kept).sum();
+            format!(
+                "Joined from {} (decided tests kept from the interrupted: {kept}). ",
+                many(runs.len() + 1, "run")
+            )
+        }
+    };
+    let flaky = match result.tests.iter().filter(|test| test.is_flaky()).count() {
+        0 => String::new(),
+        1 => " 1 test is flaky: its repetitions have different verdicts.".to_owned(),
+        count => format!(" {count} tests are flaky: their repetitions have different verdicts."),
+    };
     let own = if result.suites_modified {
         "With suites that are not the delivered ones: "
     } else {
         ""
     };
-    format!("{own}{partial}{sentence}")
+    format!("{own}{joined}{partial}{sentence}{flaky}")
 }
 
 /// What restricts the statement, one sentence each: what follows from the result itself, then what the run

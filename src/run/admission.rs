@@ -26,6 +26,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         if !self.wait_for(patience, there).await? {
             return Ok(Err(format!("no device connected within {}", show_duration(patience))));
         }
+        if let Err(why) = self.after_start().await? {
+            return Ok(Err(why));
+        }
         if self.engine.recorder.judge().role() == Role::MasterControl {
             return self.settle_in().await;
         }

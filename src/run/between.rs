@@ -10,6 +10,11 @@ use crate::journal::event::{Event, LinkFault};
 use crate::link::Link;
 use crate::profile::show_duration;
 
+/// The hook that gives the device what it needs after a start.
+const AFTER_START: &str = "after-start";
+/// The hooks after which the device has just been started.
+const STARTS_IT: [&str; 2] = ["power-cycle", "start"];
+
 /// So often a device is switched on before it is given up.
 const STARTS: usize = 2;
 
@@ -63,6 +68,32 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     }
 }
 
+impl<L: Link, O: Operator> Session<'_, L, O> {
+    /// Lets the device have what it needs after a start. `Err` says what did not work.
+    pub(super) async fn after_start(&mut self) -> Result<Result<(), String>, EngineError> {
+        let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == AFTER_START);
+        self.ready_since = next_seq(&self.engine.recorder);
+        if !has_hook {
+            return Ok(Ok(()));
+        }
+        Ok(match self.engine.hook(AFTER_START, Map::new(), true).await? {
+            HookOutcome::Done(_) | HookOutcome::Missing => Ok(()),
+            HookOutcome::Failed(why) | HookOutcome::Refused(why) | HookOutcome::Skipped(why) => {
+                Err(format!("hook `{AFTER_START}` failed: {why}"))
+            }
+        })
+    }
+
+    /// Whether a test has started the device since it was last given what it needs after a start.
+    pub(super) fn was_started(&self) -> bool {
+        let entries = self.engine.recorder.journal().entries().iter().rev();
+        let mut since = entries.take_while(|entry| entry.seq() >= self.ready_since);
+        since.any(
+            |entry| matches!(entry.event(), Event::Hook { hook, ok: true, .. } if STARTS_IT.contains(&hook.as_str())),
+        )
+    }
+}
+
 /// Switches the device off and on by its hook, and waits for the first state of the new connection. A start that takes
 /// long is waited for as long as it gets on; one that does not is tried once more. `Err` says what did not work.
 pub(super) async fn power_cycle<L: Link, O: Operator>(
@@ -79,6 +110,9 @@ pub(super) async fn power_cycle<L: Link, O: Operator>(
             session.engine.note(Event::Note { text })?;
         }
         outcome = off_and_on(session).await?;
+        if outcome.is_ok() {
+            outcome = session.after_start().await?;
+        }
         if outcome.is_ok() || session.engine.interrupted() {
             break;
         }
@@ -91,7 +125,7 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     let before = next_seq(&session.engine.recorder);
     match session.engine.hook("power-cycle", Map::new(), true).await? {
         HookOutcome::Done(_) => {}
-        HookOutcome::Failed(failed) | HookOutcome::Refused(failed) => {
+        HookOutcome::Failed(failed) | HookOutcome::Refused(failed) | HookOutcome::Skipped(failed) => {
             return Ok(Err(format!("hook `power-cycle` failed: {failed}")));
         }
         HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::journal::file::JournalWriter;
+use crate::journal::file::{self, JournalWriter};
 
 /// Why a bundle cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +19,12 @@ pub enum BundleError {
         reason: std::io::Error,
     },
 }
+
+/// A journal of more bytes is packed at the end of the run. What is smaller is more easily read as it is.
+const LARGE: u64 = 1 << 20;
+
+/// The evidence of a run.
+pub const JOURNAL: &str = crate::journal::file::NAME;
 
 /// The link in the folder of reports that leads to the run that was begun last.
 pub const LATEST: &str = "latest";
@@ -65,8 +71,28 @@ impl Bundle {
 
     /// Opens `journal.jsonl`.
     pub fn journal(&self) -> Result<JournalWriter, BundleError> {
-        let path = self.folder.join("journal.jsonl");
+        let path = self.folder.join(JOURNAL);
         JournalWriter::create(&path).map_err(|reason| BundleError::Write { path, reason })
+    }
+
+    /// Opens the journal with the records of another one in it, to go on with them.
+    pub fn journal_after(&self, before: &Path) -> Result<JournalWriter, BundleError> {
+        let path = self.folder.join(JOURNAL);
+        JournalWriter::going_on(&path, before).map_err(|reason| BundleError::Write { path, reason })
+    }
+
+    /// Packs a large journal, and gives the name that it has then.
+    pub fn pack_journal(&self) -> Result<&'static str, BundleError> {
+        let path = self.folder.join(JOURNAL);
+        let failed = |reason| BundleError::Write {
+            path: path.clone(),
+            reason,
+        };
+        if std::fs::metadata(&path).map_err(failed)?.len() <= LARGE {
+            return Ok(JOURNAL);
+        }
+        file::pack(&self.folder).map_err(failed)?;
+        Ok(file::PACKED)
     }
 
     /// Writes one file whole, so that nobody ever sees half of it.
@@ -74,7 +100,10 @@ impl Bundle {
         let path = self.folder.join(name);
         let draft = self.folder.join(format!(".{name}.draft"));
         let written = std::fs::write(&draft, content).and_then(|()| std::fs::rename(&draft, &path));
-        written.map_err(|reason| BundleError::Write { path, reason })
+        written.map_err(|reason| {
+            let _ = std::fs::remove_file(&draft);
+            BundleError::Write { path, reason }
+        })
     }
 }
 

@@ -43,6 +43,8 @@ pub struct Capabilities {
     pub vantage: Vantage,
     /// Names of the hooks that can be run.
     pub hooks: Vec<String>,
+    /// Names of the hooks that are prompts, where nobody can be asked.
+    pub unattended: Vec<String>,
     /// Whether the device can reach the map server; `Err` says why not.
     pub maps: Result<(), String>,
     /// Whether there is a map file that the device can read; `Err` says why not.
@@ -126,6 +128,9 @@ impl Capabilities {
             Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => Gate::NotApplicable(
                 format!("the profile says that the device has nothing for the hook `{name}`"),
             ),
+            Need::Hook(name) if self.unattended.contains(name) => Gate::Unobservable(format!(
+                "hook `{name}` is a prompt, and nobody can be asked: standard input or standard error is no terminal"
+            )),
             Need::Hook(name) => Gate::Unobservable(format!("the profile has no hook `{name}` ([hooks.{name}])")),
             Need::Profile(name) => match self.statements.get(name) {
                 Some(true) => Gate::Runs,
@@ -374,6 +379,7 @@ mod tests {
             claims: BTreeMap::new(),
             vantage: Vantage::Subscriber,
             hooks: Vec::new(),
+            unattended: Vec::new(),
             maps: Ok(()),
             map_file: Ok(()),
             motion: Ok(()),

@@ -16,6 +16,8 @@ pub struct Wishes {
     pub broker: String,
     /// The user name there.
     pub username: Option<String>,
+    /// Whose certificates are trusted there, as a PEM file.
+    pub tls_ca: Option<String>,
     /// A LIF file of the floor.
     pub lif: Option<String>,
     /// The vehicle type in it.
@@ -103,7 +105,12 @@ fn bench(wishes: &Wishes, text: &mut String) {
         }
         None => text.push_str("# username = \"tck\"\n# password-env = \"VDA5050_TCK_PASSWORD\"\n"),
     }
-    text.push_str("# tls-ca = \"ca.crt\"\n");
+    match &wishes.tls_ca {
+        Some(file) => {
+            let _ = writeln!(text, "tls-ca = {}", quoted(file));
+        }
+        None => text.push_str("# tls-ca = \"ca.crt\"\n"),
+    }
 }
 
 fn layout(device: &Device, wishes: &Wishes, text: &mut String) {

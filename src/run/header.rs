@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::bench::Vantage;
 use crate::journal::event::{MockVehicle, RunHeader, Setting};
 use crate::pack::{Pack, Participant};
+use crate::profile::Secrets;
 use crate::result::CERTIFY;
 
 /// Format of the journal.
@@ -85,7 +86,11 @@ impl HeaderParts<'_> {
             modified: self.modified,
             bindings,
             settings: self.settings,
-            command: self.command,
+            command: self
+                .command
+                .iter()
+                .map(|word| Secrets::default().out_of(word))
+                .collect(),
         }
     }
 }

@@ -4,14 +4,17 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Stdio;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
 use tokio::process::{Child, Command};
 
+use super::person::{Answer, Person, ask};
 use super::program::{ask_to_end, program};
+use crate::bench::web;
 use crate::engine::{HookOutcome, Operator};
-use crate::profile::{Hook, HookAction, show_duration};
+use crate::profile::{Hook, HookAction, Secrets, show_duration};
 
 /// Answers of a device that has understood what is wanted, and does not do it: in conflict with what it does now, not
 /// to be processed, not implemented.
@@ -117,8 +120,18 @@ pub struct ProfileHooks {
     common: BTreeMap<String, String>,
     folder: PathBuf,
     device: Option<DeviceProcess>,
-    /// Whether a person may be asked.
-    attended: bool,
+    /// Who may be asked.
+    person: Option<Arc<dyn Person>>,
+    means: Means,
+}
+
+/// What requests need, and what is kept out of everything that is told.
+#[derive(Clone, Debug, Default)]
+pub struct Means {
+    /// PEM file with an authority that is trusted beside those of the system.
+    pub authority: Option<PathBuf>,
+    /// What nobody may read.
+    pub secrets: Secrets,
 }
 
 impl ProfileHooks {
@@ -129,14 +142,16 @@ impl ProfileHooks {
         common: BTreeMap<String, String>,
         folder: PathBuf,
         device: Option<DeviceProcess>,
-        attended: bool,
+        person: Option<Arc<dyn Person>>,
+        means: Means,
     ) -> Self {
         Self {
             hooks,
             common,
             folder,
             device,
-            attended,
+            person,
+            means,
         }
     }
 
@@ -144,8 +159,22 @@ impl ProfileHooks {
         let action = hook.action.filled(values);
         let outcome = match action {
             HookAction::Run(arguments) => tokio::time::timeout(hook.timeout, program(&arguments, &self.folder)).await,
-            HookAction::Http { method, url, body } => {
-                let asked = tokio::task::spawn_blocking(move || request(&method, &url, body.as_deref()));
+            HookAction::Http {
+                method,
+                url,
+                body,
+                headers,
+            } => {
+                let headers = headers.into_iter().map(|(name, value)| (name, value.reveal()));
+                let request = Asked {
+                    method,
+                    url,
+                    body,
+                    headers: headers.collect(),
+                    authority: self.means.authority.clone(),
+                    within: hook.timeout,
+                };
+                let asked = tokio::task::spawn_blocking(move || request.send());
                 let answer = async {
                     asked
                         .await
@@ -153,16 +182,12 @@ impl ProfileHooks {
                 };
                 tokio::time::timeout(hook.timeout, answer).await
             }
-            HookAction::Prompt(text) if self.attended => {
-                let asked = tokio::task::spawn_blocking(move || ask(&text));
-                let answer = async {
-                    asked
-                        .await
-                        .unwrap_or_else(|error| HookOutcome::Failed(error.to_string()))
+            HookAction::Prompt(text) => {
+                let Some(person) = &self.person else {
+                    return HookOutcome::Missing;
                 };
-                tokio::time::timeout(hook.timeout, answer).await
+                return answered(ask(person, text, hook.timeout).await, hook.timeout);
             }
-            HookAction::Prompt(_) => Ok(HookOutcome::Missing),
             // The engine waits for it itself.
             HookAction::NaturalTraffic => Ok(HookOutcome::Done("left to natural traffic".to_owned())),
             HookAction::RestartDevice | HookAction::StopDevice | HookAction::StartDevice => {
@@ -194,8 +219,14 @@ impl Operator for ProfileHooks {
         let usable = self
             .hooks
             .values()
-            .filter(|hook| self.attended || hook.action.is_unattended());
+            .filter(|hook| self.person.is_some() || hook.action.is_unattended());
         usable.map(|hook| hook.name.clone()).collect()
+    }
+
+    fn unattended(&self) -> Vec<String> {
+        let prompts = self.hooks.values().filter(|hook| !hook.action.is_unattended());
+        let unattended = prompts.filter(|_| self.person.is_none());
+        unattended.map(|hook| hook.name.clone()).collect()
     }
 
     fn natural_traffic(&self, hook: &str) -> Option<Duration> {
@@ -212,34 +243,71 @@ impl Operator for ProfileHooks {
             Value::String(text) => (name, text),
             other => (name, other.to_string()),
         }));
-        self.carry_out(&hook, &values).await
-    }
-}
-
-fn request(method: &str, url: &str, body: Option<&str>) -> HookOutcome {
-    let made = ureq::http::Request::builder().method(method).uri(url);
-    let made = match body {
-        Some(body) => made.header("content-type", "application/json").body(body.to_owned()),
-        None => made.body(String::new()),
-    };
-    let made = match made {
-        Ok(made) => made,
-        Err(error) => return HookOutcome::Failed(error.to_string()),
-    };
-    match ureq::run(made) {
-        Ok(answer) => HookOutcome::Done(format!("{method} {url}: {}", answer.status())),
-        Err(ureq::Error::StatusCode(code)) if REFUSALS.contains(&code) => {
-            HookOutcome::Refused(format!("{method} {url}: {code}"))
+        let outcome = self.carry_out(&hook, &values).await;
+        let shown = |text: String| self.means.secrets.out_of(&text);
+        match outcome {
+            HookOutcome::Done(text) => HookOutcome::Done(shown(text)),
+            HookOutcome::Failed(text) => HookOutcome::Failed(shown(text)),
+            HookOutcome::Refused(text) => HookOutcome::Refused(shown(text)),
+            HookOutcome::Skipped(text) => HookOutcome::Skipped(shown(text)),
+            HookOutcome::Missing => HookOutcome::Missing,
         }
-        Err(error) => HookOutcome::Failed(format!("{method} {url}: {error}")),
     }
 }
 
-fn ask(text: &str) -> HookOutcome {
-    match inquire::Confirm::new(text).with_default(true).prompt() {
-        Ok(true) => HookOutcome::Done("the operator answered: done".to_owned()),
-        Ok(false) => HookOutcome::Failed("the operator answered: not done".to_owned()),
-        Err(error) => HookOutcome::Failed(error.to_string()),
+/// A request of a hook.
+struct Asked {
+    method: String,
+    url: String,
+    body: Option<String>,
+    headers: Vec<(String, String)>,
+    authority: Option<PathBuf>,
+    within: Duration,
+}
+
+impl Asked {
+    fn send(self) -> HookOutcome {
+        let Self { method, url, .. } = &self;
+        let agent = web::agent(url, self.authority.as_ref(), |limits| {
+            limits.timeout_global(Some(self.within))
+        });
+        let agent = match agent {
+            Ok(agent) => agent,
+            Err(error) => return HookOutcome::Failed(format!("{method} {url}: {error}")),
+        };
+        let mut made = ureq::http::Request::builder().method(method.as_str()).uri(url);
+        let has_type = self
+            .headers
+            .iter()
+            .any(|(name, _)| name.eq_ignore_ascii_case("content-type"));
+        if self.body.is_some() && !has_type {
+            made = made.header("content-type", "application/json");
+        }
+        for (name, value) in &self.headers {
+            made = made.header(name, value);
+        }
+        let made = match made.body(self.body.clone().unwrap_or_default()) {
+            Ok(made) => made,
+            Err(error) => return HookOutcome::Failed(format!("{method} {url}: {error}")),
+        };
+        match agent.run(made) {
+            Ok(answer) => HookOutcome::Done(format!("{method} {url}: {}", answer.status())),
+            Err(ureq::Error::StatusCode(code)) if REFUSALS.contains(&code) => {
+                HookOutcome::Refused(format!("{method} {url}: {code}"))
+            }
+            Err(error) => HookOutcome::Failed(format!("{method} {url}: {error}")),
+        }
+    }
+}
+
+fn answered(answer: Answer, within: Duration) -> HookOutcome {
+    match answer {
+        Answer::Done => HookOutcome::Done("the operator answered: done".to_owned()),
+        Answer::Skip => HookOutcome::Skipped("the operator skipped the test".to_owned()),
+        Answer::End => HookOutcome::Failed("the operator ended the run".to_owned()),
+        Answer::Silence => HookOutcome::Failed(format!("nobody answered within {}", show_duration(within))),
+        Answer::GivenUp => HookOutcome::Failed("given up: the run ends".to_owned()),
+        Answer::Unasked(why) => HookOutcome::Failed(format!("the operator could not be asked: {why}")),
     }
 }
 
@@ -266,7 +334,14 @@ mod tests {
         let command = ["sh", "-c", script].map(str::to_owned).to_vec();
         let mut device = DeviceProcess::new(command, folder.to_owned(), None);
         device.start().unwrap();
-        let mut hooks = ProfileHooks::new(BTreeMap::new(), BTreeMap::new(), folder.to_owned(), Some(device), false);
+        let mut hooks = ProfileHooks::new(
+            BTreeMap::new(),
+            BTreeMap::new(),
+            folder.to_owned(),
+            Some(device),
+            None,
+            Means::default(),
+        );
         let mut all = Vec::new();
         for action in actions {
             while !folder.join("ready").exists() {

@@ -2,30 +2,32 @@
 //! is taken down again.
 
 use std::collections::BTreeMap;
-use std::net::IpAddr;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::hooks::{DeviceProcess, ProfileHooks};
+use super::hooks::{DeviceProcess, Means, ProfileHooks};
 use super::library::Library;
+use super::person::Person;
 use super::plan::{How, RunPlan};
 use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
+use super::site::{bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
-use crate::bench::endpoint::{Credentials, Endpoint};
-use crate::bench::tls::TlsFiles;
+use crate::bench::endpoint::Endpoint;
 use crate::bench::{LinkError, Vantage};
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, RecordError, Recorder};
+use crate::journal::Journal;
 use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
-use crate::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
+use crate::link::mqtt::{BenchInfo, BenchOptions, MqttBench, MqttLink};
 use crate::pack::Pack;
-use crate::profile::{self, Effective, Profile, Surroundings};
+use crate::profile::{self, Effective, Profile, Secrets, Surroundings};
 use crate::simulate::WithFleet;
 use crate::simulate::driver::RunningDevice;
 use crate::simulate::{BuiltIn, UnknownName};
@@ -42,6 +44,8 @@ pub struct SocketRun {
     source: Source,
     /// Whether the device can reach the map server; `Err` says why not.
     maps: Result<(), String>,
+    /// The records of a run that broke off, with which this one goes on; its clock has to go on with theirs.
+    pub earlier: Option<Journal>,
     /// Where a device prints that the harness starts itself.
     pub device_log: Option<PathBuf>,
 }
@@ -56,7 +60,8 @@ enum Source {
     Profile {
         profile: Profile,
         folder: PathBuf,
-        attended: bool,
+        person: Option<Arc<dyn Person>>,
+        secrets: Secrets,
     },
 }
 
@@ -109,12 +114,13 @@ impl SocketRun {
                 faults: faults.to_vec(),
             },
             maps: Ok(()),
+            earlier: None,
             device_log: None,
         }
     }
 
-    /// All tests against the device of a profile. Its hooks are run in `folder`; `attended` says whether there is a
-    /// person who can be asked.
+    /// All tests against the device of a profile. Its hooks are run in `folder`; its person is asked what they
+    /// leave to one.
     ///
     /// # Errors
     /// What the profile lacks, and files or a password that it names and that are not there.
@@ -128,6 +134,9 @@ impl SocketRun {
         let profile = &effective.profile;
         let device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
         let options = bench_of(profile, device.published(pack), surroundings)?;
+        let mut profile = profile.clone();
+        let secrets = resolve(&mut profile, &options, surroundings)?;
+        let profile = &profile;
         certificates(effective)?;
         let maps = match device.fleet {
             Some(_) => Ok(()),
@@ -140,9 +149,11 @@ impl SocketRun {
             source: Source::Profile {
                 profile: profile.clone(),
                 folder: place.folder,
-                attended: place.attended,
+                person: place.person,
+                secrets,
             },
             maps,
+            earlier: None,
             device_log: None,
         })
     }
@@ -169,6 +180,8 @@ impl SocketRun {
                 Vantage::Subscriber
             },
             hooks: hooks.keys().cloned().collect(),
+            unattended: Vec::new(),
+            limits: Vec::new(),
             maps: self.maps,
         };
         let subject = self.device.subject.clone();
@@ -228,6 +241,7 @@ impl SocketRun {
             maps: self.maps,
             vantage,
             clock,
+            earlier: self.earlier,
         };
         match self.source {
             Source::BuiltIn { device, faults } => {
@@ -242,9 +256,14 @@ impl SocketRun {
             Source::Profile {
                 profile,
                 folder,
-                attended,
+                person,
+                secrets,
             } => {
-                let operator = hooks(&profile, &info, self.device_log, folder, attended)?;
+                let means = Means {
+                    authority: profile.bench.tls_ca.clone(),
+                    secrets,
+                };
+                let operator = hooks(&profile, &info, self.device_log, folder, (person, means))?;
                 progress.expects_device(&info);
                 stage.run(link, &info, operator, progress, saved).await
             }
@@ -257,8 +276,8 @@ impl SocketRun {
 pub struct Place {
     /// Where its commands are run.
     pub folder: PathBuf,
-    /// Whether a person can be asked.
-    pub attended: bool,
+    /// Who can be asked.
+    pub person: Option<Arc<dyn Person>>,
     /// How many mock AGVs a master control gets at least; the usual number unless said.
     pub vehicles: Option<usize>,
 }
@@ -274,6 +293,7 @@ struct Stage<'a> {
     maps: Result<(), String>,
     vantage: Vantage,
     clock: WallClock,
+    earlier: Option<Journal>,
 }
 
 impl Stage<'_> {
@@ -288,6 +308,8 @@ impl Stage<'_> {
         let bench = BenchFacts {
             vantage: self.vantage,
             hooks: operator.hooks(),
+            unattended: operator.unattended(),
+            limits: info.limits.clone(),
             maps: self.maps,
         };
         let fleet = self.device.fleet.clone();
@@ -295,7 +317,7 @@ impl Stage<'_> {
         let (header, setup) = self.device.on(bench, self.request, self.library, self.pack);
         let header = Box::new(header);
         let first = Occurrence::harness(self.clock.now(), Event::RunBegun { header });
-        let recorder = Recorder::begin(&self.library.rules, self.writer, first)?;
+        let recorder = Recorder::begin(&self.library.rules, self.writer, self.earlier, first)?;
         let operator = match &fleet {
             None => WithFleet::alone(operator),
             Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter()),
@@ -329,110 +351,13 @@ fn factsheet_of(device: &BuiltIn, library: &Library, pack: &Pack) -> Option<Valu
     sheets.iter().rev().find_map(|entry| entry.json().cloned())
 }
 
-/// The certificates and keys that a profile names have to be there.
-fn certificates(effective: &Effective) -> Result<(), Vec<Diagnostic>> {
-    let bench = &effective.profile.bench;
-    let files = [
-        ("bench.tls-ca", &bench.tls_ca),
-        ("bench.tls-cert", &bench.tls_cert),
-        ("bench.tls-key", &bench.tls_key),
-    ];
-    let unreadable = files.into_iter().filter_map(|(setting, file)| {
-        let file = file.as_ref()?;
-        let error = std::fs::File::open(file).err()?;
-        let title = format!("the file {} cannot be read: {error}", file.display());
-        Some(effective.complain(setting, "unreadable", title, "named here"))
-    });
-    let unreadable: Vec<Diagnostic> = unreadable.collect();
-    if unreadable.is_empty() { Ok(()) } else { Err(unreadable) }
-}
-
-/// The bench that a profile describes.
-fn bench_of(
-    profile: &Profile,
-    topics: Vec<String>,
-    surroundings: &Surroundings,
-) -> Result<BenchOptions, Vec<Diagnostic>> {
-    let bench = &profile.bench;
-    let password = bench.password.password(surroundings);
-    let password = password.map_err(|error| vec![Diagnostic::whole("password", error.to_string())])?;
-    let credentials = bench.username.clone().map(|username| Credentials {
-        username,
-        password: password
-            .map(|password| password.reveal().to_owned())
-            .unwrap_or_default(),
-    });
-    Ok(BenchOptions {
-        listen: bench.listen.clone(),
-        broker: match &bench.broker {
-            None => BrokerChoice::Embedded,
-            Some(url) => BrokerChoice::External {
-                url: url.clone(),
-                authority: bench.tls_ca.clone(),
-                credentials,
-            },
-        },
-        tap: bench.tap,
-        tls: match (&bench.tls_cert, &bench.tls_key) {
-            (Some(certificate), Some(key)) => Some(TlsFiles {
-                certificate: certificate.clone(),
-                key: key.clone(),
-            }),
-            _ => None,
-        },
-        maps_listen: bench.maps_listen.clone(),
-        maps_host: bench.maps_host.clone(),
-        ..BenchOptions::loopback(topics)
-    })
-}
-
-/// Whether a device that connects to this bench can fetch a file from its map server; `Err` says why not. One that the
-/// harness starts runs on this machine.
-fn reach(options: &BenchOptions, starts_device: bool) -> Result<(), String> {
-    let host = options
-        .maps_host
-        .as_deref()
-        .unwrap_or_else(|| host_of(&options.maps_listen));
-    if is_any(host) {
-        return Err(format!(
-            "no device can fetch a map from {host} ([bench] maps-host is the name of this machine as the device knows it)"
-        ));
-    }
-    let meets_at = match (&options.broker, options.tap) {
-        (BrokerChoice::External { url, .. }, false) => {
-            let (_, rest) = url.split_once("://").unwrap_or(("", url));
-            host_of(rest)
-        }
-        _ => host_of(&options.listen),
-    };
-    if is_this_machine(host) && !is_this_machine(meets_at) && !starts_device {
-        return Err(format!(
-            "a device that connects to {meets_at} cannot fetch a map from {host} ([bench] maps-listen and maps-host)"
-        ));
-    }
-    Ok(())
-}
-
-fn host_of(address: &str) -> &str {
-    let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
-    host.trim_start_matches('[').trim_end_matches(']')
-}
-
-fn is_any(host: &str) -> bool {
-    host.parse::<IpAddr>().is_ok_and(|address| address.is_unspecified())
-}
-
-fn is_this_machine(host: &str) -> bool {
-    host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
-}
-
 /// The hooks of a profile; starts the device if the profile says how.
 fn hooks(
     profile: &Profile,
     info: &BenchInfo,
     device_log: Option<PathBuf>,
     folder: PathBuf,
-    attended: bool,
+    (person, means): (Option<Arc<dyn Person>>, Means),
 ) -> std::io::Result<ProfileHooks> {
     let (host, port) = info
         .device_address
@@ -468,7 +393,8 @@ fn hooks(
         common,
         folder,
         process,
-        attended,
+        person,
+        means,
     ))
 }
 
@@ -514,49 +440,5 @@ impl Operator for Commands {
 
     fn usual_time(&self) -> Duration {
         Duration::from_millis(1)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn bench(listen: &str, maps_listen: &str, maps_host: Option<&str>) -> BenchOptions {
-        BenchOptions {
-            listen: listen.to_owned(),
-            maps_listen: maps_listen.to_owned(),
-            maps_host: maps_host.map(str::to_owned),
-            ..BenchOptions::loopback(Vec::new())
-        }
-    }
-
-    #[test]
-    fn a_device_elsewhere_reaches_no_map_on_loopback() {
-        let elsewhere = |maps_listen, maps_host| reach(&bench("192.168.1.20:1883", maps_listen, maps_host), false);
-        assert!(elsewhere("127.0.0.1:0", None).is_err());
-        assert!(elsewhere("0.0.0.0:0", None).is_err());
-        assert!(elsewhere("0.0.0.0:0", Some("localhost")).is_err());
-        assert!(elsewhere("[::]:0", None).is_err());
-        assert!(elsewhere("0.0.0.0:0", Some("192.168.1.20")).is_ok());
-        assert!(elsewhere("192.168.1.20:0", None).is_ok());
-    }
-
-    #[test]
-    fn a_device_on_this_machine_reaches_them() {
-        assert!(reach(&bench("127.0.0.1:1883", "127.0.0.1:0", None), false).is_ok());
-        assert!(reach(&bench("192.168.1.20:1883", "127.0.0.1:0", None), true).is_ok());
-        assert!(reach(&bench("[::1]:1883", "[::1]:0", None), false).is_ok());
-    }
-
-    #[test]
-    fn without_a_tap_it_is_where_the_broker_is() {
-        let mut bench = bench("127.0.0.1:1883", "127.0.0.1:0", None);
-        bench.tap = false;
-        bench.broker = BrokerChoice::External {
-            url: "mqtt://192.168.1.10:1883".to_owned(),
-            authority: None,
-            credentials: None,
-        };
-        assert!(reach(&bench, false).is_err());
     }
 }

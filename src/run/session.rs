@@ -48,6 +48,8 @@ pub struct Setup {
     pub run: String,
     /// Whether it ends after the first test that fails.
     pub fail_fast: bool,
+    /// How often each test is run.
+    pub repeat: u32,
 }
 
 /// A finished run.
@@ -145,6 +147,8 @@ pub(super) struct Session<'a, L, O> {
     pub(super) unhelped: u32,
     /// How many orders were sent on that way.
     pub(super) orders: u32,
+    /// From which record on the device has what it needs after a start.
+    pub(super) ready_since: u64,
     /// Preconditions that are not reached again and again.
     strikes: Strikes,
 }
@@ -165,6 +169,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             refuses: false,
             unhelped: 0,
             orders: 0,
+            ready_since: 0,
             strikes: Strikes::default(),
         }
     }
@@ -196,6 +201,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         self.tell_estimate(&plan);
         let tests = self.setup.tests.clone();
         let runs = plan.tests.iter().filter(|planned| planned.gate == Gate::Runs).count();
+        let runs = runs * self.setup.repeat as usize;
         let mut number = 0;
         let mut gone: Option<String> = None;
         let mut failed: Option<String> = None;
@@ -210,38 +216,44 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 plan.tests[at].gate = Gate::Unobservable(format!("left out, because {first} failed (--fail-fast)"));
                 continue;
             }
-            number += 1;
-            if gone.is_none() {
-                gone = self.be_there().await?;
-            }
-            if gone.is_none() && test.device == Role::MasterControl {
-                self.let_it_finish().await?;
-            }
-            let aside = gone.clone().or_else(|| self.strikes.against(test));
-            let ready = match (&aside, &self.halted) {
-                (Some(why), _) => Err(why.clone()),
-                (None, Some(why)) if test.moves => Err(why.clone()),
-                _ => self.bindings(test, number),
-            };
-            let ready = match ready {
-                Err(_) if gone.is_none() && test.device == Role::MasterControl => {
-                    self.bring_back().await?;
-                    self.bindings(test, number)
+            for repetition in 1..=self.setup.repeat {
+                if self.engine.interrupted() || failed.is_some() || repetition > 1 && gone.is_some() {
+                    break;
                 }
-                ready => ready,
-            };
-            match ready {
-                Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
-                Ok(own) => {
-                    self.progress.test_begun(test, number, runs);
-                    gone = self.run_and_restore(test, own, number).await?;
-                    if let Some(result) = self.engine.recorder.judge().done().last() {
-                        self.progress.test_ended(result);
-                        if self.setup.fail_fast && result.verdict == Some(Verdict::Fail) {
-                            failed = Some(result.id.clone());
-                        }
+                self.engine.repetition = (self.setup.repeat > 1).then_some(repetition);
+                number += 1;
+                if gone.is_none() {
+                    gone = self.be_there().await?;
+                }
+                if gone.is_none() && test.device == Role::MasterControl {
+                    self.let_it_finish().await?;
+                }
+                let aside = gone.clone().or_else(|| self.strikes.against(test));
+                let ready = match (&aside, &self.halted) {
+                    (Some(why), _) => Err(why.clone()),
+                    (None, Some(why)) if test.moves => Err(why.clone()),
+                    _ => self.bindings(test, number),
+                };
+                let ready = match ready {
+                    Err(_) if gone.is_none() && test.device == Role::MasterControl => {
+                        self.bring_back().await?;
+                        self.bindings(test, number)
                     }
-                    saved(self.engine.recorder.judge());
+                    ready => ready,
+                };
+                match ready {
+                    Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
+                    Ok(own) => {
+                        self.progress.test_begun(test, number, runs);
+                        gone = self.run_and_restore(test, own, number).await?;
+                        if let Some(result) = self.engine.recorder.judge().done().last() {
+                            self.progress.test_ended(result);
+                            if self.setup.fail_fast && result.verdict == Some(Verdict::Fail) {
+                                failed = Some(result.id.clone());
+                            }
+                        }
+                        saved(self.engine.recorder.judge());
+                    }
                 }
             }
         }
@@ -420,6 +432,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
         self.settle_link().await?;
         self.engine.drain().await?;
+        if self.was_started()
+            && let Err(why) = self.after_start().await?
+        {
+            self.progress.note(&why);
+        }
         if self.engine.recorder.judge().role() == Role::MasterControl {
             return self.tidy_fleet(test).await;
         }

@@ -39,6 +39,8 @@ pub struct Request {
     pub command: Vec<String>,
     /// Whether the run ends after the first test that fails.
     pub fail_fast: bool,
+    /// How often each test is run.
+    pub repeat: u32,
     /// Whether nothing is left to choose: the run is for a certificate.
     pub certifies: bool,
 }
@@ -54,6 +56,7 @@ impl Request {
             run: uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
             command: Vec::new(),
             fail_fast: false,
+            repeat: 1,
             certifies: false,
         }
     }
@@ -201,6 +204,7 @@ impl DeviceUnderTest {
             claims: self.claims,
             vantage: bench.vantage,
             hooks: bench.hooks,
+            unattended: bench.unattended,
             maps: bench.maps,
             map_file,
             motion: self.motion,
@@ -215,9 +219,10 @@ impl DeviceUnderTest {
             vehicles,
             maps,
             deviations: self.deviations,
-            limits: self.limits,
+            limits: [self.limits, bench.limits].concat(),
             run: request.run,
             fail_fast: request.fail_fast,
+            repeat: request.repeat.max(1),
         };
         (header, setup)
     }
@@ -230,8 +235,12 @@ pub struct BenchFacts {
     pub vantage: Vantage,
     /// Names of the hooks that can be run.
     pub hooks: Vec<String>,
+    /// Names of the hooks that are prompts, where nobody can be asked.
+    pub unattended: Vec<String>,
     /// Whether the device can reach the map server; `Err` says why not.
     pub maps: Result<(), String>,
+    /// What the broker does not allow, and what cannot be said therefore.
+    pub limits: Vec<String>,
 }
 
 fn subject(profile: &Profile) -> Result<Participant, Vec<Diagnostic>> {

@@ -11,6 +11,7 @@ use super::setup::{BenchFacts, DeviceUnderTest, Request};
 use crate::bench::{LinkError, Vantage};
 use crate::clock::{Moment, Stamp};
 use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
+use crate::journal::Journal;
 use crate::journal::event::{Event, Occurrence, Setting};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
@@ -53,6 +54,10 @@ pub struct VirtualRun {
     pub command: Vec<String>,
     /// Whether the run ends after the first test that fails.
     pub fail_fast: bool,
+    /// How often each test is run.
+    pub repeat: u32,
+    /// The records of a run that broke off, with which this one goes on.
+    pub earlier: Option<Journal>,
     /// Whether nothing is left to choose: the run is for a certificate.
     pub certifies: bool,
     /// Effective settings, for the record.
@@ -86,6 +91,8 @@ impl VirtualRun {
             run: "virtual".to_owned(),
             command: Vec::new(),
             fail_fast: false,
+            repeat: 1,
+            earlier: None,
             certifies: false,
             settings: Vec::new(),
         }
@@ -109,6 +116,13 @@ impl Operator for OnTheBus {
     }
 }
 
+/// When a run begins that goes on with another one.
+#[must_use]
+pub fn going_on_at(earlier: Option<&Journal>) -> Moment {
+    let last = earlier.and_then(|journal| journal.entries().last());
+    last.map_or(Moment::START, |last| last.at().moment + Duration::from_secs(1))
+}
+
 /// Carries it out.
 ///
 /// # Errors
@@ -124,7 +138,7 @@ pub async fn run_virtually(
 ) -> Result<Finished, EngineError> {
     let device = &request.device;
     let start = Stamp {
-        moment: Moment::START,
+        moment: going_on_at(request.earlier.as_ref()),
         utc: request.begun,
     };
     let faults: Vec<&str> = request.faults.iter().map(String::as_str).collect();
@@ -155,6 +169,8 @@ pub async fn run_virtually(
     let bench = BenchFacts {
         vantage: request.vantage,
         hooks: operator.hooks(),
+        unattended: operator.unattended(),
+        limits: Vec::new(),
         maps: Ok(()),
     };
     let composer = Composer::new(&request.run);
@@ -165,12 +181,13 @@ pub async fn run_virtually(
         run: request.run,
         command: request.command,
         fail_fast: request.fail_fast,
+        repeat: request.repeat,
         certifies: request.certifies,
     };
     let (header, setup) = tested.on(bench, asked, library, pack);
     let header = Box::new(header);
     let first = Occurrence::harness(link.now(), Event::RunBegun { header });
-    let recorder = Recorder::begin(&library.rules, writer, first)?;
+    let recorder = Recorder::begin(&library.rules, writer, request.earlier, first)?;
     let mut engine = Engine::new(link, operator, recorder, composer, interrupt);
     let end = run(&mut engine, setup, progress, saved).await;
     let recorder = engine.recorder;

@@ -4,6 +4,7 @@
 //! connection are dropped. Files are fetched by plain threads, so that a server that stalls keeps nobody
 //! waiting at the end.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -18,6 +19,7 @@ use super::peer::outgoing;
 use crate::bench::Outgoing;
 use crate::bench::client::{Client, ClientEvent, ClientOptions};
 use crate::bench::endpoint::Endpoint;
+use crate::bench::web;
 use crate::clock::{Moment, WallClock};
 use crate::journal::event::{Direction, Event, Payload, Source};
 use crate::link::mqtt::Reporter;
@@ -26,6 +28,8 @@ use crate::reference::{Device, Download, Input, Output, Publication};
 
 /// A device that wants to be woken again and again at the same moment gets on in steps of this.
 const LEAST_WAKE: Duration = Duration::from_millis(1);
+/// How long is waited until a broker has let a device in.
+const ENTRY_LIMIT: Duration = Duration::from_secs(15);
 /// Largest file a device fetches.
 const LARGEST_FILE: u64 = 256 << 20;
 /// How long a broker may take to publish a last will.
@@ -45,11 +49,12 @@ pub struct Command {
 /// A device that runs in a task of its own.
 pub struct RunningDevice {
     commands: mpsc::UnboundedSender<Command>,
+    first: Option<oneshot::Receiver<Result<(), String>>>,
     running: JoinHandle<()>,
 }
 
 impl RunningDevice {
-    /// Runs `device` against `endpoint`; see [`run_device`].
+    /// Runs `device` against `endpoint`. What a device of the harness itself publishes is reported to `sent`.
     #[must_use]
     pub fn start(
         device: impl Device + Send + 'static,
@@ -58,8 +63,26 @@ impl RunningDevice {
         sent: Option<Reporter>,
     ) -> Self {
         let (commands, receiver) = mpsc::unbounded_channel();
-        let running = tokio::spawn(run_device(device, endpoint, clock, receiver, sent));
-        Self { commands, running }
+        let (told, first) = oneshot::channel();
+        let running = tokio::spawn(run_device(device, endpoint, clock, receiver, (sent, told)));
+        Self {
+            commands,
+            first: Some(first),
+            running,
+        }
+    }
+
+    /// Waits until the broker has let the device in, or the device has waited for that long enough.
+    ///
+    /// # Errors
+    /// Why the broker does not let it in; the device tries again.
+    pub async fn is_let_in(&mut self) -> Result<(), String> {
+        let Some(first) = self.first.take() else { return Ok(()) };
+        match tokio::time::timeout(ENTRY_LIMIT, first).await {
+            Ok(Ok(let_in)) => let_in,
+            // The device does not want to be there yet.
+            _ => Ok(()),
+        }
     }
 
     /// Does something to the device, and waits until that is done. `false` when it is not running any more.
@@ -87,13 +110,13 @@ impl RunningDevice {
 }
 
 /// Runs `device` until the senders of `commands` are gone, and then disconnects it in order. What a device of
-/// the harness itself publishes is reported to `sent`.
-pub async fn run_device<D: Device>(
+/// the harness itself publishes is reported to `sent`, and how its first connection went to `told`.
+async fn run_device<D: Device>(
     device: D,
     endpoint: Endpoint,
     clock: WallClock,
     commands: mpsc::UnboundedReceiver<Command>,
-    sent: Option<Reporter>,
+    (sent, told): (Option<Reporter>, oneshot::Sender<Result<(), String>>),
 ) {
     let (downloads, progress) = mpsc::unbounded_channel();
     let driver = Driver {
@@ -101,6 +124,7 @@ pub async fn run_device<D: Device>(
         endpoint,
         clock,
         sent,
+        told: Some(told),
         connection: None,
         client_id: String::new(),
         will: None,
@@ -117,6 +141,8 @@ struct Driver<D> {
     endpoint: Endpoint,
     clock: WallClock,
     sent: Option<Reporter>,
+    /// Told how the first connection went.
+    told: Option<oneshot::Sender<Result<(), String>>>,
     connection: Option<(Client, mpsc::Receiver<ClientEvent>)>,
     client_id: String,
     will: Option<Outgoing>,
@@ -164,6 +190,7 @@ impl<D: Device> Driver<D> {
     async fn happened(&mut self, event: ClientEvent) {
         match event {
             ClientEvent::Connected => {
+                self.tell(Ok(()));
                 self.established = true;
                 self.give(Input::Connected).await;
             }
@@ -174,11 +201,19 @@ impl<D: Device> Driver<D> {
                 self.give(Input::Message { topic, payload }).await;
             }
             ClientEvent::Lost(reason) => {
+                self.tell(Err(reason.clone()));
                 tracing::debug!(client = self.client_id, reason, "a device lost its connection");
                 self.connection = None;
                 self.established = false;
                 self.give(Input::ConnectionLost).await;
             }
+        }
+    }
+
+    fn tell(&mut self, outcome: Result<(), String>) {
+        if let Some(told) = self.told.take() {
+            // Nobody may want to know.
+            let _ = told.send(outcome);
         }
     }
 
@@ -189,7 +224,9 @@ impl<D: Device> Driver<D> {
         for output in wanted {
             match output {
                 Output::Publish(publication) => self.publish(publication).await,
-                Output::Fetch { token, url } => fetch(token, url, self.downloads.clone()),
+                Output::Fetch { token, url } => {
+                    fetch(token, url, self.endpoint.authority.clone(), self.downloads.clone());
+                }
                 Output::Connect => self.connect(),
                 Output::Disconnect => {
                     self.established = false;
@@ -315,9 +352,10 @@ async fn next_event(connection: &mut Option<(Client, mpsc::Receiver<ClientEvent>
 }
 
 /// Fetches a file in a thread of its own.
-fn fetch(token: u64, url: String, progress: mpsc::UnboundedSender<Progress>) {
+fn fetch(token: u64, url: String, authority: Option<PathBuf>, progress: mpsc::UnboundedSender<Progress>) {
     std::thread::spawn(move || {
-        let end = match download(&url, || drop(progress.send((token, Download::Begun)))) {
+        let begun = || drop(progress.send((token, Download::Begun)));
+        let end = match download(&url, authority.as_ref(), begun) {
             Ok(body) => Download::Done(body),
             Err(error) => Download::Failed(error.to_string()),
         };
@@ -325,13 +363,14 @@ fn fetch(token: u64, url: String, progress: mpsc::UnboundedSender<Progress>) {
     });
 }
 
-fn download(url: &str, begun: impl FnOnce()) -> Result<Bytes, ureq::Error> {
-    let agent: ureq::Agent = ureq::Agent::config_builder()
-        .timeout_connect(Some(FETCH_TIMEOUT))
-        .timeout_recv_response(Some(FETCH_TIMEOUT))
-        .timeout_recv_body(Some(TRANSFER_LIMIT))
-        .build()
-        .into();
+fn download(url: &str, authority: Option<&PathBuf>, begun: impl FnOnce()) -> Result<Bytes, ureq::Error> {
+    let agent = web::agent(url, authority, |limits| {
+        limits
+            .timeout_connect(Some(FETCH_TIMEOUT))
+            .timeout_recv_response(Some(FETCH_TIMEOUT))
+            .timeout_recv_body(Some(TRANSFER_LIMIT))
+    });
+    let agent = agent.map_err(|error| std::io::Error::other(error.to_string()))?;
     let response = agent.get(url).call()?;
     begun();
     let body = response

@@ -51,6 +51,10 @@ impl<O: Operator> Operator for WithFleet<O> {
         self.operator.hooks()
     }
 
+    fn unattended(&self) -> Vec<String> {
+        self.operator.unattended()
+    }
+
     async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome {
         self.operator.run(hook, parameters).await
     }

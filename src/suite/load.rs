@@ -229,6 +229,7 @@ fn lint_state(
         spec,
         needs: Vec::new(),
         moves: true,
+        tags: Vec::new(),
         maturity: Maturity::Open,
         why: String::new(),
         given,

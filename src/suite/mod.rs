@@ -9,6 +9,7 @@ mod drawn;
 mod exceptions;
 mod expand;
 mod fields;
+mod filed;
 mod grammar;
 mod lint;
 mod load;

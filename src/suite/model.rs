@@ -4,6 +4,7 @@ mod drawn;
 mod monitor;
 mod path;
 mod serving;
+mod tags;
 mod vehicle;
 
 use std::sync::Arc;
@@ -29,6 +30,8 @@ pub struct Test {
     pub needs: Vec<Need>,
     /// Whether the vehicle will drive.
     pub moves: bool,
+    /// Words of its author that it is filed under; [`Test::tags`] has them all.
+    pub tags: Vec<String>,
     /// How far the test itself is trusted.
     pub maturity: Maturity,
     /// Why anybody cares.

@@ -8,10 +8,11 @@ use super::course::course_need;
 use super::drawn;
 use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of};
+use super::filed::{maturity, tags};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::matrix;
-use super::model::{About, Binding, CourseNeed, Drawn, Maturity, Monitor, Need, Rule, Test};
+use super::model::{About, Binding, CourseNeed, Drawn, Monitor, Need, Rule, Test};
 use super::source::{States, parse};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
@@ -28,6 +29,7 @@ const TEST_KEYS: &[&str] = &[
     "moves",
     "reviewed",
     "watchlist",
+    "tags",
     "why",
     "cases",
     "given",
@@ -337,6 +339,7 @@ impl TestReader<'_> {
             );
         }
         let maturity = maturity(&fields, problems);
+        let tags = tags(&fields, problems);
         let moves = fields.flag("moves", problems);
         let mut reader = StepReader {
             states: self.states,
@@ -372,6 +375,7 @@ impl TestReader<'_> {
             },
             needs,
             moves,
+            tags,
             maturity,
             why: header.why,
             given,
@@ -397,43 +401,6 @@ impl TestReader<'_> {
         lint::test(&test, &places, self.vocabulary, self.known, problems);
         Some(test)
     }
-}
-
-/// Whether a second reader has held the test against the standard, or what is disputed of it.
-fn maturity(fields: &Fields<'_>, problems: &mut Problems) -> Maturity {
-    let note = |key: &str, problems: &mut Problems| fields.text(key, problems).map(str::to_owned);
-    if let Some(key) = fields.key("watchlist").filter(|_| fields.has("reviewed")) {
-        let title = "`watchlist` beside `reviewed`";
-        problems.at(
-            "conflicting-keys",
-            &key.span,
-            title,
-            "a review settles what is disputed",
-        );
-    }
-    if let Some(why) = note("watchlist", problems) {
-        return Maturity::Watchlist(why);
-    }
-    let Some(note) = note("reviewed", problems) else {
-        return Maturity::Open;
-    };
-    let (date, looked_at) = note.split_once(',').unwrap_or((&note, ""));
-    let is_date = date.parse::<jiff::civil::Date>().is_ok() && date.len() == 10;
-    if let Some(node) = fields
-        .get("reviewed", problems)
-        .filter(|_| !is_date || looked_at.trim().is_empty())
-    {
-        problems.add(
-            Diagnostic::new(
-                "review-undated",
-                node.span.clone(),
-                "a review says when it was, and what was looked at",
-                "needs a date, a comma and a few words",
-            )
-            .hint("such as `reviewed: \"2026-11-22, section 6.6.4 and both rulings\"`"),
-        );
-    }
-    Maturity::Reviewed(note)
 }
 
 /// The monitor of a file. `name` is what its path asks for.

@@ -1,6 +1,5 @@
 //! One connection of a device, from the moment it is let in to its end.
 
-use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,14 +7,14 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::sync::watch;
-use tokio_rustls::TlsConnector;
-use tokio_rustls::rustls::pki_types::ServerName;
 
 use super::pump::{Both, Pump};
 use super::{Admitted, Control, Shared, faults};
+use crate::bench::dial::dial;
+use crate::bench::stream::Stream;
 use crate::journal::event::{Close, Direction, Event, Source};
 
-/// How long reaching the broker and each TLS handshake may take.
+/// How long the TLS handshake may take.
 const SETUP_LIMIT: Duration = Duration::from_secs(10);
 /// How long a side that was told the end may take to close its own.
 const DRAIN_LIMIT: Duration = Duration::from_secs(1);
@@ -33,12 +32,6 @@ impl Socket for TcpStream {
 }
 
 impl Socket for tokio_rustls::server::TlsStream<TcpStream> {
-    fn tcp(&self) -> &TcpStream {
-        self.get_ref().0
-    }
-}
-
-impl Socket for tokio_rustls::client::TlsStream<TcpStream> {
     fn tcp(&self) -> &TcpStream {
         self.get_ref().0
     }
@@ -140,7 +133,7 @@ pub(super) async fn serve(
 /// Pumps both ways until one side has ended or the connection is cut. Also says whether the end was reported.
 async fn run(
     device: &mut dyn Socket,
-    broker: &mut dyn Socket,
+    broker: &mut dyn Stream,
     number: u64,
     shared: &Shared,
     admitted: &mut Admitted,
@@ -192,33 +185,14 @@ async fn device_side(socket: TcpStream, shared: &Shared) -> Result<Box<dyn Socke
     }
 }
 
-async fn broker_side(shared: &Shared) -> Result<Box<dyn Socket>, SetUpError> {
-    let upstream = &shared.upstream;
-    let connect = async {
-        let socket = TcpStream::connect((upstream.host.as_str(), upstream.port)).await?;
-        socket.set_nodelay(true)?;
-        let Some(tls) = &upstream.tls else {
-            return Ok(Box::new(socket) as Box<dyn Socket>);
-        };
-        let name = ServerName::try_from(upstream.host.clone()).map_err(io::Error::other)?;
-        let stream = TlsConnector::from(tls.clone()).connect(name, socket).await?;
-        Ok(Box::new(stream) as Box<dyn Socket>)
-    };
-    let address = format!("{}:{}", upstream.host, upstream.port);
-    match tokio::time::timeout(SETUP_LIMIT, connect).await {
-        Ok(Ok(stream)) => Ok(stream),
-        Ok(Err(error)) => {
-            let error: io::Error = error;
-            Err(SetUpError::Broker(format!(
-                "the broker at {address} is not reachable: {error}"
-            )))
-        }
-        Err(_) => Err(SetUpError::Broker(format!("the broker at {address} does not answer"))),
-    }
+async fn broker_side(shared: &Shared) -> Result<Box<dyn Stream>, SetUpError> {
+    let broker = &shared.upstream.broker;
+    let dialled = dial(broker).await;
+    dialled.map_err(|reason| SetUpError::Broker(broker.lost(reason).to_string()))
 }
 
 /// Reads and forgets until the other side closes, too.
-async fn drain(mut socket: Box<dyn Socket>) {
+async fn drain(mut socket: impl AsyncRead + Unpin) {
     let mut rest = [0; 4096];
     let _ = tokio::time::timeout(DRAIN_LIMIT, async {
         while socket.read(&mut rest).await.is_ok_and(|length| length > 0) {}

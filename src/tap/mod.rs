@@ -16,9 +16,10 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio_rustls::TlsAcceptor;
-use tokio_rustls::rustls::{ClientConfig, ServerConfig};
+use tokio_rustls::rustls::ServerConfig;
 
 use crate::bench::LinkError;
+use crate::bench::endpoint::Endpoint;
 use crate::bench::inbox::Reporter;
 use crate::bench::listen::{cannot_listen, listen_on};
 use crate::journal::event::{Direction, Event, LinkFault, Source};
@@ -30,11 +31,8 @@ const CUT_LIMIT: Duration = Duration::from_secs(2);
 /// The broker behind the tap.
 #[derive(Clone)]
 pub(crate) struct Upstream {
-    /// Host, and port.
-    pub(crate) host: String,
-    pub(crate) port: u16,
-    /// For `mqtts://`.
-    pub(crate) tls: Option<Arc<ClientConfig>>,
+    /// Where it is.
+    pub(crate) broker: Endpoint,
     /// Whether it is the embedded broker, whose peculiarities the tap absorbs.
     pub(crate) embedded: bool,
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::verdict::{Outcome, Verdict};
+use crate::verdict::Outcome;
 
 /// What a run is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,25 +30,6 @@ pub struct TestLine {
     pub reason: Option<String>,
 }
 
-/// How a run ended.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct RunSummary {
-    /// Join over everything; `None` when nothing was decided.
-    pub verdict: Option<Verdict>,
-    /// How many tests ended with each verdict.
-    pub counts: Vec<(Verdict, usize)>,
-    /// How many did not apply.
-    pub not_applicable: usize,
-    /// How long it took, in the time of the run.
-    pub elapsed: Duration,
-    /// Where the report is.
-    pub report: Option<String>,
-    /// Root hash of the report.
-    pub root_hash: Option<String>,
-    /// Why the run ended before its plan did.
-    pub partial: Option<String>,
-}
-
 /// Who is told. Telling never fails a run: somebody who cannot write swallows it.
 pub trait Progress {
     /// The run begins.
@@ -65,28 +46,4 @@ pub trait Progress {
 
     /// Something worth knowing.
     fn note(&mut self, text: &str);
-
-    /// The run has ended.
-    fn run_ended(&mut self, summary: &RunSummary);
-
-    /// Runs `ask` with the terminal to itself, so that a person can be asked something.
-    fn aside<T>(&mut self, ask: impl FnOnce() -> T) -> T
-    where
-        Self: Sized,
-    {
-        ask()
-    }
-}
-
-/// Tells nobody.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Quiet;
-
-impl Progress for Quiet {
-    fn run_begun(&mut self, _: &RunTitle) {}
-    fn test_begun(&mut self, _: &str, _: &str) {}
-    fn waiting(&mut self, _: &str, _: Duration) {}
-    fn test_ended(&mut self, _: &TestLine) {}
-    fn note(&mut self, _: &str) {}
-    fn run_ended(&mut self, _: &RunSummary) {}
 }

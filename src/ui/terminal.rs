@@ -7,7 +7,7 @@ use console::Style;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::output::{Output, escaped};
-use super::progress::{Progress, RunSummary, RunTitle, TestLine};
+use super::progress::{Progress, RunTitle, TestLine};
 use crate::verdict::{Outcome, Verdict};
 
 /// What a terminal can do.
@@ -67,6 +67,18 @@ impl<W: Write, E: Write> Terminal<W, E> {
     #[must_use]
     pub fn is_closed(&self) -> bool {
         self.results.is_closed()
+    }
+
+    /// Draws no bar from now on, since something else writes to standard error.
+    pub fn without_bar(&mut self) {
+        self.options.bar = false;
+        self.clear();
+    }
+
+    /// The bar, which may be hidden.
+    #[must_use]
+    pub fn bar(&self) -> &ProgressBar {
+        &self.bar
     }
 
     /// Takes the bar away.
@@ -164,42 +176,6 @@ impl<W: Write, E: Write> Progress for Terminal<W, E> {
         let text = escaped(text);
         let _ = self.bar.suspend(|| self.notes.line(&text));
     }
-
-    fn run_ended(&mut self, summary: &RunSummary) {
-        self.bar.finish_and_clear();
-        self.bar = ProgressBar::hidden();
-        let mut parts: Vec<String> = summary
-            .counts
-            .iter()
-            .filter(|(_, number)| *number > 0)
-            .map(|(verdict, number)| self.style(*verdict).apply_to(format!("{number} {verdict}")).to_string())
-            .collect();
-        if summary.not_applicable > 0 {
-            parts.push(format!("{} not applicable", summary.not_applicable));
-        }
-        if parts.is_empty() {
-            parts.push("no test ran".to_owned());
-        }
-        let word = match summary.verdict {
-            Some(verdict) => self.style(verdict).apply_to(verdict.to_string()).to_string(),
-            None => "nothing decided".to_owned(),
-        };
-        self.result("");
-        self.result(&format!("{word}: {} in {}", parts.join(", "), seconds(summary.elapsed)));
-        if let Some(reason) = &summary.partial {
-            self.result(&format!("partial: {}", escaped(reason)));
-        }
-        if let Some(report) = &summary.report {
-            self.result(&format!("report: {}", escaped(report)));
-        }
-        if let Some(hash) = &summary.root_hash {
-            self.result(&format!("sha256: {}", escaped(hash)));
-        }
-    }
-
-    fn aside<T>(&mut self, ask: impl FnOnce() -> T) -> T {
-        self.bar.suspend(ask)
-    }
 }
 
 #[cfg(test)]
@@ -246,15 +222,6 @@ mod tests {
         let absent = Outcome::NotApplicable("the factsheet has no action pick".to_owned());
         progress.test_ended(&line("load/pick", absent, None));
         progress.note("the device reconnected");
-        progress.run_ended(&RunSummary {
-            verdict: Some(Verdict::Fail),
-            counts: vec![(Verdict::Pass, 1), (Verdict::Warning, 0), (Verdict::Fail, 1)],
-            not_applicable: 1,
-            elapsed: Duration::from_millis(6480),
-            report: Some("reports/acme-0001/x".to_owned()),
-            root_hash: Some("ab12".to_owned()),
-            partial: None,
-        });
     }
 
     #[test]
@@ -264,10 +231,6 @@ mod tests {
         pass         order/one  3.2 s
         fail         order/two  3.2 s  ORD-REJ-12: no error\u{1b}[31m appeared
         n/a          load/pick  the factsheet has no action pick
-
-        fail: 1 pass, 1 fail, 1 not applicable in 6.5 s
-        report: reports/acme-0001/x
-        sha256: ab12
         ");
         insta::assert_snapshot!(notes, @r"
         ACME 0001, VDA 5050 1.2.3: 2 tests, 1 not applicable
@@ -300,11 +263,5 @@ mod tests {
         );
         assert_eq!(results, "");
         assert!(!notes.is_empty());
-    }
-
-    #[test]
-    fn a_run_that_decided_nothing_says_so() {
-        let (results, _) = told(PLAIN, |terminal| terminal.run_ended(&RunSummary::default()));
-        assert_eq!(results, "\nnothing decided: no test ran in 0.0 s\n");
     }
 }

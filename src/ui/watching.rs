@@ -85,6 +85,7 @@ impl<W: Write, E: Write> Viewer for Lines<W, E> {
     fn happened(&mut self, happening: &Happening, at: jiff::Timestamp) {
         if self.options.json {
             let (kind, more) = match happening {
+                Happening::Tap(address) => ("tap", json!(address.to_string())),
                 Happening::Metrics(address) => ("metrics", json!(address.to_string())),
                 Happening::Connected => ("connected", Value::Null),
                 Happening::Again(unseen) => ("connected", json!({ "unseenSeconds": unseen.as_secs_f64() })),
@@ -93,6 +94,7 @@ impl<W: Write, E: Write> Viewer for Lines<W, E> {
             self.write(&json!({ "kind": kind, "at": format!("{at:.3}"), "detail": more }).to_string());
         }
         let text = match happening {
+            Happening::Tap(address) => format!("vehicles are expected at mqtt://{address}"),
             Happening::Metrics(address) => format!("metrics are served at http://{address}/metrics"),
             Happening::Connected => "watching; Ctrl-C ends it".to_owned(),
             Happening::Again(unseen) => format!(

@@ -18,7 +18,7 @@ use bytes::Bytes;
 
 use crate::audit::result::AuditResult;
 use crate::audit::{Audit, AuditError, Found, Options};
-use crate::capture::Message;
+use crate::capture::{Message, Wire};
 use crate::clock::Stamp;
 use crate::judge::Rules;
 use glance::Glance;
@@ -121,6 +121,16 @@ impl<'r> Watch<'r> {
             None => self.elsewhere += 1,
         }
         self.audit.observe(message);
+        self.notices()
+    }
+
+    /// Takes in what was seen of a connection; tells what is found by now.
+    pub fn take_wire(&mut self, wire: Wire) -> Vec<Notice> {
+        self.audit.wire(wire);
+        self.notices()
+    }
+
+    fn notices(&mut self) -> Vec<Notice> {
         let news = self.audit.news();
         let notices: Vec<Notice> = news
             .into_iter()

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::clock::Stamp;
-use crate::journal::event::{Close, Event, Record, RunHeader, Source};
+use crate::journal::event::{Close, Direction, Event, Record, RunHeader, Source};
 use crate::journal::file::JournalWriter;
 
 /// When a part is closed and the next one begun.
@@ -54,6 +54,11 @@ impl Recorder {
 
     /// Records a message that was heard.
     pub fn message(&mut self, at: Stamp, event: Event) -> io::Result<()> {
+        self.record(at, Source::Link, None, event)
+    }
+
+    /// Records something that was heard or seen.
+    pub fn record(&mut self, at: Stamp, source: Source, direction: Option<Direction>, event: Event) -> io::Result<()> {
         let is_full = self.rotation.size.is_some_and(|size| self.writer.written() >= size);
         let is_old = self
             .rotation
@@ -62,7 +67,7 @@ impl Recorder {
         if is_full || is_old {
             self.rotate(at)?;
         }
-        self.write(at, Source::Link, event)
+        self.write_of(at, source, direction, event)
     }
 
     /// Records that nothing is heard from here on.
@@ -103,12 +108,16 @@ impl Recorder {
     }
 
     fn write(&mut self, at: Stamp, source: Source, event: Event) -> io::Result<()> {
+        self.write_of(at, source, None, event)
+    }
+
+    fn write_of(&mut self, at: Stamp, source: Source, direction: Option<Direction>, event: Event) -> io::Result<()> {
         self.seq += 1;
         self.writer.write(&Record {
             seq: self.seq,
             at,
             source,
-            direction: None,
+            direction,
             event,
         })
     }
@@ -134,7 +143,7 @@ fn aside(path: &Path, time: jiff::Timestamp) -> PathBuf {
 mod tests {
     use super::*;
     use crate::capture::merge::Merged;
-    use crate::capture::{Lines, Mapping, input};
+    use crate::capture::{Lines, Mapping, Told, input};
     use crate::clock::Moment;
     use crate::journal::Payload;
 
@@ -169,11 +178,11 @@ mod tests {
     fn read(folder: &Path) -> Vec<(String, bool)> {
         let files = names(folder).into_iter().enumerate().map(|(number, name)| {
             let reader = input::open(&folder.join(&name)).expect("readable");
-            (name, Lines::new(reader, number, Mapping::default()))
+            (name, Lines::new(reader, number, Mapping::default()).into())
         });
         let mut merged = Merged::new(files.collect()).expect("readable");
         let mut all = Vec::new();
-        while let Some(message) = merged.read().expect("readable") {
+        while let Some(Told::Message(message)) = merged.read().expect("readable") {
             let payload = String::from_utf8_lossy(&message.payload).into_owned();
             all.push((payload, message.after_gap));
         }
@@ -215,6 +224,26 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("site.jsonl");
         let mut recorder = Recorder::create(&path, Rotation::default(), RunHeader::default(), at(0)).expect("create");
+        recorder.message(at(1), heard(1)).expect("write");
+        recorder.cut_off(at(2), "reset").expect("write");
+        recorder.message(at(5), heard(2)).expect("write");
+        recorder.message(at(6), heard(3)).expect("write");
+        let wanted = [("1", false), ("2", true), ("3", false)];
+        assert_eq!(
+            read(folder.path()),
+            wanted.map(|(payload, gap)| (payload.to_owned(), gap))
+        );
+    }
+
+    #[test]
+    fn what_was_not_heard_at_the_end_of_a_part_is_known_in_the_next_one() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("site.jsonl");
+        let rotation = Rotation {
+            every: Some(Duration::from_secs(4)),
+            ..Rotation::default()
+        };
+        let mut recorder = Recorder::create(&path, rotation, RunHeader::default(), at(0)).expect("file");
         recorder.message(at(1), heard(1)).expect("write");
         recorder.cut_off(at(2), "reset").expect("write");
         recorder.message(at(5), heard(2)).expect("write");

@@ -17,10 +17,12 @@ use crate::audit::{AuditError, Options};
 use crate::bench::LinkError;
 use crate::bench::client::ClientEvent;
 use crate::bench::endpoint::Endpoint;
-use crate::capture::{Message, Place};
+use crate::bench::inbox::inbox;
+use crate::capture::{Carried, Message, Place, taped};
 use crate::clock::{Moment, WallClock};
-use crate::journal::event::{Event, Payload, RunHeader};
+use crate::journal::event::{Direction, Event, Payload, RunHeader};
 use crate::judge::Rules;
+use crate::tap::{Tap, Upstream};
 use crate::verdict::Verdict;
 
 /// What a watch is to do.
@@ -28,6 +30,8 @@ use crate::verdict::Verdict;
 pub struct Settings {
     /// The broker.
     pub endpoint: Endpoint,
+    /// Where vehicles connect to, if the watch is to be the tap between them and the broker.
+    pub listen: Option<String>,
     /// Topic filters.
     pub filters: Vec<String>,
     /// What is judged.
@@ -47,6 +51,8 @@ pub struct Settings {
 /// What happens to the watch itself.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Happening {
+    /// Vehicles may connect there.
+    Tap(std::net::SocketAddr),
     /// Metrics are served there.
     Metrics(std::net::SocketAddr),
     /// It listens.
@@ -98,13 +104,25 @@ pub async fn run(
     let mut watch = Watch::new(rules, settings.options)?;
     let mut recorder = None;
     if let Some((path, rotation)) = &settings.record {
-        recorder = Some(Recorder::create(path, *rotation, header(), clock.now())?);
+        let header = header(settings.listen.is_some());
+        recorder = Some(Recorder::create(path, *rotation, header, clock.now())?);
     }
     let mut server = None;
     if let Some(address) = &settings.metrics {
         let started = MetricsServer::start(address).await?;
         viewer.happened(&Happening::Metrics(started.address), clock.now().utc);
         server = Some(started);
+    }
+    let (reporter, mut seen_at_tap) = inbox(clock);
+    let mut tap = None;
+    if let Some(address) = &settings.listen {
+        let upstream = Upstream {
+            broker: settings.endpoint.clone(),
+            embedded: false,
+        };
+        let started = Tap::start(address, None, upstream, reporter).await?;
+        viewer.happened(&Happening::Tap(started.address()), clock.now().utc);
+        tap = Some(started);
     }
     let mut listener = Listener::new(settings.endpoint, &settings.filters);
     let mut contact = Contact::default();
@@ -132,6 +150,27 @@ pub async fn run(
             asked = ask(server.as_mut()) => {
                 // Whoever asked may be gone again.
                 let _ = asked.send(metrics::page(&watch, seen(contact, gone, clock.now().moment)));
+            }
+            occurrence = seen_at_tap.next(), if tap.is_some() => {
+                let occurrence = occurrence?;
+                if occurrence.direction == Some(Direction::ToDevice) && matches!(occurrence.event, Event::Packet { .. }) {
+                    continue;
+                }
+                if let Some(recorder) = &mut recorder {
+                    recorder.record(occurrence.at, occurrence.source, occurrence.direction, occurrence.event.clone())?;
+                }
+                let (at, source) = (occurrence.at, occurrence.source);
+                let Some(wire) = taped::wire(at.utc, source, occurrence.direction, &occurrence.event, 0) else {
+                    continue;
+                };
+                let message = taped::carried(&wire, Place::default());
+                let mut notices = watch.take_wire(wire);
+                if let Some(message) = message {
+                    notices.extend(watch.take(at, message));
+                }
+                if shown(viewer, &notices) && settings.fail_fast {
+                    break;
+                }
             }
             event = listener.next() => match event {
                 ClientEvent::Connected => {
@@ -176,13 +215,10 @@ pub async fn run(
                         retain: Some(retain),
                         place: Place::default(),
                         after_gap: std::mem::take(&mut after_gap),
+                        carried: tap.is_some().then_some(Carried::BESIDE_TAP),
                     };
                     let notices = watch.take(now, message);
-                    for notice in &notices {
-                        viewer.found(notice);
-                    }
-                    let failed = |notice: &Notice| notice.found.verdict == Verdict::Fail;
-                    if settings.fail_fast && notices.iter().any(failed) {
+                    if shown(viewer, &notices) && settings.fail_fast {
                         break;
                     }
                 }
@@ -191,10 +227,21 @@ pub async fn run(
     }
     viewer.tick(&watch, seen(contact, gone, clock.now().moment));
     listener.stop().await;
+    if let Some(tap) = tap {
+        tap.stop().await;
+    }
     if let Some(recorder) = recorder {
         recorder.finish()?;
     }
     Ok(watch.finish())
+}
+
+/// Shows what was found; says whether something is violated.
+fn shown(viewer: &mut impl Viewer, notices: &[Notice]) -> bool {
+    for notice in notices {
+        viewer.found(notice);
+    }
+    notices.iter().any(|notice| notice.found.verdict == Verdict::Fail)
 }
 
 /// The contact with the time that is unseen right now.
@@ -216,11 +263,11 @@ async fn ask(server: Option<&mut MetricsServer>) -> Asked {
 }
 
 /// What every part of the journal begins with: it is of no run.
-fn header() -> RunHeader {
+fn header(tapped: bool) -> RunHeader {
     RunHeader {
         format: "vda5050-tck.journal/1".to_owned(),
         tool: crate::run::tool(),
-        vantage: "subscriber".to_owned(),
+        vantage: if tapped { "tap" } else { "subscriber" }.to_owned(),
         ..RunHeader::default()
     }
 }

@@ -25,6 +25,7 @@ fn message(library: &Library, name: &str, number: u64, more: Value) -> (Stamp, M
         retain: Some(false),
         place: Place::default(),
         after_gap: false,
+        carried: None,
     };
     (at, message)
 }

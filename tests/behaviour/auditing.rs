@@ -129,3 +129,38 @@ fn what_holds_no_message_is_4_and_says_so() {
         .code(4)
         .prints("2 of them no message");
 }
+
+#[test]
+fn mcap_holds_what_the_lines_hold() {
+    let seen = |name: &str| -> Vec<(Value, Value, Value)> {
+        let result = result(&run(&["audit", &capture(name), "--format", "json"]).code(0));
+        let vehicles = result["vehicles"].as_array().unwrap().clone();
+        let facts = |vehicle: &Value| {
+            (
+                vehicle["topics"].clone(),
+                vehicle["messages"].clone(),
+                vehicle["protocol"].clone(),
+            )
+        };
+        vehicles.iter().map(facts).collect()
+    };
+    let lines = seen("two-versions.jsonl");
+    assert_eq!(lines.len(), 2);
+    assert_eq!(seen("site.zstd.mcap"), lines);
+    assert_eq!(seen("site.lz4.mcap"), lines);
+}
+
+#[test]
+fn a_slice_shows_its_finding_to_whoever_gets_it() {
+    let bench = Bench::new();
+    let whole = capture("horizon-missing.jsonl");
+    let sliced = bench.run(&["audit", &whole, "--slice", "STATE-12"]).code(1);
+    let lines = sliced.stdout.lines().count();
+    assert!(lines > 1 && lines < 60, "{lines} lines");
+    fs::write(bench.path().join("bug.jsonl"), &sliced.stdout).unwrap();
+    bench.run(&["audit", "bug.jsonl"]).code(1).prints("STATE-12");
+    bench
+        .run(&["audit", &whole, "--slice", "NO-SUCH"])
+        .code(2)
+        .says("NO-SUCH");
+}

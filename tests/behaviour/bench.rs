@@ -159,12 +159,24 @@ impl Bench {
         serde_json::from_slice(&text).unwrap()
     }
 
+    /// The journal of the only run there was, packed or not.
+    pub fn journal(&self) -> String {
+        let bundle = self.bundle();
+        std::fs::read_to_string(bundle.join("journal.jsonl")).unwrap_or_else(|_| {
+            let packed = std::fs::File::open(bundle.join("journal.jsonl.gz")).unwrap();
+            let mut text = String::new();
+            let mut unpacked = flate2::read::MultiGzDecoder::new(packed);
+            std::io::Read::read_to_string(&mut unpacked, &mut text).unwrap();
+            text
+        })
+    }
+
     /// Holds that the run left a whole report that says it is partial, and a journal that is closed.
     #[track_caller]
     pub fn is_partial(&self) {
         let bundle = self.bundle();
         assert_eq!(self.result()["partial"], true);
-        let journal = std::fs::read_to_string(bundle.join("journal.jsonl")).unwrap();
+        let journal = self.journal();
         let last: Value = serde_json::from_str(journal.lines().last().unwrap()).unwrap();
         assert_eq!(last["event"]["kind"], "run-ended", "{last}");
         assert_eq!(last["event"]["partial"], true, "{last}");

@@ -95,7 +95,7 @@ fn links_to_maps_name_the_host_of_the_profile_and_lead_to_its_files() {
     };
     let (run, _) = bench.start(&profile, &["maps/download"]);
     run.end().code(0);
-    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    let journal = bench.journal();
     assert!(
         journal.contains("\"url\":\"http://127.0.0.2:"),
         "the link names another host"
@@ -182,4 +182,18 @@ fn without_a_tap_a_device_at_an_external_broker_is_judged_as_far_as_it_can_be_se
     run.end().code(0);
     assert_eq!(bench.result()["vantage"], "subscriber");
     bench.is_whole();
+}
+
+#[test]
+#[cfg(unix)]
+fn a_report_that_cannot_be_written_does_not_take_back_what_was_found() {
+    let bench = Bench::new();
+    let (mut run, port) = bench.start(&Profile::default().with(&[("quiet", "2 s")]), &[WATCHING.0]);
+    let _agv = bench.agv(port, &["factsheet-without-header"]);
+    step_begun(&bench, &mut run, WATCHING);
+    // Where the report should be is a folder: to the program the same as a disk that is full.
+    std::fs::create_dir(bench.bundle().join("report.html")).unwrap();
+    let ended = run.end().code(1).says_one_error("cannot write").prints("FAIL");
+    assert!(ended.stderr.contains("report.html"), "{}", ended.stderr);
+    assert!(!bench.bundle().join(".report.html.draft").exists(), "a draft is left");
 }

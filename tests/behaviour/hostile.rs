@@ -50,7 +50,7 @@ fn five_thousand_messages_a_second_end_in_a_verdict() {
         }
     });
     ended.code(1).prints("floods the harness");
-    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    let journal = bench.journal();
     let states = journal
         .matches("\"kind\":\"message\",\"topic\":\"uagv/v2/ACME/0001/state\"")
         .count();
@@ -126,7 +126,7 @@ fn bytes_that_are_no_mqtt_are_no_device() {
 fn garbage_on_a_good_connection_is_held_against_the_device() {
     let (bench, ended) = run_against(|device| device.raw(&[0xff; 64]));
     assert!(matches!(ended.status.code(), Some(1 | 3)), "{ended:?}");
-    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    let journal = bench.journal();
     assert!(
         journal.contains("\"kind\":\"undecodable\"") || journal.contains("malformed"),
         "the bytes are not in the journal"

@@ -31,7 +31,12 @@ fn every_kind_of_good_file_is_told_by_its_content() {
         (result, "a result of 1 tests"),
     ] {
         let ended = run(&["validate", &file]).code(0).prints(&file).prints(what);
-        assert_eq!(ended.stdout.lines().count(), 1, "{}", ended.stdout);
+        // What deserves a warning stands before it.
+        assert!(
+            ended.stdout.lines().last().unwrap().starts_with(&file),
+            "{}",
+            ended.stdout
+        );
     }
 }
 
@@ -47,10 +52,6 @@ fn every_kind_of_bad_file_is_2_and_its_fault_is_named() {
         (
             write("mode.json", state.replace("AUTOMATIC", "AUTOMATISCH").as_bytes()),
             "operatingMode",
-        ),
-        (
-            write("twice.json", state.replacen('{', "{\"driving\": false,", 1).as_bytes()),
-            "driving",
         ),
         (write("cut.json", &state.as_bytes()[..100]), "cut.json"),
         (

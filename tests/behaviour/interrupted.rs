@@ -28,7 +28,7 @@ fn in_the_middle_of_a_test_the_vehicle_is_still_brought_back_and_the_report_is_p
     let interrupted = Instant::now();
     run.end().code(130);
     assert!(interrupted.elapsed() < Duration::from_secs(20), "it waited to the end");
-    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    let journal = bench.journal();
     assert!(
         journal.contains("\"kind\":\"step-begun\",\"path\":\"finally"),
         "the postamble was left out"
@@ -52,7 +52,7 @@ fn other_signals_that_ask_it_to_end_are_obeyed_like_ctrl_c() {
         step_begun(&bench, &mut run, (WAITING, "steps[1]"));
         run.signal(name);
         run.end().code(130);
-        let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+        let journal = bench.journal();
         assert!(
             journal.contains("cancelOrder"),
             "after {name} the vehicle was left with its order"
@@ -102,7 +102,7 @@ fn a_hook_that_takes_for_ever_is_given_up() {
         interrupted.elapsed() < Duration::from_secs(20),
         "it waited for the hook"
     );
-    let journal = std::fs::read_to_string(bench.bundle().join("journal.jsonl")).unwrap();
+    let journal = bench.journal();
     assert!(journal.contains("given up: the user has interrupted the run"));
     bench.is_partial();
 }

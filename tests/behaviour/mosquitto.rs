@@ -15,12 +15,18 @@ pub struct Mosquitto {
 impl Mosquitto {
     /// Starts one. Without mosquitto on this machine: nothing, which in CI is a failure.
     pub fn start() -> Option<Self> {
+        Self::start_with(|_| "allow_anonymous true\n".to_owned())
+    }
+
+    /// The same with other lines of its configuration, whose files may stand in the folder.
+    pub fn start_with(configure: impl Fn(&Path) -> String) -> Option<Self> {
         // mosquitto refuses port 0, so a free one is guessed; another test may be faster, hence several tries.
         for _ in 0..5 {
             let port = free_port();
             let folder = tempfile::tempdir().unwrap();
             let file = folder.path().join("mosquitto.conf");
-            std::fs::write(&file, format!("listener {port} 127.0.0.1\nallow_anonymous true\n")).unwrap();
+            let lines = configure(folder.path());
+            std::fs::write(&file, format!("listener {port} 127.0.0.1\n{lines}")).unwrap();
             let Ok(process) = spawn(&file) else {
                 assert!(
                     std::env::var_os("CI").is_none(),
@@ -58,6 +64,11 @@ impl Mosquitto {
         meanwhile();
         self.process = spawn(&self.folder.path().join("mosquitto.conf")).unwrap();
         assert!(self.is_up(), "mosquitto does not start again");
+    }
+
+    /// Where its files are.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
     }
 
     pub fn url(&self) -> String {

@@ -13,7 +13,7 @@ use crate::bench::Bench;
 use crate::tool::{Running, tool};
 
 /// A bundle as `certify` leaves it, of a few tests.
-fn certified(folder: &Path) {
+pub fn certified(folder: &Path) {
     fs::create_dir(folder).unwrap();
     let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let pack = library.rules.packs.latest().clone();

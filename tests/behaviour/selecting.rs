@@ -30,6 +30,37 @@ fn tests_are_selected_by_what_they_decide_and_left_out_by_name() {
 }
 
 #[test]
+fn an_expression_selects_tests_and_lists_them() {
+    let bench = Bench::new();
+    let filter = format!("requirement(ORD-REJ-02) and not test({REFUSAL})");
+    bench
+        .run(&["run", "--virtual", "--filter", &filter, "--filter", "tag(stands)"])
+        .code(0);
+    let found = ids(&bench);
+    assert!(!found.is_empty() && !found.iter().any(|id| id == REFUSAL), "{found:?}");
+    let listed = run(&[
+        "list",
+        "tests",
+        "--role",
+        "agv",
+        "--filter",
+        "hook(set-mode) and tag(hook)",
+    ])
+    .code(0);
+    assert!(listed.stdout.contains("hook set-mode") && !listed.stdout.contains(QUICK));
+    run(&["list", "tests", "--filter", "tag(hok)"])
+        .code(2)
+        .says("did you mean `hook`?");
+    run(&["list", "tests", "--filter", "hook(dispatch) and hook(set-mode)"]).code(4);
+    run(&["run", "--virtual", "--filter", "chapter(9.9)"])
+        .code(2)
+        .says("this selects no test");
+    run(&["run", "--virtual", "--filter", "(tag(moves)"])
+        .code(2)
+        .says("`)` was expected here");
+}
+
+#[test]
 fn a_typo_in_a_selection_is_2_and_nothing_left_is_4() {
     run(&["run", "--virtual", "--requirement", "ORD-RJE-02"])
         .code(2)

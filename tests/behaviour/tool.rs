@@ -183,12 +183,12 @@ impl Running {
     }
 
     /// Waits for its end, and kills it when it does not come.
-    pub fn wait(&mut self) -> ExitStatus {
+    fn wait_within(&mut self, limit: Duration) -> ExitStatus {
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return status;
             }
-            if self.begun.elapsed() > LIMIT {
+            if self.begun.elapsed() > limit {
                 let _ = self.child.kill();
                 panic!("it hangs:\n{}\n{}", self.stdout(), self.stderr());
             }
@@ -198,8 +198,13 @@ impl Running {
 
     /// Waits for its end.
     #[track_caller]
-    pub fn end(mut self) -> Ended {
-        let status = self.wait();
+    pub fn end(self) -> Ended {
+        self.end_within(LIMIT)
+    }
+
+    /// The same for what takes longer.
+    pub fn end_within(mut self, limit: Duration) -> Ended {
+        let status = self.wait_within(limit);
         for reader in self.readers.drain(..) {
             reader.join().unwrap();
         }

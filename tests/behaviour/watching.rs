@@ -102,7 +102,10 @@ fn a_watch_outlives_its_broker_and_its_journal_is_judged_as_it_was() {
     assert!(parts.len() > 1, "{parts:?}");
     let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
     let audited = run_in(bench.path(), &[&["audit", "--format", "json"], &parts[..]].concat()).code(1);
-    assert_eq!(found(&serde_json::from_str(&audited.stdout).unwrap()).0, findings);
+    assert_eq!(
+        found(&serde_json::from_str(&audited.stdout).unwrap()),
+        (findings, holes)
+    );
 }
 
 #[test]
@@ -129,6 +132,135 @@ fn a_faultless_vehicle_is_accused_of_nothing_and_the_first_violation_of_another_
         found.stdout
     );
     assert!(lines[1].contains("/state {\"headerId\":"), "{}", found.stdout);
+}
+
+#[test]
+fn as_the_tap_it_judges_connections_too_and_so_does_the_audit_of_its_journal() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    let broker = mosquitto.url();
+    let arguments = [
+        "watch",
+        "--broker",
+        &broker,
+        "--listen",
+        "127.0.0.1:0",
+        "--record",
+        "site.jsonl",
+    ];
+    let mut watch = Running::start(&mut tool(
+        bench.path(),
+        &[&arguments[..], &["--format", "json"]].concat(),
+    ));
+    let tap = watch.line("vehicles are expected at ");
+    watch.line("watching");
+    let mut agv = talkative(&bench, &tap, &["will-not-retained", "state-qos-1"]);
+    agv.line("1 simulated AGV(s) on ");
+    watch.until("states", |watch| {
+        watch.stderr().contains("1 vehicle heard").then_some(())
+    });
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    agv.interrupt();
+    agv.end();
+    watch.until("a finding", |watch| {
+        watch.stdout().contains("\"CONN-03\"").then_some(())
+    });
+    watch.interrupt();
+    let ended = watch.end().code(1);
+    let result: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!(result["vehicles"][0]["vantage"], "tap");
+    let (findings, holes) = found(&result);
+    for wanted in ["CONN-03", "MQTT-07"] {
+        let all = findings.iter().map(|(_, requirement, _)| requirement.as_str());
+        assert!(
+            all.clone().any(|requirement| requirement == wanted),
+            "{:?}",
+            all.collect::<Vec<_>>()
+        );
+    }
+    let audited = run_in(bench.path(), &["audit", "--format", "json", "site.jsonl"]).code(1);
+    assert_eq!(
+        found(&serde_json::from_str(&audited.stdout).unwrap()),
+        (findings, holes)
+    );
+}
+
+/// A terminal that nobody looks at. It is closed when the test is over.
+struct Tmux(String);
+
+impl Tmux {
+    /// Runs the program in it. Without tmux on this machine: nothing, which in CI is a failure.
+    fn start(bench: &Bench, command: &str) -> Option<Self> {
+        let this = Self(format!("tck-{}", std::process::id()));
+        let size = ["-x", "150", "-y", "44"];
+        let mut tmux = std::process::Command::new("tmux");
+        tmux.args(["-L", &this.0, "-f", "/dev/null", "new-session", "-d"])
+            .args(size)
+            .arg(command);
+        let Ok(status) = tmux.current_dir(bench.path()).env("TERM", "xterm-256color").status() else {
+            assert!(
+                std::env::var_os("CI").is_none(),
+                "tmux is not installed, and CI must have it"
+            );
+            eprintln!("skipped: tmux is not installed");
+            return None;
+        };
+        assert!(status.success());
+        Some(this)
+    }
+
+    fn tmux(&self, arguments: &[&str]) -> String {
+        let output = std::process::Command::new("tmux")
+            .args(["-L", &self.0])
+            .args(arguments)
+            .output()
+            .unwrap();
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    /// What is on the screen, once this is seen on it.
+    fn until(&self, seen: impl Fn(&str) -> bool) -> String {
+        for _ in 0..600 {
+            let screen = self.tmux(&["capture-pane", "-p"]);
+            if seen(&screen) {
+                return screen;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        panic!("not on the screen:\n{}", self.tmux(&["capture-pane", "-p"]));
+    }
+}
+
+impl Drop for Tmux {
+    fn drop(&mut self) {
+        self.tmux(&["kill-server"]);
+    }
+}
+
+#[test]
+fn on_a_terminal_vehicles_and_the_wrong_member_are_shown() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    let broker = mosquitto.url();
+    let program = env!("CARGO_BIN_EXE_vda5050-tck");
+    let command = format!("{program} watch --broker {broker} && true; echo ended with $?; sleep 60");
+    let Some(tmux) = Tmux::start(&bench, &command) else {
+        return;
+    };
+    tmux.until(|screen| screen.contains("no vehicle was heard so far") && screen.contains("connected"));
+    let mut agv = talkative(&bench, &broker, &["mode-lower-case"]);
+    agv.line("1 simulated AGV(s) on ");
+    let screen = tmux.until(|screen| screen.contains(">>   \"operatingMode\""));
+    assert!(
+        screen.contains(&format!("{MANUFACTURER} {SERIAL}")) && screen.contains("ONLINE"),
+        "{screen}"
+    );
+    tmux.tmux(&[&["send-keys", "Tab", "Down"][..], &["PPage"; 12][..]].concat());
+    tmux.until(|screen| screen.contains("\"headerId\""));
+    tmux.tmux(&["send-keys", "q"]);
+    let screen = tmux.until(|screen| screen.contains("ended with 1"));
+    assert!(screen.contains("1 vehicle;"), "{screen}");
+    agv.kill();
 }
 
 #[test]

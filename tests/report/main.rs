@@ -6,6 +6,7 @@ mod certificate;
 mod html;
 mod json;
 mod junit;
+mod junit_schema;
 mod picture;
 mod samples;
 mod side_by_side;

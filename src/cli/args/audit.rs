@@ -11,6 +11,8 @@ Examples:
   vda5050-tck audit site.jsonl                               what mosquitto_sub -F %J or %j printed
   mosquitto_sub -v -t 'uagv/#' | vda5050-tck audit -         until it ends
   vda5050-tck audit monday.jsonl.gz tuesday.jsonl.zst        as one stream, ordered by time
+  vda5050-tck audit site.pcap                                network traffic: QoS, last will and the like are judged, too
+  vda5050-tck audit site.jsonl --slice STATE-12 > bug.jsonl  as few messages as still show a finding
   vda5050-tck audit log.jsonl --time ts --topic t --payload p
 
 What a recording cannot show is not judged: it may begin in the middle or lack messages.";
@@ -46,6 +48,9 @@ pub struct Audit {
     /// How topics are built, with {serialNumber}, and {interface}, {majorVersion}, {manufacturer} and {topic} where they have them
     #[arg(long, value_name = "TEMPLATE", help_heading = "Selection")]
     pub topic_template: Option<String>,
+    /// Write the smallest journal that still shows a finding to standard output: the first one of this requirement or monitor
+    #[arg(long, value_name = "FINDING")]
+    pub slice: Option<String>,
     /// How results are written to standard output
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

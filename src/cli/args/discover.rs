@@ -16,13 +16,13 @@ It only listens: nothing is published. States come at least every 30 s, and reta
 /// Which broker is listened on.
 #[derive(Clone, Debug, Args)]
 pub struct BrokerArgs {
-    /// The broker: mqtt://host:port or mqtts://host:port
+    /// The broker: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
     #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
     pub broker: String,
     /// User name at the broker; its password is taken from the variable `VDA5050_TCK_PASSWORD`
     #[arg(long, value_name = "NAME")]
     pub username: Option<String>,
-    /// Whose certificates are trusted at an mqtts broker, as a PEM file
+    /// Whose certificates are trusted at a broker with TLS, as a PEM file
     #[arg(long, value_name = "FILE")]
     pub tls_ca: Option<PathBuf>,
     /// Topic filter to subscribe to; may be repeated [default: everything]
@@ -97,6 +97,9 @@ pub struct Init {
     /// Write over a file that is there
     #[arg(long)]
     pub force: bool,
+    /// How is said what was written
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
     /// Write the built-in suites, the schemas for editors and every setting with its default into this folder, and no profile
     #[arg(long, value_name = "DIR", conflicts_with_all = ["broker", "username", "tls_ca", "topic", "seconds", "manufacturer", "serial", "lif", "file", "force"])]
     pub suites: Option<PathBuf>,

@@ -10,6 +10,7 @@ use crate::pack::Role;
 const LIST_HELP: &str = "\
 Examples:
   vda5050-tck list tests                   every test, what it needs, whether the vehicle drives
+  vda5050-tck list tests --filter 'chapter(6.6) and not tag(moves)'
   vda5050-tck list coverage --role agv     which requirement is decided by what, or by nothing
   vda5050-tck list coverage --uncovered    what nothing decides
   vda5050-tck list hooks                   what a profile can do for a test";
@@ -27,6 +28,9 @@ pub struct List {
     /// For this protocol version; the newest one unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,
+    /// Of the tests, only those for which this holds, such as 'hook(set-mode) or tag(link)'
+    #[arg(long, value_name = "EXPRESSION")]
+    pub filter: Option<String>,
     /// Of the coverage, only what nothing decides
     #[arg(long)]
     pub uncovered: bool,
@@ -77,6 +81,9 @@ pub struct Explain {
     /// For this protocol version; the newest one unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,
+    /// How it is written: as a text, or a JSON object for each thing of that name
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
     /// Which suites.
     #[command(flatten)]
     pub suites: SuiteArgs,
@@ -86,13 +93,14 @@ const VALIDATE_HELP: &str = "\
 Examples:
   vda5050-tck validate device.toml hall.lif.json
   vda5050-tck validate state.json --topic state
+  vda5050-tck validate states.jsonl messages/   one message a line, and all JSON files of a folder
   vda5050-tck validate suites/agv/order-rejection/*.yaml";
 
 /// `validate`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = VALIDATE_HELP)]
 pub struct Validate {
-    /// Files to check; `-` is standard input
+    /// Files to check, or folders with messages; `-` is standard input
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Take messages for this protocol version; their own header says it unless given

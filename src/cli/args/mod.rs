@@ -53,6 +53,15 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    /// Log what happens inside to this file; the variable `VDA5050_TCK_LOG` says how much
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILE",
+        env = "VDA5050_TCK_LOG_FILE",
+        hide_env_values = true
+    )]
+    pub log_file: Option<PathBuf>,
 }
 
 /// The commands.
@@ -93,6 +102,17 @@ pub enum Command {
 }
 
 impl Command {
+    /// How much is to be told of what happens inside.
+    #[must_use]
+    pub fn verbose(&self) -> u8 {
+        match self {
+            Self::Run(arguments) => arguments.output.verbose,
+            Self::Certify(arguments) => arguments.output.verbose,
+            Self::Explore(arguments) => arguments.output.verbose,
+            _ => 0,
+        }
+    }
+
     /// How the command writes, errors included.
     #[must_use]
     pub fn format(&self) -> Format {
@@ -107,7 +127,11 @@ impl Command {
             Self::Audit(arguments) => arguments.format,
             Self::Watch(arguments) => arguments.format,
             Self::Explore(arguments) => arguments.output.format,
-            Self::Explain(_) | Self::Simulate(_) | Self::Init(_) | Self::Completions(_) | Self::Man(_) => Format::Text,
+            Self::Explain(arguments) => arguments.format,
+            Self::Simulate(arguments) => arguments.format,
+            Self::Init(arguments) => arguments.format,
+            // What these print is meant for a shell and for `man`.
+            Self::Completions(_) | Self::Man(_) => Format::Text,
         }
     }
 }
@@ -136,7 +160,7 @@ pub struct DeviceArgs {
     /// Where the device connects; this machine only unless said [default: 127.0.0.1:1883]
     #[arg(long, value_name = "HOST:PORT", help_heading = "Bench")]
     pub listen: Option<String>,
-    /// Use this broker instead of the built-in one: mqtt://host:port or mqtts://host:port
+    /// Use this broker instead of the built-in one: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
     #[arg(long, value_name = "URL", help_heading = "Bench")]
     pub broker: Option<String>,
     /// The device is connected to the broker directly: packets cannot be seen (needs --broker)
@@ -197,7 +221,7 @@ pub struct OutputArgs {
         hide_env_values = true
     )]
     pub format: Format,
-    /// Verbose: every effective setting with its origin; twice, every step
+    /// Verbose: every effective setting with its origin; twice, every step, and what happens inside
     #[arg(short, long, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     pub verbose: u8,
     /// Say less: no line per test and no details, only the verdict and what is broken
@@ -206,12 +230,26 @@ pub struct OutputArgs {
     /// Show tests that failed or broke, and no others
     #[arg(long, conflicts_with = "quiet")]
     pub failures: bool,
+    /// Write what happens as JSON lines while it happens; `-` is standard output (docs/events.md)
+    #[arg(long, value_name = "FILE")]
+    pub events: Option<PathBuf>,
+    /// Show the report in the browser when the run is over
+    #[arg(long)]
+    pub open: bool,
     /// How junit.xml shows what was not decided
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub inconclusive: InconclusiveArg,
     /// Show the NUMBER tests that took longest
     #[arg(long, value_name = "NUMBER")]
     pub slowest: Option<usize>,
+}
+
+impl OutputArgs {
+    /// Whether standard output belongs to the stream of events.
+    #[must_use]
+    pub fn speaks_events(&self) -> bool {
+        self.events.as_deref().is_some_and(|path| path.as_os_str() == "-")
+    }
 }
 
 /// The format of standard output.

@@ -16,6 +16,9 @@ Examples:
   vda5050-tck run 'order-rejection/*' --manufacturer ACME --serial 0001 --listen 0.0.0.0:1883
   vda5050-tck run --profile device.toml --plan       what would be run, asked and driven
   vda5050-tck run --profile device.toml --last-failed --fail-fast   what failed, up to the first failure
+  vda5050-tck run --virtual --filter 'chapter(6.6) and not tag(moves)'   see docs/selection.md
+  vda5050-tck run --profile device.toml --repeat 5 order-update   is it the same five times?
+  vda5050-tck run --profile device.toml --resume reports/latest   go on after an interruption
   vda5050-tck run --profile device.toml --shard 2/4  the second quarter of the tests
 
 A test is named by its id, and `*` stands for anything: `order-rejection/*`, `*map*`. See `list tests`.

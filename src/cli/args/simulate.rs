@@ -9,6 +9,7 @@ use serde_json::Value;
 use crate::diagnostic;
 use crate::profile::{VEHICLE_WORDS, find_vehicle_word};
 
+use super::Format;
 use super::vehicle::VehicleKind;
 
 /// `simulate`.
@@ -17,6 +18,9 @@ pub struct Simulate {
     /// Which side to be.
     #[command(subcommand)]
     pub what: Simulated,
+    /// How is said what is there: as a text on standard error, or as JSON lines on standard output
+    #[arg(long, value_enum, default_value_t, global = true)]
+    pub format: Format,
 }
 
 /// What can be simulated.
@@ -31,12 +35,15 @@ pub enum Simulated {
 /// How a simulated device reaches its broker.
 #[derive(Clone, Debug, Args)]
 pub struct ConnectionArgs {
-    /// The broker: mqtt://host:port or mqtts://host:port
+    /// The broker: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
     #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
     pub broker: String,
     /// User name at the broker; its password is taken from the variable `VDA5050_TCK_PASSWORD`
     #[arg(long, value_name = "NAME")]
     pub username: Option<String>,
+    /// Whose certificates are trusted at a broker with TLS, as a PEM file
+    #[arg(long, value_name = "FILE")]
+    pub tls_ca: Option<PathBuf>,
     /// Protocol version it speaks; the newest one unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,
@@ -83,6 +90,9 @@ pub struct SimulatedAgv {
     /// be repeated
     #[arg(long, value_name = "WORD")]
     pub persona: Vec<PersonaArg>,
+    /// Serve what a person would do at the vehicle over HTTP here, by the names of `list hooks`; for one vehicle
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "count")]
+    pub hooks: Option<String>,
     /// Seconds between two states when nothing happens
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub state_interval: Option<f64>,

@@ -12,9 +12,10 @@ Examples:
   vda5050-tck watch --broker mqtt://127.0.0.1:1883               until Ctrl-C
   vda5050-tck watch --record site.jsonl --rotate-every 1d --keep 14
   vda5050-tck watch --metrics 127.0.0.1:9464 --summary 15m       for a scraper and a log
+  vda5050-tck watch --broker mqtt://site:1883 --listen 0.0.0.0:1884   vehicles connect here
   vda5050-tck watch --for 60s --fail-fast                        as a check after a change on site
 
-It only listens: nothing is published. What a subscriber cannot see is not judged.
+It only listens: nothing is published. What a subscriber cannot see is judged only with --listen.
 The exit code is that of `audit`: 1 when something is violated, 0 when nothing is.";
 
 /// `watch`.
@@ -24,6 +25,9 @@ pub struct Watch {
     /// Where to listen.
     #[command(flatten)]
     pub at: BrokerArgs,
+    /// Be the tap: let vehicles connect here, hand all on to the broker, and judge their connections, too
+    #[arg(long, value_name = "HOST:PORT")]
+    pub listen: Option<String>,
     /// End after this time, such as 90s, 15m, 8h or 7d; without it, Ctrl-C ends it
     #[arg(long = "for", value_name = "TIME", value_parser = time)]
     pub time: Option<Duration>,
@@ -60,6 +64,9 @@ pub struct Watch {
     /// A line for each vehicle, so often
     #[arg(long, value_name = "TIME", value_parser = time, help_heading = "Output")]
     pub summary: Option<Duration>,
+    /// Plain lines, and no full-screen view where the output is a terminal
+    #[arg(long, help_heading = "Output")]
+    pub plain: bool,
     /// How results are written to standard output
     #[arg(long, value_enum, default_value_t, help_heading = "Output")]
     pub format: Format,

@@ -9,7 +9,7 @@ use tokio::sync::watch;
 use crate::cli::args::Explore;
 use crate::cli::device::tolerate;
 use crate::cli::problem::Problem;
-use crate::cli::run::interrupts;
+use crate::cli::run::{person, stop};
 use crate::clock::WallClock;
 use crate::explore::{ConversationFile, Explored, Purpose, Stage};
 use crate::journal::file::JournalWriter;
@@ -23,6 +23,7 @@ use crate::run::{
 };
 use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 use crate::suite::model::Test;
+use crate::ui::Desk;
 
 /// What is explored.
 pub(super) enum Device {
@@ -82,6 +83,7 @@ pub(super) struct OnStage {
     reports: PathBuf,
     runtime: Runtime,
     interrupt: watch::Receiver<bool>,
+    desk: Desk,
     rounds: u32,
     kept: Option<PathBuf>,
     /// The report whose tests are the conversations of the findings.
@@ -95,14 +97,15 @@ impl OnStage {
             .enable_all()
             .build()
             .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
-        let interrupt = runtime.block_on(async { interrupts() })?;
+        let stop = runtime.block_on(async { stop() })?;
         Ok(Self {
             library,
             pack,
             device,
             reports: reports.to_owned(),
             runtime,
-            interrupt,
+            interrupt: stop.subscribe(),
+            desk: Desk::new(stop),
             rounds: 0,
             kept: None,
             evidence: None,
@@ -139,6 +142,7 @@ impl OnStage {
             run: run.to_owned(),
             command: std::env::args().collect(),
             fail_fast: false,
+            repeat: 1,
             certifies: false,
         }
     }
@@ -176,7 +180,7 @@ impl OnStage {
             } => {
                 let place = Place {
                     folder: folder.clone(),
-                    attended: console::user_attended(),
+                    person: person(&self.desk),
                     vehicles: None,
                 };
                 let mut run = SocketRun::of_profile(effective, library, pack, surroundings, place)?;

@@ -2,9 +2,10 @@
 
 use super::Job;
 use crate::cli::args;
+use crate::cli::events::Followed;
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
-use crate::cli::screen::Screen;
+
 use crate::diagnostic::Diagnostic;
 use crate::engine::Recorder;
 use crate::report::known::measure;
@@ -17,8 +18,17 @@ use crate::verdict::Verdict;
 
 impl Job {
     /// Writes the bundle and says the verdict.
-    pub(super) fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Screen) -> Result<Exit, Problem> {
-        let Finished { end, result, recorder } = finished;
+    pub(super) fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Followed) -> Result<Exit, Problem> {
+        let Finished {
+            end,
+            mut result,
+            recorder,
+        } = finished;
+        let mut unwritten = None;
+        match bundle.pack_journal() {
+            Ok(packed) => packed.clone_into(&mut result.journal),
+            Err(error) => unwritten = Some(error.to_string()),
+        }
         let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
         let root = write_all(
             bundle,
@@ -27,11 +37,18 @@ impl Job {
             recorder.journal(),
             self.output.inconclusive.into(),
         );
-        let root = root.map_err(|error| Problem::Environment(error.to_string()))?;
-        terminal.finish();
+        let root = match root {
+            Ok(root) => Some(root),
+            Err(error) => {
+                unwritten = Some(error.to_string());
+                None
+            }
+        };
+        terminal.screen.finish();
         let shown = bundle.folder().display().to_string();
         crate::cli::pipeline::tell(&result, &quoted, &shown);
         match self.output.format {
+            _ if self.output.speaks_events() => {}
             args::Format::Json => {
                 let text =
                     crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
@@ -45,33 +62,52 @@ impl Job {
                     page.push('\n');
                 }
                 let report = format!("{shown}/report.html");
-                let bundle = overview::Bundle {
-                    report: Some(&report),
-                    root: Some(&root),
+                let shown_bundle = overview::Bundle {
+                    report: root.as_ref().map(|_| report.as_str()),
+                    root: root.as_deref(),
                 };
                 page.push_str(&overview::overview(
                     &result,
                     &quoted,
                     Some(recorder.journal()),
-                    bundle,
+                    shown_bundle,
                     color,
                 ));
                 crate::cli::print(&page)?;
             }
         }
+        if self.output.open && root.is_some() {
+            crate::cli::browser::open(&bundle.folder().join("report.html"));
+        }
+        let outcome = match unwritten {
+            None => self.outcome(end, &result, &shown),
+            // What was found is not lost with the paper it should stand on.
+            Some(why) => {
+                let problem = Problem::Environment(format!("{why}; the journal is in {shown}, and `report` reads it"));
+                eprintln!("{}", problem.render(console::colors_enabled_stderr()));
+                Ok(Exit::of_partial(result.verdict, matches!(end, End::Interrupted)))
+            }
+        };
+        let exit = outcome.as_ref().map_or_else(Problem::exit, |exit| *exit);
+        terminal.ended(&result, root.as_deref(), exit.code());
+        outcome
+    }
+
+    /// What the end of a run means for whoever started it.
+    fn outcome(&self, end: End, result: &RunResult, shown: &str) -> Result<Exit, Problem> {
         match end {
             End::Completed => match result.tests.iter().find_map(|test| test.not_applicable.as_deref()) {
                 Some(why) if result.verdict.is_none() => Err(Problem::NothingToDo(format!(
                     "no selected test applies to the device: {why}"
                 ))),
-                _ => self.exit(&result),
+                _ => self.exit(result),
             },
             End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
             End::Stranger(why) => Err(Diagnostic::whole("another-device", why)
                 .hint("set manufacturer, serial-number, protocol-version or topic-template in the section [device] of the profile")
                 .into()),
-            End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Ok(broken_off(&why, &shown, &result)),
-            End::Broken(error) => Ok(broken_off(&error.to_string(), &shown, &result)),
+            End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Ok(broken_off(&why, shown, result)),
+            End::Broken(error) => Ok(broken_off(&error.to_string(), shown, result)),
         }
     }
 }
@@ -109,8 +145,8 @@ impl Job {
         }
         let measured = measure(result, known);
         match self.output.format {
-            args::Format::Text => crate::cli::print(&format!("\n{}", measured.text()))?,
-            args::Format::Json => {
+            args::Format::Text if !self.output.speaks_events() => crate::cli::print(&format!("\n{}", measured.text()))?,
+            _ => {
                 eprint!("{}", measured.text());
                 Exit::Conforms
             }

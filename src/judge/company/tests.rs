@@ -1,7 +1,7 @@
 use super::*;
 use crate::clock::Stamp;
 use crate::journal::Journal;
-use crate::journal::event::{Close, Filter, Occurrence, Source};
+use crate::journal::event::{Close, Filter, LinkFault, Source};
 use crate::pack::{Assets, Packs};
 
 /// A tap, and what was said of each entry.

@@ -3,34 +3,36 @@
 //! Everything that happens comes through one inbox, stamped on arrival. The bench owns all tasks and sockets;
 //! [`MqttLink::stop`] closes them.
 
+mod delivery;
 mod fresh;
+mod standing;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep_until, timeout};
 
-use crate::bench::client::{Client, ClientEvent, ClientOptions};
+use crate::bench::client::Client;
 use crate::bench::endpoint::{Credentials, Endpoint};
 use crate::bench::inbox::{Inbox, inbox};
+use crate::bench::own::OwnNames;
 use crate::bench::tls::{self, TlsFiles};
 use crate::bench::{LinkError, Offer, Outgoing, Vantage};
-use crate::broker::{EmbeddedBroker, self_test};
+use crate::broker::{EmbeddedBroker, Tested, self_test};
 use crate::clock::{Moment, Stamp, WallClock};
-use crate::journal::event::{Direction, Event, LinkFault, Occurrence, Payload, Source};
+use crate::journal::event::{Event, LinkFault, Occurrence, Source};
 use crate::link::Link;
 use crate::maps::MapServer;
 use crate::tap::{Tap, Upstream};
+use delivery::Delivery;
+use standing::{listen, own_client, probe_topic, rules, standing, without_own_topics};
 
 pub use crate::bench::inbox::Reporter;
 
 /// How long the broker may take to accept the harness, or to serve a fresh subscriber.
 const ANSWER_LIMIT: Duration = Duration::from_secs(10);
-/// Keep-alive of the harness's own connections.
-const KEEP_ALIVE: Duration = Duration::from_secs(30);
 
 /// A harness that is late by less is in time.
 const LAG: Duration = Duration::from_millis(100);
@@ -63,7 +65,7 @@ pub enum BrokerChoice {
     Embedded,
     /// Another one.
     External {
-        /// `mqtt://host:port` or `mqtts://host:port`.
+        /// `mqtt://host:port`, or with `mqtts`, `ws` or `wss`.
         url: String,
         /// PEM file to check its certificate against.
         authority: Option<PathBuf>,
@@ -83,10 +85,14 @@ pub struct BenchOptions {
     pub tap: bool,
     /// Certificate of the tap; without one it speaks plain TCP.
     pub tls: Option<TlsFiles>,
+    /// PEM file with an authority that mock vehicles trust when they fetch maps.
+    pub authority: Option<PathBuf>,
     /// Where the map server listens.
     pub maps_listen: String,
     /// Host name in the links to map files, as the device knows this machine; where the map server listens unless said.
     pub maps_host: Option<String>,
+    /// How the harness names itself.
+    pub own: OwnNames,
     /// Topic filters of the standing subscription: the topics of the device.
     pub device_topics: Vec<String>,
     /// The clock of the run.
@@ -102,8 +108,10 @@ impl BenchOptions {
             broker: BrokerChoice::Embedded,
             tap: true,
             tls: None,
+            authority: None,
             maps_listen: "127.0.0.1:0".to_owned(),
             maps_host: None,
+            own: OwnNames::default(),
             device_topics,
             clock: WallClock::start(),
         }
@@ -123,6 +131,8 @@ pub struct BenchInfo {
     pub broker: Endpoint,
     /// Where the map server listens.
     pub maps_address: SocketAddr,
+    /// What the broker does not allow, and what cannot be said therefore.
+    pub limits: Vec<String>,
 }
 
 impl BenchInfo {
@@ -179,17 +189,21 @@ impl MqttBench {
             } => (None, Endpoint::parse(url, authority.as_deref(), credentials.clone())?),
         };
         let upstream = Upstream {
-            host: endpoint.host.clone(),
-            port: endpoint.port,
-            tls: endpoint.tls.clone(),
+            broker: endpoint.clone(),
             embedded: embedded.is_some(),
         };
         let maps = MapServer::start(&options.maps_listen, options.maps_host.as_deref(), reporter.clone()).await?;
-        self_test(&endpoint).await?;
+        let limits = match self_test(&endpoint, &options.own).await? {
+            Tested::Keeps => Vec::new(),
+            Tested::Forbids(what) => vec![without_own_topics(&what, &endpoint, &options)],
+        };
+        let has_own_topics = limits.is_empty();
         let run = uuid::Uuid::new_v4().simple().to_string();
         // Known to nobody on the broker, so that nobody can take it.
-        let client_id = format!("tck-{}", uuid::Uuid::new_v4().simple());
-        let standing = standing(&endpoint, &run, &client_id, &options, &reporter).await?;
+        let client_id = options.own.client("");
+        let probes = probe_topic(&options.own, &run);
+        let own_topic = has_own_topics.then(|| probes.clone());
+        let standing = standing(&endpoint, own_topic, &client_id, &options, &reporter).await?;
         // Last, so that nothing of the device can be missed.
         let tap = if options.tap {
             Some(Tap::start(&options.listen, tls, upstream, reporter.clone()).await?)
@@ -206,9 +220,14 @@ impl MqttBench {
                 endpoint.tls.is_some()
             },
             broker_address: endpoint.address(),
-            broker: endpoint.clone(),
+            broker: Endpoint {
+                authority: options.authority.clone(),
+                ..endpoint.clone()
+            },
             maps_address: maps.address(),
+            limits,
         };
+        let access_rules = rules(&endpoint, &options);
         let mut tasks = JoinSet::new();
         if let Some(broker) = &embedded {
             let (mut ended, reporter, endpoint) = (broker.ended(), reporter.clone(), endpoint.clone());
@@ -218,17 +237,16 @@ impl MqttBench {
                 }
             });
         }
-        tasks.spawn(listen(
-            standing.events,
-            endpoint.clone(),
-            probe_topic(&run),
-            reporter.clone(),
-        ));
+        tasks.spawn(listen(standing.events, endpoint.clone(), probes, reporter.clone()));
         tasks.spawn(watch_lag(reporter.clone()));
         let link = MqttLink {
             clock: options.clock,
             vantage: if options.tap { Vantage::Tap } else { Vantage::Subscriber },
             endpoint,
+            own: options.own,
+            rules: access_rules,
+            delivery: (embedded.is_none() && options.tap).then(Delivery::default),
+            has_own_topics,
             run,
             client_id,
             client: standing.client,
@@ -246,101 +264,18 @@ impl MqttBench {
     }
 }
 
-struct Standing {
-    client: Client,
-    events: mpsc::Receiver<ClientEvent>,
-}
-
-/// Connects the harness and waits until its standing subscription is acknowledged.
-async fn standing(
-    endpoint: &Endpoint,
-    run: &str,
-    client_id: &str,
-    options: &BenchOptions,
-    reporter: &Reporter,
-) -> Result<Standing, LinkError> {
-    let topics = options.device_topics.iter().cloned().chain([probe_topic(run)]);
-    let (client, mut events) = Client::open(&own_client(endpoint, client_id, topics));
-    let connected = async {
-        loop {
-            match events.recv().await {
-                Some(ClientEvent::Connected) => return Ok(()),
-                // Stored messages may come before the acknowledgement.
-                Some(message @ ClientEvent::Message { .. }) => tell(message, reporter, "").await,
-                Some(ClientEvent::Lost(reason)) => return Err(endpoint.lost(reason)),
-                None => return Err(endpoint.lost("the connection ended")),
-            }
-        }
-    };
-    match timeout(ANSWER_LIMIT, connected).await {
-        Ok(result) => result?,
-        Err(_) => return Err(endpoint.lost("it does not answer")),
-    }
-    Ok(Standing { client, events })
-}
-
-fn own_client(endpoint: &Endpoint, client_id: &str, topics: impl Iterator<Item = String>) -> ClientOptions {
-    ClientOptions {
-        endpoint: endpoint.clone(),
-        client_id: client_id.to_owned(),
-        keep_alive: KEEP_ALIVE,
-        clean_session: true,
-        will: None,
-        subscriptions: topics.map(|topic| (topic, 2)).collect(),
-    }
-}
-
-fn probe_topic(run: &str) -> String {
-    format!("vda5050-tck/{run}/probe")
-}
-
-/// Reports what the standing subscription receives, until the connection is gone.
-async fn listen(mut events: mpsc::Receiver<ClientEvent>, endpoint: Endpoint, probes: String, reporter: Reporter) {
-    let reason = loop {
-        match events.recv().await {
-            Some(ClientEvent::Lost(reason)) => break reason,
-            Some(event) => tell(event, &reporter, &probes).await,
-            None => break "the connection ended".to_owned(),
-        }
-    };
-    reporter.broken(endpoint.lost(reason));
-}
-
-async fn tell(event: ClientEvent, reporter: &Reporter, probes: &str) {
-    let ClientEvent::Message {
-        topic,
-        payload,
-        qos,
-        retain,
-        dup,
-    } = event
-    else {
-        return;
-    };
-    if topic == probes {
-        if let Some(probe) = std::str::from_utf8(&payload).ok().and_then(|text| text.parse().ok()) {
-            reporter
-                .report(Source::Link, None, Event::ProbeReceived { probe })
-                .await;
-        }
-        return;
-    }
-    let payload = Payload::keep(payload);
-    let event = Event::Message {
-        topic,
-        qos,
-        retain,
-        dup,
-        payload,
-    };
-    reporter.report(Source::Link, Some(Direction::FromDevice), event).await;
-}
-
 /// The real bench as the engine sees it.
 pub struct MqttLink {
     clock: WallClock,
     vantage: Vantage,
     endpoint: Endpoint,
+    own: OwnNames,
+    /// The access rules that allow all this.
+    rules: String,
+    /// Whether a broker of somebody else delivers; nobody knows without a tap.
+    delivery: Option<Delivery>,
+    /// Whether the broker allows topics of the harness.
+    has_own_topics: bool,
     run: String,
     client_id: String,
     client: Client,
@@ -390,30 +325,8 @@ impl MqttLink {
         result
     }
 
-    fn send(&mut self, message: Outgoing) -> Result<(), LinkError> {
-        self.check()?;
-        if self.client.publish(message) {
-            return Ok(());
-        }
-        let result = Err(self.endpoint.lost("the harness's own connection is gone"));
-        self.note(result)
-    }
-}
-
-impl Link for MqttLink {
-    fn now(&self) -> Stamp {
-        self.clock.now()
-    }
-
-    fn vantage(&self) -> Vantage {
-        self.vantage
-    }
-
-    async fn publish(&mut self, message: Outgoing) -> Result<(), LinkError> {
-        self.send(message)
-    }
-
-    async fn next(&mut self, until: Moment) -> Result<Option<Occurrence>, LinkError> {
+    /// The next thing that happens.
+    async fn take(&mut self, until: Moment) -> Result<Option<Occurrence>, LinkError> {
         let ready = self.inbox.ready();
         if let Some(occurrence) = self.note(ready)? {
             return Ok(Some(occurrence));
@@ -435,6 +348,56 @@ impl Link for MqttLink {
         Ok(next)
     }
 
+    fn send(&mut self, message: Outgoing) -> Result<(), LinkError> {
+        self.check()?;
+        if self.client.publish(message) {
+            return Ok(());
+        }
+        let result = Err(self.endpoint.lost("the harness's own connection is gone"));
+        self.note(result)
+    }
+}
+
+impl Link for MqttLink {
+    fn now(&self) -> Stamp {
+        self.clock.now()
+    }
+
+    fn vantage(&self) -> Vantage {
+        self.vantage
+    }
+
+    async fn publish(&mut self, message: Outgoing) -> Result<(), LinkError> {
+        let now = self.clock.now().moment;
+        if let Some(delivery) = &mut self.delivery {
+            delivery.sent(&message.topic, now);
+        }
+        self.send(message)
+    }
+
+    async fn next(&mut self, until: Moment) -> Result<Option<Occurrence>, LinkError> {
+        let next = self.take(until).await?;
+        let Some(delivery) = &mut self.delivery else {
+            return Ok(next);
+        };
+        let now = match &next {
+            Some(occurrence) => {
+                delivery.observe(occurrence);
+                // What has come since is still to be read.
+                occurrence.at.moment
+            }
+            None => self.clock.now().moment,
+        };
+        match delivery.overdue(now) {
+            None => Ok(next),
+            Some(topic) => Err(LinkError::Forbidden {
+                address: self.endpoint.address(),
+                what: format!("that what the harness publishes on {topic} reaches the device, which subscribes to it"),
+                rules: self.rules.clone(),
+            }),
+        }
+    }
+
     async fn fault(&mut self, fault: LinkFault) -> Result<(), LinkError> {
         let Some(tap) = &self.tap else {
             return Err(LinkError::NeedsTap {
@@ -442,6 +405,9 @@ impl Link for MqttLink {
             });
         };
         tap.fault(&fault).await;
+        if let Some(delivery) = &mut self.delivery {
+            delivery.fault(&fault);
+        }
         Ok(())
     }
 
@@ -449,9 +415,12 @@ impl Link for MqttLink {
         self.check()?;
         self.requests += 1;
         let request = self.requests;
-        let end = format!("vda5050-tck/{}/end/{request}", self.run);
+        let end = self
+            .has_own_topics
+            .then(|| format!("{}/{}/end/{request}", self.own.topics, self.run));
         let id = format!("{}-{request}", self.client_id);
-        let options = own_client(&self.endpoint, &id, [topic.to_owned(), end.clone()].into_iter());
+        let topics = [topic.to_owned()].into_iter().chain(end.clone());
+        let options = own_client(&self.endpoint, &id, topics);
         let (endpoint, reporter) = (self.endpoint.clone(), self.reporter.clone());
         while self.tasks.try_join_next().is_some() {}
         self.tasks.spawn(async move {
@@ -466,8 +435,12 @@ impl Link for MqttLink {
     async fn probe(&mut self) -> Result<u64, LinkError> {
         self.probes += 1;
         let probe = self.probes;
+        if !self.has_own_topics {
+            // It would never come back; what waits for it says that nothing is known.
+            return self.check().map(|()| probe);
+        }
         self.send(Outgoing {
-            topic: probe_topic(&self.run),
+            topic: probe_topic(&self.own, &self.run),
             payload: probe.to_string().into(),
             qos: 1,
             retain: false,

@@ -7,6 +7,7 @@ use super::{Entry, Reader};
 use crate::diagnostic;
 use crate::profile::hooks::{HOOKS, Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
 use crate::profile::key::{COMMON_PLACEHOLDERS, Kind};
+use crate::profile::secret::SecretText;
 use crate::profile::value::{self, Value};
 
 impl Reader<'_> {
@@ -20,7 +21,12 @@ impl Reader<'_> {
             return;
         }
         let what = format!("hook `{id}`");
-        let Some(members) = self.members(&what, value, &["run", "http", "prompt", "builtin", "timeout"], &[]) else {
+        let Some(members) = self.members(
+            &what,
+            value,
+            &["run", "http", "prompt", "builtin", "listen", "timeout"],
+            &[],
+        ) else {
             return;
         };
         let ways: Vec<&str> = members.keys().copied().filter(|way| *way != "timeout").collect();
@@ -33,7 +39,7 @@ impl Reader<'_> {
                     "more than one way to be done"
                 }
             );
-            let hint = "give exactly one of `run`, `http`, `prompt` and `builtin`".to_owned();
+            let hint = "give exactly one of `run`, `http`, `prompt`, `builtin` and `listen`".to_owned();
             self.complain("contradiction", name.span(), &title, &ways.join(" and "), Some(hint));
             return;
         };
@@ -42,6 +48,24 @@ impl Reader<'_> {
             return;
         };
         let mut timeout = action.default_timeout();
+        if *way == "listen" {
+            if members.contains_key("timeout") {
+                let title = format!("{what} says twice how long it may take");
+                let hint = "`listen` is the time itself: leave `timeout` out".to_owned();
+                return self.complain(
+                    "contradiction",
+                    name.span(),
+                    &title,
+                    "`listen` and `timeout`",
+                    Some(hint),
+                );
+            }
+            match Value::from_toml(Kind::Duration, way_value.get_ref(), self.folder) {
+                Ok(Value::Duration(duration)) => timeout = duration,
+                Ok(_) => {}
+                Err(refusal) => return self.refuse(&format!("`listen` of {what}"), way_value, refusal),
+            }
+        }
         if let Some(written) = members.get("timeout") {
             match Value::from_toml(Kind::Duration, written.get_ref(), self.folder) {
                 Ok(Value::Duration(duration)) => timeout = duration,
@@ -64,6 +88,7 @@ impl Reader<'_> {
             "run" => HookAction::Run(self.command(&what, value)?),
             "prompt" => HookAction::Prompt(self.text(&what, value)?),
             "builtin" => self.builtin(&what, value)?,
+            "listen" => HookAction::NaturalTraffic,
             _ => self.http(&what, value)?,
         };
         let mut known: Vec<&str> = HOOKS
@@ -125,7 +150,7 @@ impl Reader<'_> {
 
     fn http(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<HookAction> {
         const METHODS: [&str; 5] = ["GET", "POST", "PUT", "PATCH", "DELETE"];
-        let members = self.members(what, value, &["method", "url", "body"], &["url"])?;
+        let members = self.members(what, value, &["method", "url", "body", "headers"], &["url"])?;
         let url_value = members.get("url")?;
         let url = self.text(&format!("the url in {what}"), url_value)?;
         if !url.starts_with("http://") && !url.starts_with("https://") {
@@ -161,6 +186,51 @@ impl Reader<'_> {
             }
             None => "POST".to_owned(),
         };
-        Some(HookAction::Http { method, url, body })
+        let headers = match members.get("headers") {
+            Some(headers) => self.headers(what, headers)?,
+            None => Vec::new(),
+        };
+        Some(HookAction::Http {
+            method,
+            url,
+            body,
+            headers,
+        })
+    }
+
+    fn headers(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<Vec<(String, SecretText)>> {
+        let DeValue::Table(table) = value.get_ref() else {
+            let label = format!("this is {}", value::type_name(value.get_ref()));
+            let title = format!("the headers in {what} are a table");
+            let hint = "such as headers = { Authorization = \"Bearer ${env:TOKEN}\" }".to_owned();
+            self.complain("wrong-type", value.span(), &title, &label, Some(hint));
+            return None;
+        };
+        let mut headers = Vec::new();
+        for (name, value) in table {
+            let id = name.get_ref().as_ref();
+            let is_name = |c: char| c.is_ascii_alphanumeric() || "!#$%&'*+-.^_`|~".contains(c);
+            if id.is_empty() || !id.chars().all(is_name) {
+                let title = format!("`{id}` is no name of a header in {what}");
+                self.complain("bad-value", name.span(), &title, "not a name", None);
+                return None;
+            }
+            let text = self.text(&format!("the header `{id}` in {what}"), value)?;
+            match SecretText::read(&text, self.folder) {
+                Ok(read) if !text.contains(|c: char| c.is_control()) => headers.push((id.to_owned(), read)),
+                Ok(_) => {
+                    let title = format!("the header `{id}` in {what} has a line break or another control character");
+                    self.complain("bad-value", value.span(), &title, "here", None);
+                    return None;
+                }
+                Err(why) => {
+                    let title = format!("the header `{id}` in {what} cannot be read");
+                    let hint = "a value of the site is taken from ${env:NAME} or ${file:PATH}".to_owned();
+                    self.complain("bad-value", value.span(), &title, &why, Some(hint));
+                    return None;
+                }
+            }
+        }
+        Some(headers)
     }
 }

@@ -8,6 +8,7 @@ use super::source_view::{SourceView, source_view};
 use super::view::Badge;
 use crate::journal::Event;
 use crate::report::headline::reference;
+use crate::report::repeated;
 use crate::report::sources::Sources;
 use crate::report::statement::{many, seconds, test_verdict};
 use crate::report::{clean, sequence};
@@ -29,6 +30,9 @@ pub struct TestView {
     pub title: String,
     pub why: String,
     pub reason: Option<String>,
+    /// How often it was run and what came out, where it was run several times.
+    pub repeated: Option<String>,
+    pub flaky: bool,
     /// What was read over, and what else was done to get here.
     pub allowances: Vec<String>,
     pub not_applicable: bool,
@@ -199,6 +203,8 @@ fn view(
                 .then(|| "the test decided nothing".to_owned())
                 .filter(|_| test.decisions.is_empty())
         }),
+        repeated: repeated::summary(test),
+        flaky: test.is_flaky(),
         allowances: test.allowances.clone(),
         not_applicable: verdict.is_none(),
         watchlist: test.maturity == "watchlist",

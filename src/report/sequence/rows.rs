@@ -163,6 +163,7 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
                 StepEnd::Deadline => ("time is up".to_owned(), text(path)),
                 StepEnd::Interrupted => ("interrupted".to_owned(), text(path)),
                 StepEnd::Broken(why) => ("the harness broke".to_owned(), text(why)),
+                StepEnd::Skipped(why) => ("the test is skipped".to_owned(), text(why)),
                 StepEnd::Refused(why) => ("the device does not do it".to_owned(), text(why)),
             };
             let mut row = plain(entry, What::Box(Harness), title, detail);

@@ -143,6 +143,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
                 seconds: -1.0,
             }],
             allowances: vec![evil()],
+            repetitions: Vec::new(),
         })
         .collect::<Vec<_>>();
     let monitors = vec![MonitorResult {

@@ -50,6 +50,7 @@ pub fn step(
 pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Vec<Decision>) -> TestResult {
     TestResult {
         allowances: Vec::new(),
+        repetitions: Vec::new(),
         id: id.to_owned(),
         title: title.to_owned(),
         verdict: Some(verdict),
@@ -148,6 +149,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
         suites_sha256: "5f0c2c1d9a7b3e4f5a6b7c8d9e0f1a2b3c4d5e6f708192a3b4c5d6e7f8091a2b".to_owned(),
         suites_modified: false,
         journal: "journal.jsonl".to_owned(),
+        joined: Vec::new(),
         tests,
         monitors,
         requirements,

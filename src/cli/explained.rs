@@ -1,0 +1,91 @@
+//! `explain --format json`: the same for programs, an object for each thing of that name.
+
+use serde_json::{Map, Value, json};
+
+use crate::checks;
+use crate::pack::{Pack, Requirement, Role};
+use crate::profile::HOOKS;
+use crate::reference::Fault;
+use crate::run::Library;
+use crate::simulate::BuiltIn;
+use crate::suite::model::{Monitor, Rule, Test};
+
+/// Everything that has this name.
+pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
+    let suites = &library.rules.suites;
+    let mut found = Vec::new();
+    if let Some(known) = library.rules.catalogue.get(id) {
+        found.push(requirement(known, library, pack));
+    }
+    let mut tests = suites.tests.iter();
+    let is_meant = |test: &&std::sync::Arc<Test>| test.id == id || test.id.split('[').next() == Some(id);
+    if let Some(known) = tests.find(is_meant) {
+        let cases = suites.tests.iter().filter(is_meant).count();
+        found.push(test(known, cases));
+    }
+    let monitors = suites.monitors.iter().filter(|monitor| monitor.id == id);
+    found.extend(monitors.map(|known| monitor(known)));
+    if let Some(check) = checks::find(id) {
+        found.push(json!({ "kind": "check", "id": id, "doc": check.doc, "decides": check.decides }));
+    }
+    for hook in HOOKS.iter().filter(|hook| hook.name == id) {
+        found.push(
+            json!({ "kind": "hook", "id": id, "role": hook.role.word(), "doc": hook.doc,
+            "parameters": hook.parameters }),
+        );
+    }
+    for (role, fault) in faults().filter(|(_, fault)| fault.name == id) {
+        found.push(
+            json!({ "kind": "fault", "id": id, "role": role.word(), "wrong": fault.wrong,
+            "breaks": fault.breaks }),
+        );
+    }
+    found
+}
+
+fn faults() -> impl Iterator<Item = (Role, &'static Fault)> {
+    let roles = [Role::Agv, Role::MasterControl].into_iter();
+    roles.flat_map(|role| BuiltIn::faults(role).iter().map(move |fault| (role, fault)))
+}
+
+fn requirement(known: &Requirement, library: &Library, pack: &Pack) -> Value {
+    let id = known.id.as_str();
+    let versions = known.versions.iter().map(|(version, note)| {
+        let note = json!({ "section": note.section, "mood": note.mood.word() });
+        (version.clone(), note)
+    });
+    let versions: Map<String, Value> = versions.collect();
+    let suites = &library.rules.suites;
+    let mut by: Vec<String> = suites.deciding(id).iter().map(|test| test.table().to_owned()).collect();
+    by.dedup();
+    let monitors = suites.monitors.iter();
+    let monitors = monitors.filter(|monitor| monitor.checks.iter().any(|one| one.requirement.as_str() == id));
+    let monitors: Vec<&str> = monitors.map(|monitor| monitor.id.as_str()).collect();
+    let proved: Vec<&str> = faults()
+        .filter(|(_, fault)| fault.breaks.contains(&id))
+        .map(|(_, fault)| fault.name)
+        .collect();
+    json!({ "kind": "requirement", "id": id, "chapter": known.chapter, "text": known.text, "role": known.role.word(),
+        "versions": versions, "inVersion": known.in_version(pack).is_some(), "interpretation": known.interpretation,
+        "decided": known.decided.word(), "tests": by, "monitors": monitors, "provedWith": proved })
+}
+
+fn test(known: &Test, cases: usize) -> Value {
+    let steps = known.steps.iter().flat_map(crate::suite::model::Step::clauses);
+    let decides: Vec<Value> = steps
+        .map(|(requirement, clause)| json!({ "requirement": requirement, "clause": clause }))
+        .collect();
+    json!({ "kind": "test", "id": known.id, "title": known.title, "why": known.why.trim(), "file": known.source.name,
+        "role": known.device.word(), "spec": known.spec.to_string(), "moves": known.moves, "tags": known.tags(),
+        "hooks": known.hooks(), "cases": cases, "decides": decides, "source": known.source.text })
+}
+
+fn monitor(known: &Monitor) -> Value {
+    let decides: Vec<&str> = known.checks.iter().map(|one| one.requirement.as_str()).collect();
+    let check = match &known.rule {
+        Rule::Check(check) => Some(check.name.clone()),
+        _ => None,
+    };
+    json!({ "kind": "monitor", "id": known.id, "title": known.title, "why": known.why.trim(),
+        "file": known.source.name, "decides": decides, "check": check })
+}

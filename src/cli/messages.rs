@@ -1,0 +1,320 @@
+//! Messages of `validate`: one or many in a file, each judged by itself.
+
+use std::ops::Range;
+use std::path::Path;
+
+use bytes::Bytes;
+use serde_json::{Value, json};
+
+use super::args::{Format, Validate};
+use super::problem::Problem;
+use crate::audit::{Flaw, single};
+use crate::diagnostic::{Diagnostic, closest};
+use crate::journal::json::Parsed;
+use crate::journal::place;
+use crate::pack::Pack;
+use crate::report::clean::{line, short};
+use crate::run::Library;
+use crate::verdict::Verdict;
+
+/// What was counted in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counted {
+    /// Messages in all.
+    pub messages: usize,
+    /// Those with at least one violation.
+    pub wrong: usize,
+    /// Those with nothing worse than a warning.
+    pub warned: usize,
+}
+
+/// Whether a file holds many messages: lines of JSON, or an array.
+pub fn is_batch(path: &Path, bytes: &[u8]) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    if matches!(extension, Some("jsonl" | "ndjson")) {
+        return true;
+    }
+    let text = bytes.trim_ascii_start();
+    if text.starts_with(b"[") {
+        return Parsed::of_bytes(bytes).value().is_some_and(|value| {
+            let all = value.as_array();
+            all.is_some_and(|all| !all.is_empty() && all.iter().all(Value::is_object))
+        });
+    }
+    // One message may stand on several lines, but then its first line is not whole.
+    let mut lines = text
+        .split(|byte| *byte == b'\n')
+        .filter(|line| !line.trim_ascii().is_empty());
+    let is_whole =
+        |line: &[u8]| line.starts_with(b"{") && serde_json::from_slice::<serde::de::IgnoredAny>(line).is_ok();
+    lines.next().is_some_and(is_whole) && lines.next().is_some()
+}
+
+/// Checks every message of a file.
+pub fn batch(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Result<Counted, Problem> {
+    let mut counted = Counted::default();
+    let ranges: Vec<Range<usize>> = if bytes.trim_ascii_start().starts_with(b"[") {
+        place::elements(bytes)
+    } else {
+        lines(bytes)
+    };
+    for range in ranges {
+        counted.messages += 1;
+        let found = message(bytes, range, arguments, library);
+        counted.add(&found.flaws);
+        for flaw in &found.flaws {
+            show(name, Some(counted.messages), flaw, arguments.format)?;
+        }
+    }
+    Ok(counted)
+}
+
+/// Checks a file that holds one message.
+pub fn alone(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Result<(Counted, String), Problem> {
+    let mut counted = Counted {
+        messages: 1,
+        ..Counted::default()
+    };
+    let found = message(bytes, 0..bytes.len(), arguments, library);
+    counted.add(&found.flaws);
+    for flaw in &found.flaws {
+        show(name, None, flaw, arguments.format)?;
+    }
+    Ok((counted, found.what))
+}
+
+impl Counted {
+    fn add(&mut self, flaws: &[Placed]) {
+        match flaws.iter().map(|placed| placed.flaw.verdict).max() {
+            Some(Verdict::Fail) => self.wrong += 1,
+            Some(_) => self.warned += 1,
+            None => {}
+        }
+    }
+}
+
+/// A flaw, and where it stands.
+struct Placed {
+    flaw: Flaw,
+    pointer: Option<String>,
+    line: usize,
+    column: usize,
+    sentence: Option<String>,
+    nearest: Option<String>,
+}
+
+/// A message that was checked.
+struct Checked {
+    what: String,
+    flaws: Vec<Placed>,
+}
+
+/// The bytes of each line that holds something.
+fn lines(bytes: &[u8]) -> Vec<Range<usize>> {
+    let mut begin = 0;
+    let mut all = Vec::new();
+    for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+        if !line.trim_ascii().is_empty() {
+            all.push(begin..begin + line.len());
+        }
+        begin += line.len();
+    }
+    all
+}
+
+fn message(file: &[u8], range: Range<usize>, arguments: &Validate, library: &Library) -> Checked {
+    let text = &file[range.clone()];
+    // A line ends with a line feed that is none of the message.
+    let text = text.strip_suffix(b"\n").unwrap_or(text);
+    let (first_line, first_column) = place::line_and_column(file, range.start);
+    let parsed = Parsed::of_bytes(text);
+    let value = parsed.value();
+    let own = |title: String, nearest: Option<String>| Checked {
+        what: String::new(),
+        flaws: vec![Placed {
+            flaw: Flaw {
+                requirements: Vec::new(),
+                verdict: Verdict::Fail,
+                monitor: "validate".to_owned(),
+                text: title,
+                interpretation: None,
+            },
+            pointer: None,
+            line: first_line,
+            column: first_column,
+            sentence: None,
+            nearest,
+        }],
+    };
+    let packs = &library.rules.packs;
+    let said = value.and_then(|value| value.get("version")?.as_str());
+    let wanted = arguments.protocol.as_deref().or(said);
+    let known = || packs.all().iter().map(|pack| pack.version.to_string());
+    let pack = match wanted.map(|version| (version, packs.get(version))) {
+        Some((_, Some(pack))) => pack,
+        None => packs.latest(),
+        Some((version, None)) => {
+            let known: Vec<String> = known().collect();
+            return own(
+                format!("there is no protocol version {version}"),
+                Some(format!("known versions: {}", known.join(", "))),
+            );
+        }
+    };
+    let topic = arguments.topic.as_deref().or_else(|| value.and_then(topic_of));
+    let topic = match topic {
+        Some(topic) => topic,
+        // What is not JSON is wrong on every topic.
+        None if value.is_none() => "state",
+        None if value.is_some_and(|value| value.get("topic").is_some() && value.get("payload").is_some()) => {
+            return own(
+                "a message with its topic, as recorders write it".to_owned(),
+                Some("judge recordings with `vda5050-tck audit`".to_owned()),
+            );
+        }
+        None => {
+            return own(
+                "JSON, but not a message that can be told by its members".to_owned(),
+                Some("say which with --topic".to_owned()),
+            );
+        }
+    };
+    if pack.topic(topic).is_none() {
+        let diagnostic = unknown_topic(topic, pack);
+        return own(diagnostic.title, diagnostic.hint);
+    }
+    let flaws = single(&library.rules, pack, topic, &Bytes::copy_from_slice(text));
+    let placed = flaws.into_iter().map(|flaw| {
+        let (pointer, at) = whereabouts(&flaw, topic, text, value);
+        let (line, column) = place::line_and_column(file, range.start + at);
+        let sentences = flaw.requirements.iter().rev();
+        let mut sentences = sentences.filter_map(|id| library.rules.catalogue.get(id));
+        let nearest = pointer
+            .as_deref()
+            .and_then(|pointer| nearest(pack, topic, pointer, value));
+        Placed {
+            sentence: sentences.next().map(|requirement| requirement.text.clone()),
+            flaw,
+            pointer,
+            line,
+            column,
+            nearest,
+        }
+    });
+    Checked {
+        flaws: placed.collect(),
+        what: format!("a valid {topic} message of VDA 5050 {}", pack.version),
+    }
+}
+
+/// Which member a flaw is about, and at which byte it stands.
+fn whereabouts(flaw: &Flaw, topic: &str, text: &[u8], value: Option<&Value>) -> (Option<String>, usize) {
+    let Some(value) = value else {
+        return (None, broken_at(text));
+    };
+    if flaw.text.contains("occurs twice")
+        && let Some((pointer, name)) = place::repeated(text)
+            .into_iter()
+            .find(|(pointer, _)| pointer.rsplit('/').next().is_some_and(|name| flaw.text.contains(name)))
+    {
+        return (Some(pointer), name.start);
+    }
+    let pointer = place::named(&flaw.text, topic, value).into_iter().next();
+    let range = pointer.as_deref().and_then(|pointer| place::of(text, pointer));
+    (pointer, range.map_or(0, |range| range.start))
+}
+
+/// Where a text ceases to be JSON in UTF-8.
+fn broken_at(text: &[u8]) -> usize {
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    match std::str::from_utf8(text) {
+        Err(error) => error.valid_up_to(),
+        Ok(whole) => {
+            let Err(error) = serde_json::from_str::<serde::de::IgnoredAny>(whole) else {
+                return 0;
+            };
+            let before: usize = whole
+                .split_inclusive('\n')
+                .take(error.line().saturating_sub(1))
+                .map(str::len)
+                .sum();
+            (before + error.column().saturating_sub(1)).min(text.len())
+        }
+    }
+}
+
+/// The allowed word that is closest to what stands there.
+fn nearest(pack: &Pack, topic: &str, pointer: &str, value: Option<&Value>) -> Option<String> {
+    let path: Vec<&str> = pointer
+        .split('/')
+        .skip(1)
+        .filter(|part| part.parse::<usize>().is_err())
+        .collect();
+    let found = value?.pointer(pointer)?.as_str()?;
+    let literals = pack.schema(topic)?.shape(&path)?.literals?;
+    if literals.iter().any(|word| word == found) {
+        return None;
+    }
+    let closest = closest(found, literals.iter().map(String::as_str))?;
+    Some(format!("did you mean `{closest}`?"))
+}
+
+fn show(name: &str, number: Option<usize>, placed: &Placed, format: Format) -> Result<(), Problem> {
+    let flaw = &placed.flaw;
+    let text = match format {
+        Format::Text => {
+            let tag = if flaw.verdict == Verdict::Fail { "FAIL" } else { "WARN" };
+            let mut text = format!(
+                "{name}:{}:{}: {tag} {}\n",
+                placed.line,
+                placed.column,
+                short(&line(&flaw.text), 300)
+            );
+            let requirements = flaw.requirements.join(", ");
+            match (&placed.sentence, requirements.is_empty()) {
+                (Some(sentence), false) => text.push_str(&format!("    {requirements}: {}\n", short(sentence, 300))),
+                (None, false) => text.push_str(&format!("    {requirements}\n")),
+                _ => {}
+            }
+            if let Some(nearest) = &placed.nearest {
+                text.push_str(&format!("    {}\n", line(nearest)));
+            }
+            text
+        }
+        Format::Json => {
+            let object = json!({
+                "file": name, "message": number, "ok": flaw.verdict != Verdict::Fail, "verdict": flaw.verdict,
+                "code": flaw.monitor, "title": flaw.text, "line": placed.line, "column": placed.column,
+                "pointer": placed.pointer, "requirements": flaw.requirements, "sentence": placed.sentence,
+                "interpretation": flaw.interpretation, "hint": placed.nearest,
+            });
+            format!("{object}\n")
+        }
+    };
+    super::print(&text).map(|_| ())
+}
+
+/// The topic a message belongs to, by a member only it has.
+pub fn topic_of(value: &Value) -> Option<&'static str> {
+    let has = |name: &str| value.get(name).is_some();
+    [
+        ("nodeStates", "state"),
+        ("nodes", "order"),
+        ("actions", "instantActions"),
+        ("instantActions", "instantActions"),
+        ("connectionState", "connection"),
+        ("typeSpecification", "factsheet"),
+        ("operatingMode", "state"),
+        ("agvPosition", "visualization"),
+        ("velocity", "visualization"),
+    ]
+    .into_iter()
+    .find(|(member, _)| has(member))
+    .map(|(_, topic)| topic)
+}
+
+fn unknown_topic(topic: &str, pack: &Pack) -> Diagnostic {
+    let names: Vec<&str> = pack.topics().iter().map(|rule| rule.name.as_str()).collect();
+    let diagnostic = Diagnostic::whole("unknown-topic", format!("there is no topic `{topic}`"));
+    diagnostic.hint(crate::diagnostic::did_you_mean(topic, names.iter().copied()))
+}

@@ -1,0 +1,50 @@
+//! What the commands about recordings share: opening them, the time that is asked for, and the result.
+
+use std::path::Path;
+
+use super::args::{Audit as Arguments, Format};
+use super::exit::Exit;
+use super::problem::Problem;
+use crate::audit::page;
+use crate::audit::result::AuditResult;
+use crate::capture::{CaptureError, Mapping, Recorded};
+use crate::diagnostic::Diagnostic;
+
+/// Prints the result.
+pub(super) fn show(result: &AuditResult, format: Format) -> Result<Exit, Problem> {
+    match format {
+        Format::Text => super::print(&page::page(result))?,
+        Format::Json => {
+            let text = serde_json::to_string_pretty(result).map_err(|error| Problem::Environment(error.to_string()))?;
+            super::print(&format!("{text}\n"))?
+        }
+    };
+    Ok(match result.verdict {
+        None if !result.vehicles.is_empty() => Exit::Undecided,
+        verdict => Exit::of(verdict),
+    })
+}
+
+/// Opens the recording of that number.
+pub(super) fn open(path: &Path, number: usize, arguments: &Arguments) -> Result<Recorded, Problem> {
+    Recorded::open(path, number, mapping(arguments)).map_err(broken)
+}
+
+/// Which members hold what.
+pub(super) fn mapping(arguments: &Arguments) -> Mapping {
+    Mapping {
+        time: arguments.time.clone(),
+        topic: arguments.topic.clone(),
+        payload: arguments.payload.clone(),
+    }
+}
+
+/// Whether a message came in the time that is asked for.
+pub(super) fn in_time(at: Option<jiff::Timestamp>, arguments: &Arguments) -> bool {
+    at.is_none_or(|at| arguments.from.is_none_or(|from| at >= from) && arguments.to.is_none_or(|to| at <= to))
+}
+
+/// A recording cannot be read.
+pub(super) fn broken(error: CaptureError) -> Problem {
+    Diagnostic::whole("unreadable", error.to_string()).into()
+}

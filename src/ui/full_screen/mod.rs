@@ -1,0 +1,101 @@
+//! A watch on the whole screen: vehicles, what was found of the chosen one, and the message with the wrong member marked.
+
+mod marked;
+mod view;
+
+use std::io::{self, IsTerminal as _};
+use std::time::Duration;
+
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+
+use crate::watch::session::{Contact, Happening, Viewer};
+use crate::watch::{Notice, Watch};
+use view::{Focus, View};
+
+/// See the module.
+pub struct FullScreen {
+    terminal: DefaultTerminal,
+    view: View,
+}
+
+impl FullScreen {
+    /// Takes the terminal over.
+    ///
+    /// # Errors
+    /// What the terminal cannot do.
+    pub fn open(broker: String) -> io::Result<Self> {
+        Ok(Self {
+            terminal: ratatui::try_init()?,
+            view: View::new(broker),
+        })
+    }
+}
+
+impl Drop for FullScreen {
+    fn drop(&mut self) {
+        ratatui::restore();
+    }
+}
+
+impl Viewer for FullScreen {
+    fn found(&mut self, _: &Notice) {}
+
+    fn happened(&mut self, happening: &Happening, at: jiff::Timestamp) {
+        self.view.note = match happening {
+            Happening::Tap(address) => format!("vehicles are expected at mqtt://{address}"),
+            Happening::Metrics(address) => format!("metrics at http://{address}/metrics"),
+            Happening::Connected => String::new(),
+            Happening::Again(unseen) => {
+                format!("{at:.0} connected again; {:.1} s were not seen", unseen.as_secs_f64())
+            }
+            Happening::Lost(why) => format!("{at:.0} the connection is lost: {why}"),
+        };
+    }
+
+    fn tick(&mut self, watch: &Watch<'_>, contact: Contact) -> bool {
+        // A terminal that is gone has no end of events.
+        if !io::stdin().is_terminal() {
+            return false;
+        }
+        let glances: Vec<_> = watch.glances().collect();
+        while event::poll(Duration::ZERO).unwrap_or(false) {
+            match event::read() {
+                Ok(Event::Key(key)) if key.kind != KeyEventKind::Release => {
+                    if !press(&mut self.view, key) {
+                        return false;
+                    }
+                }
+                Ok(_) => {}
+                Err(_) => return false,
+            }
+        }
+        self.view.choose(&glances);
+        let view = &mut self.view;
+        self.terminal.draw(|frame| view.draw(frame, &glances, contact)).is_ok()
+    }
+}
+
+/// What a key does; `false` ends the watch.
+fn press(view: &mut View, key: KeyEvent) -> bool {
+    let is_interrupt = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+    match key.code {
+        KeyCode::Char('q') => return false,
+        _ if is_interrupt => return false,
+        KeyCode::Tab | KeyCode::Left | KeyCode::Right => {
+            view.focus = match view.focus {
+                Focus::Vehicles => Focus::Findings,
+                Focus::Findings => Focus::Vehicles,
+            };
+        }
+        KeyCode::Up | KeyCode::Char('k') => view.step(-1),
+        KeyCode::Down | KeyCode::Char('j') => view.step(1),
+        KeyCode::PageUp => view.scroll(-10),
+        KeyCode::PageDown => view.scroll(10),
+        _ => {}
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,281 @@
+//! A question to the person at the terminal, who has it to himself meanwhile: nothing else is drawn, and only keys that
+//! are pressed after the question count.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, poll, read};
+use crossterm::terminal::{disable_raw_mode, enable_raw_mode};
+use indicatif::ProgressBar;
+use tokio::sync::watch;
+
+use super::output::escaped;
+use crate::run::{Answer, Person, Wanted};
+
+/// How long the keyboard is read before it is looked whether the answer is still wanted.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// The place where a person is asked, and what is asked about. Copies are the same place.
+#[derive(Clone, Debug)]
+pub struct Desk {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    /// Ends the run.
+    stop: watch::Sender<bool>,
+    /// What is drawn otherwise, and what the run is about now.
+    about: Mutex<About>,
+    asked: AtomicUsize,
+    /// Whoever holds it has the terminal to himself.
+    terminal: Mutex<()>,
+}
+
+#[derive(Clone, Debug)]
+struct About {
+    bar: ProgressBar,
+    test: Option<String>,
+    step: Option<String>,
+}
+
+impl Desk {
+    /// A place where nothing is drawn otherwise. `stop` is told when the person wants the run to end.
+    #[must_use]
+    pub fn new(stop: watch::Sender<bool>) -> Self {
+        let about = About {
+            bar: ProgressBar::hidden(),
+            test: None,
+            step: None,
+        };
+        Self {
+            shared: Arc::new(Shared {
+                stop,
+                about: Mutex::new(about),
+                asked: AtomicUsize::new(0),
+                terminal: Mutex::new(()),
+            }),
+        }
+    }
+
+    /// What is hidden while a person is asked.
+    pub fn draws(&self, bar: &ProgressBar) {
+        held(&self.shared.about).bar = bar.clone();
+    }
+
+    /// Which test runs.
+    pub fn runs(&self, test: &str) {
+        let mut about = held(&self.shared.about);
+        about.test = Some(test.to_owned());
+        about.step = None;
+    }
+
+    /// Which step the test has come to.
+    pub fn performs(&self, step: Option<&str>) {
+        held(&self.shared.about).step = step.map(str::to_owned);
+    }
+
+    /// Waits until nobody is being asked, so that the terminal is as it was.
+    pub fn at_rest(&self) {
+        drop(held(&self.shared.terminal));
+    }
+
+    fn heading(&self, about: &About, what: &str) -> String {
+        let number = self.shared.asked.fetch_add(1, Ordering::Relaxed) + 1;
+        let test = about
+            .test
+            .as_deref()
+            .map_or_else(String::new, |test| format!(", test {}", escaped(test)));
+        let mut heading = format!("\r\n-- question {number}{test} --\r\n");
+        if let Some(step) = &about.step {
+            let _ = write!(heading, "   {}\r\n", escaped(step));
+        }
+        let bold = console::Style::new().for_stderr().bold();
+        for line in what.lines() {
+            let _ = write!(heading, "   {}\r\n", bold.apply_to(escaped(line)));
+        }
+        heading
+    }
+}
+
+impl Person for Desk {
+    fn ask(&self, what: &str, within: Duration, wanted: &Wanted) -> Answer {
+        let _alone = held(&self.shared.terminal);
+        let about = held(&self.shared.about).clone();
+        about.bar.suspend(|| {
+            let mut terminal = io::stderr();
+            let heading = self.heading(&about, what);
+            if *self.shared.stop.borrow() {
+                let _ = write!(terminal, "{heading}   The run ends, and does not wait for this.\r\n");
+                return Answer::GivenUp;
+            }
+            let answer = match Raw::on() {
+                Ok(_raw) => put(&heading, within, wanted, &self.shared.stop, &mut terminal),
+                Err(error) => Err(error),
+            };
+            let answer = answer.unwrap_or_else(|error| Answer::Unasked(error.to_string()));
+            if answer == Answer::End {
+                self.shared.stop.send_replace(true);
+            }
+            answer
+        })
+    }
+}
+
+fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The terminal gives every key at once, and shows none.
+struct Raw;
+
+impl Raw {
+    fn on() -> io::Result<Self> {
+        enable_raw_mode()?;
+        Ok(Self)
+    }
+}
+
+impl Drop for Raw {
+    fn drop(&mut self) {
+        let _ = disable_raw_mode();
+    }
+}
+
+/// Puts the terminal back as it was before a question; for a program that ends at once.
+pub fn put_terminal_back() {
+    let _ = disable_raw_mode();
+}
+
+fn put(
+    heading: &str,
+    within: Duration,
+    wanted: &Wanted,
+    stop: &watch::Sender<bool>,
+    terminal: &mut impl Write,
+) -> io::Result<Answer> {
+    // What was typed before the question is no answer to it.
+    while poll(Duration::ZERO)? {
+        let _ = read()?;
+    }
+    write!(terminal, "\x07{heading}")?;
+    let until = Instant::now() + within;
+    let mut shown = None;
+    let answer = loop {
+        let left = until.saturating_duration_since(Instant::now());
+        if shown != Some(left.as_secs()) {
+            shown = Some(left.as_secs());
+            write!(terminal, "\r\x1b[2K{}", keys(left))?;
+            terminal.flush()?;
+        }
+        if left.is_zero() {
+            break Answer::Silence;
+        }
+        if wanted.is_given_up() || *stop.borrow() {
+            break Answer::GivenUp;
+        }
+        if poll(GLANCE.min(left))?
+            && let Event::Key(key) = read()?
+            && let Some(answer) = meaning(key)
+        {
+            break answer;
+        }
+    };
+    write!(terminal, "\r\x1b[2K   {}\r\n", said(&answer))?;
+    terminal.flush()?;
+    Ok(answer)
+}
+
+fn keys(left: Duration) -> String {
+    let left = left.as_secs();
+    format!(
+        "   d done   s skip this test   q end the run   {}:{:02} left ",
+        left / 60,
+        left % 60
+    )
+}
+
+/// What a key means; nothing is meant by any other, such as a blind Enter.
+fn meaning(key: KeyEvent) -> Option<Answer> {
+    if key.kind == KeyEventKind::Release {
+        return None;
+    }
+    let controlled = key.modifiers.contains(KeyModifiers::CONTROL);
+    match key.code {
+        KeyCode::Char('c') if controlled => Some(Answer::End),
+        _ if controlled || key.modifiers.contains(KeyModifiers::ALT) => None,
+        KeyCode::Char('d' | 'D') => Some(Answer::Done),
+        KeyCode::Char('s' | 'S') => Some(Answer::Skip),
+        KeyCode::Char('q' | 'Q') => Some(Answer::End),
+        _ => None,
+    }
+}
+
+fn said(answer: &Answer) -> &'static str {
+    match answer {
+        Answer::Done => "done",
+        Answer::Skip => "the test is skipped",
+        Answer::End => "the run ends",
+        Answer::Silence => "nobody answered in time",
+        Answer::GivenUp | Answer::Unasked(_) => "the question is withdrawn",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(code: KeyCode, modifiers: KeyModifiers) -> Option<Answer> {
+        meaning(KeyEvent::new(code, modifiers))
+    }
+
+    #[test]
+    fn only_three_keys_and_ctrl_c_mean_something() {
+        let plain = |code| key(code, KeyModifiers::NONE);
+        assert_eq!(plain(KeyCode::Char('d')), Some(Answer::Done));
+        assert_eq!(plain(KeyCode::Char('s')), Some(Answer::Skip));
+        assert_eq!(plain(KeyCode::Char('q')), Some(Answer::End));
+        assert_eq!(key(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(Answer::End));
+        for nothing in [
+            KeyCode::Enter,
+            KeyCode::Esc,
+            KeyCode::Char('y'),
+            KeyCode::Char(' '),
+            KeyCode::Char('c'),
+        ] {
+            assert_eq!(plain(nothing), None, "{nothing:?}");
+        }
+        assert_eq!(key(KeyCode::Char('d'), KeyModifiers::CONTROL), None);
+        assert_eq!(key(KeyCode::Char('q'), KeyModifiers::ALT), None);
+    }
+
+    #[test]
+    fn a_question_says_which_test_and_what_to_do_and_how_long() {
+        let desk = Desk::new(watch::channel(false).0);
+        desk.runs("state/emergency-stop");
+        desk.performs(Some("The operator stops it"));
+        let about = held(&desk.shared.about).clone();
+        let heading = desk.heading(&about, "Press an emergency stop.\u{1b}[2J");
+        assert_eq!(
+            console::strip_ansi_codes(&heading),
+            "\r\n-- question 1, test state/emergency-stop --\r\n   The operator stops it\r\n   Press an emergency \
+             stop.\\u{1b}[2J\r\n"
+        );
+        assert!(desk.heading(&about, "Release it.").contains("question 2"));
+        assert!(keys(Duration::from_secs(598)).ends_with("9:58 left "));
+    }
+
+    #[test]
+    fn once_the_run_ends_nobody_is_kept_waiting() {
+        let (stop, _keep) = watch::channel(true);
+        let asked = Desk::new(stop).ask(
+            "Release the emergency stop.",
+            Duration::from_secs(600),
+            &Wanted::default(),
+        );
+        assert_eq!(asked, Answer::GivenUp);
+    }
+}
