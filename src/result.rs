@@ -1,9 +1,12 @@
 //! The canonical result of a run; every rendering is a pure function of it (and of the journal).
 
+mod exploration;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use self::exploration::{Answers, ExplorationResult, MemberResult, SaidResult};
 use crate::journal::event::Setting;
 use crate::verdict::Verdict;
 
@@ -59,6 +62,9 @@ pub struct RunResult {
     /// How a master control commanded its vehicles; absent when an AGV was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fleet: Option<FleetResult>,
+    /// What came of conversations; absent when no test is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exploration: Option<ExplorationResult>,
     /// What restricts this statement, one sentence each.
     pub limits: Vec<String>,
     /// Declared deviations of the profile: requirement id to reason.
@@ -279,6 +285,8 @@ impl TestResult {
 }
 
 impl StepResult {
+    /// The outcome of a step that came to its end.
+    pub const DONE: &str = "done";
     /// The outcome of a step that was not reached.
     pub const NOT_RUN: &str = "not run";
 }

@@ -57,7 +57,7 @@ fn every_suite_is_valid() {
 
 #[test]
 fn mistakes_of_form_are_refused() {
-    const OF_FORM: [&str; 16] = [
+    const OF_FORM: [&str; 17] = [
         "always-without-extent",
         "bad-duration",
         "bad-need",
@@ -66,6 +66,7 @@ fn mistakes_of_form_are_refused() {
         "bad-walk",
         "empty-cases",
         "empty-steps",
+        "half-broken",
         "horizon-without-base",
         "monitor-rule",
         "unknown-behaviour",

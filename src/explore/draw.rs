@@ -1,4 +1,4 @@
-//! Conversations at random, which are the same for the same seed, and turn to what was not tried yet.
+//! Conversations at random, which are the same for the same seed and the same answers, and turn to what was not tried yet.
 
 use super::broken::family;
 use super::chain::Chain;
@@ -28,9 +28,6 @@ impl Random {
     }
 }
 
-/// How much more often a stimulus is drawn that was not tried in this situation yet.
-const UNTRIED: u64 = 8;
-
 /// A conversation of at most `length` stimuli, noted in `coverage`. It ends early where nothing more may be said.
 #[must_use]
 pub fn draw(grammar: &Grammar, random: &mut Random, length: usize, coverage: &mut Coverage) -> Chain {
@@ -42,9 +39,8 @@ pub fn draw(grammar: &Grammar, random: &mut Random, length: usize, coverage: &mu
             .iter()
             .filter(|(_, stimulus)| model.allows(stimulus))
             .map(|(name, stimulus)| {
-                let weight = u64::from(stimulus.weight.max(1));
-                let tried = coverage.tried(&model.situation, family(name));
-                (name, stimulus, if tried { weight } else { weight * UNTRIED })
+                let worth = coverage.worth(&model.situation, family(name));
+                (name, stimulus, u64::from(stimulus.weight.max(1)) * worth)
             })
             .collect();
         let sum: u64 = may.iter().map(|(_, _, weight)| weight).sum();

@@ -121,6 +121,7 @@ impl Exploration {
         let mut grammar = self.grammar.clone();
         grammar.stimuli.retain(|name, _| !unfit.contains(family(name)));
         let mut found = findings(&probed, &probes);
+        learn(&mut coverage, &probed);
 
         let mut undecided = (0, None);
         let (mut conversations, mut stimuli) = (0, 0);
@@ -135,6 +136,7 @@ impl Exploration {
             undecided = (short.len(), short.first().and_then(|test| test.reason.clone()));
             conversations = result.tests.iter().filter(|test| test.journal.is_some()).count();
             merge(&mut found, findings(&result, &drawn));
+            learn(&mut coverage, &result);
         }
         let mut shown = Vec::new();
         for (number, finding) in found.into_iter().enumerate() {
@@ -214,6 +216,12 @@ impl Exploration {
             file,
             shows: (times, ATTEMPTS),
         })
+    }
+}
+
+fn learn(coverage: &mut Coverage, result: &RunResult) {
+    if let Some(exploration) = &result.exploration {
+        coverage.learn(exploration);
     }
 }
 

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use super::broken::{Breaks, family};
 use crate::diagnostic::Source;
 use crate::pack::{Assets, Role, VersionRange};
+use crate::suite::model::BrokenMember;
 use crate::yaml;
 
 /// Why there is no grammar.
@@ -76,6 +77,9 @@ pub struct Stimulus {
     /// The breakages it stands for, one of which goes where `sends` says `${break.patch}`.
     #[serde(default)]
     pub breaks: Option<Breaks>,
+    /// What it breaks, when it is one of many breakages.
+    #[serde(skip)]
+    pub broken: Option<BrokenMember>,
     /// How often it is drawn, compared with others.
     #[serde(default = "once")]
     pub weight: u32,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::grammar::{Grammar, Stimulus};
 use crate::pack::{Breakage, Pack, VersionRange};
+use crate::suite::model::BrokenMember;
 
 /// Where the patch goes that breaks the message.
 const PATCH: &str = "${break.patch}";
@@ -54,6 +55,10 @@ fn unfolded(stimuli: BTreeMap<String, Stimulus>, pack: &Pack) -> BTreeMap<String
                 title: format!("{}: {} ({})", stimulus.title, one.member, one.way.word()),
                 sends: stimulus.sends.replace(PATCH, &one.patch.to_string()),
                 weight: share,
+                broken: Some(BrokenMember {
+                    member: one.member.clone(),
+                    way: one.way.word().to_owned(),
+                }),
                 ..stimulus.clone()
             };
             all.insert(format!("{name}.{}-{}", one.member, one.way.word()), own);

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::broken::family;
 use super::grammar::{Grammar, Stimulus};
 use super::model::Model;
 
@@ -60,6 +61,7 @@ pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -
     let mut specs: BTreeSet<&str> = BTreeSet::from([grammar.spec.as_str()]);
     let mut moves = false;
     let mut body = String::new();
+    let mut said = String::new();
     let mut lengths = Vec::new();
     for name in stimuli {
         let Some(stimulus) = grammar.stimuli.get(name) else {
@@ -75,6 +77,16 @@ pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -
         indented(&sent, &mut body);
         indented(&heard, &mut body);
         lengths.push(body.lines().count());
+        let broken = stimulus.broken.as_ref().map_or_else(String::new, |broken| {
+            format!(", member: \"{}\", way: \"{}\"", broken.member, broken.way)
+        });
+        let _ = writeln!(
+            said,
+            "  - {{ in: {}, say: {}{broken}, steps: {} }}",
+            model.situation,
+            family(name),
+            steps(&sent) + steps(&heard)
+        );
         model.hear(stimulus, sent);
     }
     let mut text = String::new();
@@ -94,7 +106,11 @@ pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -
         .chars()
         .map(|one| if one.is_control() { ' ' } else { one })
         .collect();
-    let _ = writeln!(text, "why: \"{}\"\n\ngiven:", why.replace(['"', '\\'], "'"));
+    let _ = writeln!(text, "why: \"{}\"", why.replace(['"', '\\'], "'"));
+    if !said.is_empty() {
+        let _ = write!(text, "conversation:\n{said}");
+    }
+    text.push_str("\ngiven:\n");
     indented(&grammar.given, &mut text);
     text.push_str("\nsteps:\n");
     let first = lines(&text) + 1;
@@ -119,6 +135,11 @@ pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -
 fn drives(line: &str) -> bool {
     let base = line.split_once("base: [").and_then(|(_, rest)| rest.split_once(']'));
     base.is_some_and(|(base, _)| base.contains(',') || base == "far")
+}
+
+/// How many steps a text has; a step begins where a line does.
+fn steps(text: &str) -> usize {
+    text.lines().filter(|line| line.starts_with("- ")).count()
 }
 
 fn lines(text: &str) -> u32 {

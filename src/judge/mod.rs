@@ -19,6 +19,7 @@ mod own_errors;
 mod reactions;
 mod rules;
 mod run;
+mod said;
 mod scene;
 mod side;
 mod step;

@@ -23,6 +23,7 @@ use super::mend::mended;
 use super::opinions::Opinions;
 use super::reactions::Reactions;
 use super::rules::{JudgeError, Rules};
+use super::said;
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
 use super::watches::{Watched, Watches};
@@ -422,6 +423,7 @@ impl RunJudge {
             journal: "journal.jsonl".to_owned(),
             joined,
             requirements: self.requirements(&tests, &watched),
+            exploration: said::exploration(&self.rules.suites.tests, &tests, self.role),
             tests,
             monitors: watched.into_iter().map(|watched| watched.result).collect(),
             capabilities: self

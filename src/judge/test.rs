@@ -376,7 +376,7 @@ impl TestJudge {
             (StepEnd::Interrupted, _) => "interrupted",
             (StepEnd::Skipped(_), _) => "skipped",
             (StepEnd::Refused(_), _) | (_, Some(Err(_))) => "failed",
-            _ => "done",
+            _ => StepResult::DONE,
         };
         self.result.steps.push(StepResult {
             path: step.path.clone(),

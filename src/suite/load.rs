@@ -230,6 +230,7 @@ fn lint_state(
         needs: Vec::new(),
         moves: true,
         tags: Vec::new(),
+        conversation: Vec::new(),
         maturity: Maturity::Open,
         why: String::new(),
         given,

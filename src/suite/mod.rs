@@ -16,6 +16,7 @@ mod load;
 mod matrix;
 pub mod model;
 mod read;
+mod said;
 mod source;
 mod steps;
 mod stimuli;

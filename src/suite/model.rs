@@ -1,5 +1,6 @@
 //! What a test is, once it has been read and linted.
 
+mod conversation;
 mod drawn;
 mod monitor;
 mod path;
@@ -32,6 +33,8 @@ pub struct Test {
     pub moves: bool,
     /// Words of its author that it is filed under; [`Test::tags`] has them all.
     pub tags: Vec<String>,
+    /// What it says one after the other, when it is a conversation that was written down.
+    pub conversation: Vec<Said>,
     /// How far the test itself is trusted.
     pub maturity: Maturity,
     /// Why anybody cares.
@@ -160,6 +163,7 @@ pub enum Need {
 }
 
 pub use crate::course::CourseNeed;
+pub use conversation::{BrokenMember, Said};
 pub use drawn::{Drawn, Kind};
 pub use monitor::{About, Monitor, Rule};
 pub use path::Path;

@@ -13,6 +13,7 @@ use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::matrix;
 use super::model::{About, Binding, CourseNeed, Drawn, Monitor, Need, Rule, Test};
+use super::said::conversation;
 use super::source::{States, parse};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
@@ -30,6 +31,7 @@ const TEST_KEYS: &[&str] = &[
     "reviewed",
     "watchlist",
     "tags",
+    "conversation",
     "why",
     "cases",
     "given",
@@ -356,6 +358,7 @@ impl TestReader<'_> {
         {
             problems.at("empty-steps", &node.span, "a test without steps", "decides nothing");
         }
+        let conversation = conversation(&fields, steps.len(), problems);
         let id = fields.text("test", &mut Problems::default())?.to_owned();
         let group = id.split('/').next().unwrap_or_default().to_owned();
         let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
@@ -376,6 +379,7 @@ impl TestReader<'_> {
             needs,
             moves,
             tags,
+            conversation,
             maturity,
             why: header.why,
             given,

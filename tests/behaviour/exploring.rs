@@ -43,7 +43,15 @@ fn conversations_with_a_faultless_vehicle_find_nothing() {
     assert_eq!(explored["conversations"], 4);
     assert_eq!(explored["undecided"], 0);
     assert_eq!(explored["findings"].as_array().unwrap().len(), 0);
+    let order = &explored["coverage"]["rest"]["order-next"];
+    assert!(order["asDemanded"].as_u64().unwrap() > 0, "{}", explored["coverage"]);
+    assert_eq!(order["broken"], 0);
     let report = explored["report"].as_str().unwrap();
+    let written = |name: &str| fs::read_to_string(folder.path().join(report).join(name)).unwrap();
+    let result: Value = serde_json::from_str(&written("result.json")).unwrap();
+    let said = result["exploration"]["said"].as_array().unwrap();
+    assert!(said.iter().any(|one| one["stimulus"] == "order-next"), "{said:?}");
+    assert!(written("report.html").contains("Situations and stimuli"));
     prints(
         &run_in(folder.path(), &["report", report, "--rejudge"]).code(0),
         "byte for byte",
@@ -70,6 +78,19 @@ fn a_finding_is_shrunk_to_a_test_that_fails_again() {
     run_in(folder.path(), &replay).code(0);
     let evidence = reports(folder.path()).pop().unwrap();
     assert!(evidence.join("report.html").is_file());
+}
+
+#[test]
+fn the_conversations_end_when_the_time_is_up_and_what_was_found_is_shrunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let explore = ["explore", "--virtual", "--conversations", "400", "--budget", "1s", "--format", "json"];
+    let fault = ["--fault", "outdated-update-taken-over"];
+    let ended = run_in(folder.path(), &[explore.as_slice(), &fault].concat()).code(1);
+    let explored: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert!(explored["conversations"].as_u64().unwrap() < 400, "{}", explored["conversations"]);
+    assert_eq!(explored["interrupted"], false);
+    let findings = explored["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|one| one["requirement"] == "ORD-REJ-10"), "{findings:?}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! `explore`.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 
@@ -10,7 +11,7 @@ const EXPLORE_HELP: &str = "\
 Examples:
   vda5050-tck explore --virtual                              conversations with the built-in AGV
   vda5050-tck explore --virtual --fault outdated-update-taken-over   see a finding shrink
-  vda5050-tck explore --profile device.toml --conversations 20   # not in CI: needs a device
+  vda5050-tck explore --profile device.toml --conversations 400 --budget 1h   # not in CI: needs a device
   vda5050-tck explore --virtual --replay fixtures/conversations/outdated.yaml   carry out a conversation again
 
 The shortest conversation of every finding is written as a test beside the report.
@@ -29,9 +30,12 @@ pub struct Explore {
     /// Begin the random choice here; another number draws other conversations
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
-    /// Draw so many conversations
+    /// Draw at most so many conversations
     #[arg(long, value_name = "NUMBER", default_value_t = 40)]
     pub conversations: usize,
+    /// Begin no conversation after this time, such as 20m or 2h; what was found until then is still made shorter
+    #[arg(long, value_name = "TIME", value_parser = super::watch::time)]
+    pub budget: Option<Duration>,
     /// Say at most so much in one of them
     #[arg(long, value_name = "NUMBER", default_value_t = 12)]
     pub length: usize,

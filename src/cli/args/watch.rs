@@ -76,7 +76,7 @@ pub struct Watch {
 }
 
 /// A number and a unit: `90s`, `15m`, `8h`, `7d`.
-fn time(text: &str) -> Result<Duration, String> {
+pub(super) fn time(text: &str) -> Result<Duration, String> {
     let wrong = || format!("`{text}` is no time; write 90s, 15m, 8h or 7d");
     let units = [("s", 1), ("m", 60), ("h", 3_600), ("d", 86_400)];
     let seconds = scaled(text, &units).ok_or_else(wrong)?;

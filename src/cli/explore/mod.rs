@@ -51,7 +51,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         return measure::every_fault(role, &pack, &exploration, every.max(1), arguments.output.format);
     }
     let device = Device::of(arguments, &effective, &pack, &surroundings)?;
-    let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?;
+    let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?.within(arguments.budget);
     if !arguments.replay.is_empty() {
         return replay(&arguments.replay, &mut stage);
     }

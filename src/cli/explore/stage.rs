@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -83,6 +84,8 @@ pub(super) struct OnStage {
     reports: PathBuf,
     runtime: Runtime,
     interrupt: watch::Receiver<bool>,
+    /// How long conversations that were drawn are carried out.
+    budget: Option<Duration>,
     desk: Desk,
     rounds: u32,
     kept: Option<PathBuf>,
@@ -106,10 +109,16 @@ impl OnStage {
             runtime,
             interrupt: stop.subscribe(),
             desk: Desk::new(stop),
+            budget: None,
             rounds: 0,
             kept: None,
             evidence: None,
         })
+    }
+
+    /// The same, with a time after which no conversation that was drawn begins.
+    pub(super) fn within(self, budget: Option<Duration>) -> Self {
+        Self { budget, ..self }
     }
 
     pub(super) fn catalogue(&self) -> &Catalogue {
@@ -147,9 +156,32 @@ impl OnStage {
         }
     }
 
-    fn finished(&self, tests: Vec<Arc<Test>>, run: &str, writer: Option<JournalWriter>) -> Result<Finished, Problem> {
+    /// What ends a run: a person, or the end of its time.
+    fn end(&self, purpose: Purpose) -> watch::Receiver<bool> {
+        let Some(budget) = self.budget.filter(|_| purpose == Purpose::Conversations) else {
+            return self.interrupt.clone();
+        };
+        let mut person = self.interrupt.clone();
+        let (ends, end) = watch::channel(false);
+        self.runtime.spawn(async move {
+            tokio::select! {
+                () = tokio::time::sleep(budget) => {}
+                _ = person.wait_for(|interrupted| *interrupted) => {}
+                () = ends.closed() => {}
+            }
+            ends.send_replace(true);
+        });
+        end
+    }
+
+    fn finished(
+        &self,
+        tests: Vec<Arc<Test>>,
+        run: &str,
+        writer: Option<JournalWriter>,
+        interrupt: watch::Receiver<bool>,
+    ) -> Result<Finished, Problem> {
         let request = Self::request(tests, run);
-        let interrupt = self.interrupt.clone();
         let (library, pack) = (&self.library, &self.pack);
         match &self.device {
             Device::Virtual { device, faults } => {
@@ -170,7 +202,7 @@ impl OnStage {
             }
             Device::BuiltIn { device, faults } => {
                 let run = SocketRun::built_in(device.clone(), faults, library, pack);
-                self.over_sockets(run, request, writer)
+                self.over_sockets(run, request, writer, interrupt)
             }
             Device::Profile {
                 effective,
@@ -187,7 +219,7 @@ impl OnStage {
                 if *still {
                     run.device.stand_still("motion was ruled out by --no-motion");
                 }
-                self.over_sockets(run, request, writer)
+                self.over_sockets(run, request, writer, interrupt)
             }
         }
     }
@@ -197,11 +229,12 @@ impl OnStage {
         mut run: SocketRun,
         request: Request,
         writer: Option<JournalWriter>,
+        interrupt: watch::Receiver<bool>,
     ) -> Result<Finished, Problem> {
         run.request = request;
         let (library, pack) = (&self.library, &self.pack);
         let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
-        let run = run.carry_out(library, pack, writer, self.interrupt.clone(), &mut nobody, &mut nowhere);
+        let run = run.carry_out(library, pack, writer, interrupt, &mut nobody, &mut nowhere);
         self.runtime.block_on(run).map_err(environment)
     }
 
@@ -235,7 +268,7 @@ impl Stage for OnStage {
         self.rounds += 1;
         let run = format!("explore-{}", self.rounds);
         if matches!(purpose, Purpose::Probe | Purpose::Trial) {
-            return Ok(self.finished(tests, &run, None)?.result);
+            return Ok(self.finished(tests, &run, None, self.end(purpose))?.result);
         }
         let subject = self.subject();
         let utc = WallClock::start().now().utc;
@@ -245,7 +278,7 @@ impl Stage for OnStage {
             write(&bundle.folder().join("tests"), file)?;
         }
         let writer = bundle.journal().map_err(environment)?;
-        let finished = self.finished(tests, &run, Some(writer))?;
+        let finished = self.finished(tests, &run, Some(writer), self.end(purpose))?;
         let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
         let journal = finished.recorder.journal();
         write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::default()).map_err(environment)?;

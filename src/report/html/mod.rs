@@ -5,6 +5,7 @@
 //! the sequence diagrams, which are templates of their own.
 
 mod escape;
+mod exploration_view;
 mod matrix;
 mod messages;
 mod overview_view;
@@ -19,6 +20,7 @@ use std::collections::BTreeMap;
 use askama::Template;
 
 pub use escape::Escape;
+use exploration_view::Grid;
 
 use super::fleet;
 use super::sources::Sources;
@@ -73,6 +75,7 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
             (None, Some(answers)) => fleet::plot(&answers, fleet::ANSWERS)?,
             (None, None) => String::new(),
         },
+        exploration: explored(result),
         chapters: matrix::chapters(result, sources, &anchors),
         not_applicable: tests.iter().any(|test| test.not_applicable),
         tests,
@@ -90,6 +93,18 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
         legend: view::legend(),
     }
     .render()
+}
+
+/// The tables of an exploration that have something in them.
+fn explored(result: &RunResult) -> Vec<(&'static str, Grid)> {
+    let Some(exploration) = &result.exploration else {
+        return Vec::new();
+    };
+    let tables = [
+        ("Situations and stimuli", exploration_view::situations(exploration)),
+        ("Broken members", exploration_view::members(exploration)),
+    ];
+    tables.into_iter().filter(|(_, grid)| !grid.rows.is_empty()).collect()
 }
 
 /// The command line as recorded in the journal.
@@ -117,6 +132,7 @@ struct Page<'a> {
     fleet: String,
     vehicles: Vec<view::VehicleRow>,
     reactions: String,
+    exploration: Vec<(&'static str, Grid)>,
     chapters: Vec<ChapterView>,
     tests: Vec<TestView>,
     shown_tests: usize,

@@ -298,6 +298,7 @@ records! {
         because "MQTT-10 is a recommendation and never more than a warning."
         => plain().retries(|_, _| None);
     fault "reconnects-only-once" ["MQTT-10"] "It connects again after the first lost connection, but not after the second one."
+        because "MQTT-10 is a recommendation and never more than a warning."
         => plain().retries(|site, retry| retry.filter(|_| site.connection.losses < 2));
     liberty "reconnects-later" ["MQTT-10"] "It waits four times as long before it connects again."
         => plain().retries(|_, retry| retry.map(|delay| delay * 4));
