@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use vda5050_tck::bench::Outgoing;
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
 use vda5050_tck::bench::endpoint::Endpoint;
+use vda5050_tck::explore::{Coverage, Exploration, Grammar};
 use vda5050_tck::judge::judge;
 use vda5050_tck::link::mqtt::{BenchOptions, MqttBench};
 use vda5050_tck::pack::Role;
@@ -61,7 +62,7 @@ fn main() {
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
-    let measures: [fn() -> Vec<Measured>; 5] = [start_up, virtual_suite, tap, vehicles, audit];
+    let measures: [fn() -> Vec<Measured>; 6] = [start_up, virtual_suite, exploration, tap, vehicles, audit];
     let mut missed = 0;
     for measure in measures {
         for one in measure() {
@@ -130,6 +131,43 @@ fn virtual_suite() -> Vec<Measured> {
             100.0,
         ),
     ]
+}
+
+/// Conversations with the reference AGV: drawn, made tests, carried out and judged, on one core.
+fn exploration() -> Vec<Measured> {
+    const CONVERSATIONS: usize = 100;
+    let mut library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let pack = library.rules.packs.latest().clone();
+    let grammar = Grammar::load(&library.assets, Role::Agv)
+        .unwrap()
+        .only(&pack, |_, _| true);
+    let begun = Instant::now();
+    let explore = Exploration {
+        grammar,
+        seed: 1,
+        conversations: CONVERSATIONS,
+        length: 12,
+        trials: 0,
+    };
+    let drawn = explore.drawn(&explore.grammar, &mut Coverage::default());
+    let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
+    let files = drawn
+        .iter()
+        .map(|(_, file)| (file.place(explore.grammar.side()), file.text.clone()));
+    let mut request = VirtualRun::of_role(Role::Agv, &library, &pack);
+    request.tests = library
+        .add(&files.collect::<Vec<_>>())
+        .unwrap_or_else(|all| panic!("{}", all[0]));
+    request.complete = false;
+    request.draw = None;
+    run_silently(&library, &pack, request).unwrap();
+    let seconds = begun.elapsed().as_secs_f64();
+    vec![at_least(
+        "stimuli of conversations: drawn, said and judged",
+        stimuli as f64 / seconds,
+        "a second",
+        5_000.0,
+    )]
 }
 
 /// Messages of 3 KB there and back, in µs.

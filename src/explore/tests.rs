@@ -9,6 +9,7 @@ use std::convert::Infallible;
 
 use super::{Chain, ConversationFile, Coverage, Exploration, Grammar, Source, findings, shrink};
 use crate::pack::{Pack, Role};
+use crate::result::{Answers, ExplorationResult, SaidResult};
 use crate::run::{Library, VirtualRun, run_silently};
 
 const ROLES: [Role; 2] = [Role::Agv, Role::MasterControl];
@@ -76,6 +77,32 @@ fn what_was_not_tried_yet_is_drawn_first() {
     let (tried, of) = coverage.pairs(&grammar);
     let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
     assert!(tried * 10 >= of * 9, "{tried} of {of} pairs in {stimuli} stimuli");
+}
+
+#[test]
+fn what_failed_when_it_was_tried_is_drawn_less() {
+    let library = Library::load(None).expect("the built-in suites");
+    let grammar = grammar(&library, library.rules.packs.latest(), Role::Agv);
+    let times = |coverage: &mut Coverage| {
+        let drawn = exploration(grammar.clone(), 1, 40).drawn(&grammar, coverage);
+        let said = drawn.iter().flat_map(|(chain, _)| chain.stimuli());
+        said.filter(|name| *name == "order-open").count()
+    };
+    let said = ["rest", "cancelled", "open"].map(|situation| SaidResult {
+        situation: situation.to_owned(),
+        stimulus: "order-open".to_owned(),
+        answers: Answers {
+            broken: 1,
+            ..Answers::default()
+        },
+    });
+    let mut coverage = Coverage::default();
+    coverage.learn(&ExplorationResult {
+        said: said.to_vec(),
+        members: Vec::new(),
+    });
+    let (less, usual) = (times(&mut coverage), times(&mut Coverage::default()));
+    assert!(less * 3 < usual, "{less} times, and {usual} times of a device of which nothing is known");
 }
 
 /// What is found in conversations with the reference device of a side.
