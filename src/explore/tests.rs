@@ -102,7 +102,10 @@ fn what_failed_when_it_was_tried_is_drawn_less() {
         members: Vec::new(),
     });
     let (less, usual) = (times(&mut coverage), times(&mut Coverage::default()));
-    assert!(less * 3 < usual, "{less} times, and {usual} times of a device of which nothing is known");
+    assert!(
+        less * 3 < usual,
+        "{less} times, and {usual} times of a device of which nothing is known"
+    );
 }
 
 /// What is found in conversations with the reference device of a side.

@@ -166,7 +166,10 @@ mod tests {
         let conversation = [said("order", 2), said("cancel", 1), said("ask", 1)];
         let steps = (0..4).map(|at| step(at, StepResult::DONE)).collect();
         let failed = result(steps, &[(1, Verdict::Pass), (2, Verdict::Fail), (3, Verdict::Pass)]);
-        let expected = [("order".to_owned(), Answer::AsDemanded), ("cancel".to_owned(), Answer::Broken)];
+        let expected = [
+            ("order".to_owned(), Answer::AsDemanded),
+            ("cancel".to_owned(), Answer::Broken),
+        ];
         assert_eq!(words(&conversation, &failed), expected);
     }
 
@@ -179,7 +182,10 @@ mod tests {
             step(2, StepResult::NOT_RUN),
         ];
         let broken_off = result(steps, &[(2, Verdict::Inconclusive)]);
-        assert_eq!(words(&conversation, &broken_off), [("order".to_owned(), Answer::Undecided)]);
+        assert_eq!(
+            words(&conversation, &broken_off),
+            [("order".to_owned(), Answer::Undecided)]
+        );
     }
 
     #[test]

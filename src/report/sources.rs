@@ -250,6 +250,7 @@ mod tests {
             needs: Vec::new(),
             moves: false,
             tags: Vec::new(),
+            conversation: Vec::new(),
             maturity: Maturity::Open,
             why: "because".to_owned(),
             given: Vec::new(),

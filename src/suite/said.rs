@@ -12,7 +12,9 @@ pub(super) fn conversation(fields: &Fields<'_>, body: usize, problems: &mut Prob
     let mut all = Vec::new();
     let nodes = fields.list("conversation", problems);
     for node in nodes {
-        let Some(said) = Fields::of(node, problems) else { continue };
+        let Some(said) = Fields::of(node, problems) else {
+            continue;
+        };
         said.only(&[&["in", "say", "member", "way", "steps"]], problems);
         let member = said.text("member", problems).map(str::to_owned);
         let way = said.text("way", problems).map(str::to_owned);

@@ -83,14 +83,30 @@ fn a_finding_is_shrunk_to_a_test_that_fails_again() {
 #[test]
 fn the_conversations_end_when_the_time_is_up_and_what_was_found_is_shrunk() {
     let folder = tempfile::tempdir().unwrap();
-    let explore = ["explore", "--virtual", "--conversations", "400", "--budget", "1s", "--format", "json"];
+    let explore = [
+        "explore",
+        "--virtual",
+        "--conversations",
+        "400",
+        "--budget",
+        "1s",
+        "--format",
+        "json",
+    ];
     let fault = ["--fault", "outdated-update-taken-over"];
     let ended = run_in(folder.path(), &[explore.as_slice(), &fault].concat()).code(1);
     let explored: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert!(explored["conversations"].as_u64().unwrap() < 400, "{}", explored["conversations"]);
+    assert!(
+        explored["conversations"].as_u64().unwrap() < 400,
+        "{}",
+        explored["conversations"]
+    );
     assert_eq!(explored["interrupted"], false);
     let findings = explored["findings"].as_array().unwrap();
-    assert!(findings.iter().any(|one| one["requirement"] == "ORD-REJ-10"), "{findings:?}");
+    assert!(
+        findings.iter().any(|one| one["requirement"] == "ORD-REJ-10"),
+        "{findings:?}"
+    );
 }
 
 #[test]

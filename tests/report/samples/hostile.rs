@@ -8,8 +8,8 @@ use vda5050_tck::journal::{Direction, Event, Journal, Packet, Payload};
 use vda5050_tck::pack::Role;
 use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use vda5050_tck::result::{
-    Capability, Decision, DeviceIdentity, MonitorFinding, MonitorResult, NearestMiss, RequirementResult, RunResult,
-    StepResult, TestResult, Waited,
+    Answers, Capability, Decision, DeviceIdentity, ExplorationResult, MemberResult, MonitorFinding, MonitorResult,
+    NearestMiss, RequirementResult, RunResult, SaidResult, StepResult, TestResult, Waited,
 };
 use vda5050_tck::verdict::Verdict;
 
@@ -199,6 +199,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             value: evil(),
             source: evil(),
         }],
+        exploration: Some(explored()),
         limits: vec![evil()],
         deviations: BTreeMap::from([(evil(), evil())]),
         settings: vec![setting(HOSTILE, HOSTILE, HOSTILE)],
@@ -240,4 +241,26 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         }],
     };
     (result, record.journal, sources)
+}
+
+/// A conversation whose names are hostile, too.
+fn explored() -> ExplorationResult {
+    let answers = Answers {
+        as_demanded: 1,
+        broken: usize::MAX / 4,
+        undecided: 1,
+    };
+    ExplorationResult {
+        said: vec![SaidResult {
+            situation: HOSTILE.to_owned(),
+            stimulus: HOSTILE.to_owned(),
+            answers,
+        }],
+        members: vec![MemberResult {
+            stimulus: HOSTILE.to_owned(),
+            member: HOSTILE.to_owned(),
+            way: HOSTILE.to_owned(),
+            answers,
+        }],
+    }
 }
