@@ -145,7 +145,7 @@ fn a_fault_is_found_where_it_shows() {
         (Role::Agv, "outdated-update-taken-over", "ORD-REJ-10", "outdated"),
         (Role::MasterControl, "orders-in-manual", "MODE-04", "ordered-by-hand"),
     ] {
-        let all = found(role, &[fault], 1, 20);
+        let all = found(role, &[fault], 1, 60);
         let source = Source::Stimulus(stimulus.to_owned());
         let shows = |one: &super::Finding| one.requirement == requirement && one.source == source;
         assert!(all.iter().any(shows), "{all:#?}");
