@@ -25,6 +25,7 @@ use super::reactions::Reactions;
 use super::rules::{JudgeError, Rules};
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
+use super::unheard::Unheard;
 use super::watches::{Watched, Watches};
 use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
@@ -54,6 +55,8 @@ pub struct RunJudge {
     watches: Watches,
     /// Who is on the tap, where that is known.
     company: Option<Company>,
+    /// What the device does not show to have heard, where nobody sees what reaches it.
+    unheard: Option<Unheard>,
     /// Whether the last entry was left out.
     left_out: bool,
     reactions: Reactions,
@@ -89,6 +92,8 @@ impl RunJudge {
             .collect();
         let watches = Watches::begin(&monitors, &ground, vehicles, tap);
         let reactions = Reactions::of(&header.vehicles);
+        let is_unseen = !tap && role == Role::Agv;
+        let unheard = is_unseen.then(|| Unheard::of(&ground.topics, &ground.pack));
         let company = Company::of(role, &ground.topics, &ground.pack);
         let timeline = if header.vehicles.is_empty() {
             Timeline::new(&header.topics)
@@ -106,6 +111,7 @@ impl RunJudge {
             records: first.seq(),
             watches,
             company,
+            unheard,
             reactions,
             instants: BTreeMap::new(),
             last_order: None,
@@ -150,6 +156,9 @@ impl RunJudge {
         if self.role == Role::Agv {
             self.note_instants(entry);
         }
+        if let Some(unheard) = &mut self.unheard {
+            unheard.observe(entry);
+        }
         match entry.event() {
             Event::Waived { waiver } => self.ground.waivers.push(waiver.clone()),
             Event::Planned { plan } => self.plan = (**plan).clone(),
@@ -184,6 +193,9 @@ impl RunJudge {
         if let Some(current) = &mut self.current {
             if matches!(entry.event(), Event::TestEnded { .. }) {
                 current.hide(hidden(&self.watches, &self.ground.waivers));
+                if let Some(why) = self.unheard.as_ref().and_then(Unheard::why) {
+                    current.interfered(&why);
+                }
             }
             current.observe(entry, subject.as_deref(), &self.timeline, &self.ground);
         }
@@ -308,6 +320,9 @@ impl RunJudge {
     fn break_off(&mut self, why: &str) {
         if let Some(mut current) = self.current.take() {
             current.hide(hidden(&self.watches, &self.ground.waivers));
+            if let Some(why) = self.unheard.as_ref().and_then(Unheard::why) {
+                current.interfered(&why);
+            }
             let mut result = current.break_off(self.last.moment, why, &self.ground);
             self.number(&mut result);
             self.done.push(result);
