@@ -179,7 +179,7 @@ impl Drop for Ending {
 
 impl Run {
     async fn lost(&self, reason: String) {
-        tracing::debug!(broker = self.endpoint.address(), reason, "a connection is lost");
+        tracing::debug!(broker = self.endpoint.url(), reason, "a connection is lost");
         let _ = self.events.send(ClientEvent::Lost(reason)).await;
     }
 

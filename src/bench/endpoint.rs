@@ -7,6 +7,7 @@ use tokio_rustls::rustls::ClientConfig;
 
 use crate::bench::LinkError;
 use crate::bench::tls;
+use crate::profile::Secrets;
 
 /// The path of a WebSocket unless said, as most brokers have it.
 const USUAL_PATH: &str = "/mqtt";
@@ -67,7 +68,10 @@ impl Endpoint {
     /// # Errors
     /// [`LinkError::Setup`] when the address cannot be read or the certificates do not work.
     pub fn parse(url: &str, authority: Option<&Path>, credentials: Option<Credentials>) -> Result<Self, LinkError> {
-        let wrong = |what: &str| LinkError::Setup(format!("`{url}` is not a broker: {what}"));
+        let wrong = |what: &str| {
+            let shown = Secrets::default().out_of(url);
+            LinkError::Setup(format!("`{shown}` is not a broker: {what}"))
+        };
         let (secure, web, rest) = match url.split_once("://") {
             None | Some(("mqtt" | "tcp", _)) => (false, false, url.rsplit("://").next().unwrap_or(url)),
             Some(("mqtts" | "ssl" | "tls", rest)) => (true, false, rest),
@@ -116,7 +120,22 @@ impl Endpoint {
         })
     }
 
-    /// `host:port`, for messages.
+    /// The broker as messages name it: how it is reached and where, without the query of the path, which may hold a token.
+    #[must_use]
+    pub fn url(&self) -> String {
+        let scheme = match (self.websocket.is_some(), self.tls.is_some()) {
+            (false, false) => "mqtt",
+            (false, true) => "mqtts",
+            (true, false) => "ws",
+            (true, true) => "wss",
+        };
+        // The query may hold a token.
+        let path = self.websocket.as_deref().unwrap_or_default();
+        let path = path.split('?').next().unwrap_or_default();
+        format!("{scheme}://{}{path}", self.address())
+    }
+
+    /// `host:port`.
     #[must_use]
     pub fn address(&self) -> String {
         if self.host.contains(':') {
@@ -129,7 +148,7 @@ impl Endpoint {
     /// The error that this broker is not there.
     pub(crate) fn lost(&self, reason: impl Into<String>) -> LinkError {
         LinkError::Broker {
-            address: self.address(),
+            broker: self.url(),
             reason: reason.into(),
         }
     }
@@ -158,7 +177,7 @@ mod tests {
     fn a_websocket_has_a_path() {
         let read = |url| {
             let endpoint = Endpoint::parse(url, None, None).unwrap();
-            (endpoint.address(), endpoint.websocket.unwrap())
+            (endpoint.address(), endpoint.websocket.clone().unwrap())
         };
         let expected = |address: &str, path: &str| (address.to_owned(), path.to_owned());
         assert_eq!(read("ws://broker.local"), expected("broker.local:80", "/mqtt"));
@@ -167,6 +186,10 @@ mod tests {
             read("ws://[::1]:9001/a/b?token=c"),
             expected("[::1]:9001", "/a/b?token=c")
         );
+        let shown = Endpoint::parse("ws://[::1]:9001/a/b?token=c", None, None)
+            .unwrap()
+            .url();
+        assert_eq!(shown, "ws://[::1]:9001/a/b");
     }
 
     #[test]
@@ -178,7 +201,7 @@ mod tests {
             ("mqtt://user:secret@x", "given apart"),
         ] {
             let error = Endpoint::parse(url, None, None).unwrap_err().to_string();
-            assert!(error.contains(reason), "{error}");
+            assert!(error.contains(reason) && !error.contains("secret"), "{error}");
         }
     }
 

@@ -64,10 +64,10 @@ pub struct Offer {
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// The broker is gone, was never there, or lets nobody in.
-    #[error("the broker at {address} cannot be used: {reason}")]
+    #[error("the broker at {broker} cannot be used: {reason}")]
     Broker {
-        /// Where it should be.
-        address: String,
+        /// Its URL.
+        broker: String,
         /// Why, as the end of a sentence about the broker.
         reason: String,
     },
@@ -81,11 +81,11 @@ pub enum LinkError {
     },
     /// The broker does not allow what the harness has to do.
     #[error(
-        "the broker at {address} does not allow {what}; these are the access rules it needs, as mosquitto has them:\n{rules}"
+        "the broker at {broker} does not allow {what}; these are the access rules it needs, as mosquitto has them:\n{rules}"
     )]
     Forbidden {
-        /// Where it is.
-        address: String,
+        /// Its URL.
+        broker: String,
         /// What it refuses.
         what: String,
         /// What would allow it.

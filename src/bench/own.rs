@@ -18,6 +18,16 @@ impl Default for OwnNames {
     }
 }
 
+/// Who logs in at a broker: under a name, or without.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct User(pub Option<String>);
+
+impl User {
+    fn line(&self) -> Option<String> {
+        self.0.as_ref().map(|name| format!("user {name}"))
+    }
+}
+
 impl OwnNames {
     /// A client id that nobody else can know.
     #[must_use]
@@ -31,20 +41,29 @@ impl OwnNames {
         format!("{}-{what}{random}", self.client_id)
     }
 
-    /// The lines of mosquitto's access rules with which a user may do all that a run does. `device_topics` are those the
-    /// device publishes on.
+    /// The lines of mosquitto's access rules with which a user may do all that a run does, and another one may use the topics of
+    /// the device. `device_topics` are those the device publishes on.
     #[must_use]
-    pub fn access_rules(&self, user: Option<&str>, device_topics: &[String]) -> String {
-        let mut lines: Vec<String> = user.map(|user| format!("user {user}")).into_iter().collect();
-        lines.push(format!("topic readwrite {}/#", self.topics));
+    pub fn access_rules(&self, harness: &User, other: Option<&User>, device_topics: &[String]) -> String {
         let mut devices: Vec<&str> = device_topics
             .iter()
             .filter_map(|topic| topic.rsplit_once('/'))
             .map(|(device, _)| device)
             .collect();
         devices.dedup();
-        lines.extend(devices.iter().map(|device| format!("topic readwrite {device}/#")));
-        lines.join("\n")
+        let topics: Vec<String> = devices
+            .iter()
+            .map(|device| format!("topic readwrite {device}/#"))
+            .collect();
+        let own = format!("topic readwrite {}/#", self.topics);
+        let mut parts = vec![(harness, [&[own], &topics[..]].concat())];
+        parts.extend(other.filter(|other| *other != harness).map(|other| (other, topics)));
+        // What is for everybody without a name stands before the first name.
+        parts.sort_by_key(|(user, _)| user.0.is_some());
+        let lines = parts
+            .into_iter()
+            .flat_map(|(user, lines)| user.line().into_iter().chain(lines));
+        lines.collect::<Vec<_>>().join("\n")
     }
 }
 
@@ -56,10 +75,18 @@ mod tests {
     fn the_rules_name_what_a_run_uses_and_no_device_twice() {
         let names = OwnNames::default();
         let topics = ["uagv/v9/ACME/1/state", "uagv/v9/ACME/1/connection"].map(str::to_owned);
-        assert_eq!(
-            names.access_rules(Some("tck"), &topics),
-            "user tck\ntopic readwrite vda5050-tck/#\ntopic readwrite uagv/v9/ACME/1/#"
-        );
+        let [tck, fleet] = ["tck", "fleet"].map(|name| User(Some(name.to_owned())));
+        let nobody = User(None);
+        let (own, device) = ("topic readwrite vda5050-tck/#", "topic readwrite uagv/v9/ACME/1/#");
+        for (harness, other, rules) in [
+            (&tck, None, format!("user tck\n{own}\n{device}")),
+            (&tck, Some(&tck), format!("user tck\n{own}\n{device}")),
+            (&nobody, None, format!("{own}\n{device}")),
+            (&nobody, Some(&fleet), format!("{own}\n{device}\nuser fleet\n{device}")),
+            (&tck, Some(&nobody), format!("{device}\nuser tck\n{own}\n{device}")),
+        ] {
+            assert_eq!(names.access_rules(harness, other, &topics), rules);
+        }
         assert_ne!(names.client("watcher"), names.client("watcher"));
         assert!(names.client("").starts_with("tck-"));
     }

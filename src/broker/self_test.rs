@@ -223,6 +223,6 @@ fn message(topic: &str, text: &str, qos: u8, retain: bool) -> Outgoing {
 fn broken(endpoint: &Endpoint, what: &str) -> LinkError {
     LinkError::Setup(format!(
         "the broker at {} cannot be used to judge a device: {what}",
-        endpoint.address()
+        endpoint.url()
     ))
 }

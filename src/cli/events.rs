@@ -159,6 +159,6 @@ impl run::Progress for Followed {
 
     fn expects_device(&mut self, bench: &BenchInfo) {
         self.screen.expects_device(bench);
-        self.tell("device-expected", json!({ "address": bench.device_url() }));
+        self.tell("device-expected", json!({ "address": bench.device_url }));
     }
 }

@@ -118,7 +118,7 @@ impl run::Progress for Screen {
     }
 
     fn expects_device(&mut self, bench: &BenchInfo) {
-        eprintln!("the device is expected at {}", bench.device_url());
+        eprintln!("the device is expected at {}", bench.device_url);
         let listens_everywhere = bench.device_address.parse::<std::net::SocketAddr>();
         if listens_everywhere.is_ok_and(|address| address.ip().is_unspecified()) {
             eprintln!("(or at any other address of this machine)");

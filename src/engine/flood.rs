@@ -1,7 +1,8 @@
 //! Ends a run before a device that floods the harness fills the memory of this machine.
 //!
-//! Everything a run has seen is kept, since any of it may be evidence. That is no matter with a device that talks, and
-//! gigabytes with one that sends thousands of messages in every second. What was found until then stands.
+//! Everything a run has seen is kept, since any of it may be evidence. What counts is the memory that takes: a vehicle may talk as
+//! much as it likes in a moment, and a long run is no flood. Beside that only the number of messages in a short time is bounded,
+//! because each of them is judged. What was found until then stands.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -12,81 +13,66 @@ use crate::journal::event::{Direction, Event};
 
 /// How long is looked back.
 const WINDOW: Duration = Duration::from_secs(30);
-/// What a device may do in that time. With a tap a message counts twice: on its way to the broker and from there.
-const IN_WINDOW: Amount = Amount {
-    events: 10_000,
-    bytes: 400 << 20,
-};
-/// What it may do more for each mock vehicle it commands.
+/// What a device may send in that time. With a tap a message counts twice: on its way to the broker and from there.
+const IN_WINDOW: u64 = 10_000;
+/// What it may send more for each mock vehicle it commands.
 const FOR_EACH_VEHICLE: u64 = 100;
-/// What it may do in the whole run. Bytes are those that are held in memory: a parsed message can take sixteen times as many
-/// as it has on the wire.
-const IN_RUN: Amount = Amount {
-    events: 1_000_000,
-    bytes: 6144 << 20,
-};
+/// How many bytes of memory all records may take: payloads and what they are parsed to. A small machine has as much; the
+/// longest run against a vehicle that talks as fast as it may takes a third.
+const MEMORY: u64 = 3 << 30;
 
 /// What clients that are not the device may do in the same time before what they do is left out of the journal …
 const OF_OTHERS: u64 = 2_000;
 /// … and before the run ends, because it cannot be left out.
 const OF_OTHERS_AT_MOST: u64 = 30_000;
 
-/// Something is counted.
-#[derive(Clone, Copy, Debug, Default)]
-struct Amount {
-    events: u64,
-    bytes: u64,
-}
-
-impl Amount {
-    fn add(&mut self, other: Self) {
-        self.events += other.events;
-        self.bytes += other.bytes;
-    }
-
-    fn exceeds(self, limit: Self) -> bool {
-        self.events > limit.events || self.bytes > limit.bytes
-    }
-}
-
-/// Counts what comes from the device.
-#[derive(Debug, Default)]
+/// Counts what comes from the device, and what is held of it.
+#[derive(Debug)]
 pub struct FloodGuard {
-    /// What came in each second, the last [`WINDOW`] only.
-    seconds: VecDeque<(u64, Amount)>,
-    run: Amount,
-    vehicles: u64,
+    device: Recent,
     /// The same of clients that are not the device.
-    others: VecDeque<(u64, Amount)>,
+    others: Recent,
+    vehicles: u64,
+    /// About how many bytes of memory the records take, and how many they may take.
+    held: u64,
+    memory: u64,
     /// Why the run has to end.
     over: Option<String>,
 }
 
+impl Default for FloodGuard {
+    fn default() -> Self {
+        Self::within(MEMORY)
+    }
+}
+
 impl FloodGuard {
+    fn within(memory: u64) -> Self {
+        Self {
+            device: Recent::default(),
+            others: Recent::default(),
+            vehicles: 0,
+            held: 0,
+            memory,
+            over: None,
+        }
+    }
+
     /// Whether so much came of clients that are not the device that the rest need not be kept.
     #[must_use]
     pub fn is_beset(&self, now: Moment) -> bool {
-        let second = now.since(Moment::START).as_secs();
-        let recent = self.others.iter().filter(|(at, _)| at + WINDOW.as_secs() > second);
-        recent.map(|(_, amount)| amount.events).sum::<u64>() >= OF_OTHERS
+        self.others.count(now) >= OF_OTHERS
     }
 
     /// Sees an entry of a client that is not the device.
     pub fn observe_other(&mut self, entry: &Entry) {
-        if self.over.is_some() {
-            return;
-        }
-        let bytes = entry.payload().map_or(0, |payload| payload.bytes().len() as u64);
-        let amount = Amount { events: 1, bytes };
-        let window = count(&mut self.others, entry.at().moment, amount);
-        if window.events > OF_OTHERS_AT_MOST || window.bytes > IN_WINDOW.bytes {
-            self.over = Some(format!(
-                "clients that are not the device under test flood the harness: {} packets and messages with {} MB came within \
-                 30 s; the run was ended before this machine runs out of memory, and what was found until then stands",
-                window.events,
-                window.bytes >> 20
+        let count = self.others.add(entry.at().moment);
+        if count > OF_OTHERS_AT_MOST {
+            self.ends(format!(
+                "clients that are not the device under test flood the harness: {count} packets and messages came within 30 s"
             ));
         }
+        self.hold(entry, "from clients that are not the device under test");
     }
 
     /// Sees one entry.
@@ -94,33 +80,42 @@ impl FloodGuard {
         if let Event::RunBegun { header } = entry.event() {
             self.vehicles = header.vehicles.len() as u64;
         }
-        if entry.record.direction != Some(Direction::FromDevice) || self.over.is_some() {
-            return;
+        if entry.record.direction == Some(Direction::FromDevice) {
+            let count = self.device.add(entry.at().moment);
+            if count > IN_WINDOW + FOR_EACH_VEHICLE * self.vehicles {
+                self.ends(format!(
+                    "the device under test floods the harness: {count} packets and messages came within 30 s"
+                ));
+            }
         }
-        let bytes = entry.payload().map_or(0, |payload| payload.bytes().len() as u64);
-        let amount = Amount { events: 1, bytes };
-        self.run.add(Amount {
-            events: 1,
-            bytes: entry.held(),
+        let of = match entry.record.direction {
+            Some(Direction::FromDevice) => "from the device under test",
+            _ => "from the harness and its link",
+        };
+        self.hold(entry, of);
+    }
+
+    /// Sees an entry of the part of the run that broke off.
+    pub fn observe_earlier(&mut self, entry: &Entry) {
+        self.hold(entry, "before the run broke off");
+    }
+
+    fn hold(&mut self, entry: &Entry, of: &str) {
+        self.held += entry.held();
+        if self.held > self.memory {
+            self.ends(format!(
+                "the records of this run take {} MB of memory, more than is kept; the last came {of}",
+                self.held >> 20
+            ));
+        }
+    }
+
+    fn ends(&mut self, why: String) {
+        self.over.get_or_insert_with(|| {
+            format!(
+                "{why}; the run was ended before this machine runs out of memory, and what was found until then stands"
+            )
         });
-        let window = count(&mut self.seconds, entry.at().moment, amount);
-        let in_window = Amount {
-            events: IN_WINDOW.events + FOR_EACH_VEHICLE * self.vehicles,
-            ..IN_WINDOW
-        };
-        let (seen, when) = if window.exceeds(in_window) {
-            (window, "within 30 s")
-        } else if self.run.exceeds(IN_RUN) {
-            (self.run, "in this run")
-        } else {
-            return;
-        };
-        self.over = Some(format!(
-            "the device under test floods the harness: {} packets and messages with {} MB came {when}; the run was ended \
-             before this machine runs out of memory, and what was found until then stands",
-            seen.events,
-            seen.bytes >> 20
-        ));
     }
 
     /// Why the run has to end, if it has to.
@@ -130,24 +125,38 @@ impl FloodGuard {
     }
 }
 
-/// Adds an amount to the seconds that are looked back at; gives their sum.
-fn count(seconds: &mut VecDeque<(u64, Amount)>, now: Moment, amount: Amount) -> Amount {
-    let second = now.since(Moment::START).as_secs();
-    match seconds.back_mut() {
-        Some((last, sum)) if *last == second => sum.add(amount),
-        _ => seconds.push_back((second, amount)),
+/// How many came in each second that is looked back at.
+#[derive(Debug, Default)]
+struct Recent {
+    seconds: VecDeque<(u64, u64)>,
+}
+
+impl Recent {
+    /// One more; gives how many there are.
+    fn add(&mut self, now: Moment) -> u64 {
+        let second = second_of(now);
+        match self.seconds.back_mut() {
+            Some((last, count)) if *last == second => *count += 1,
+            _ => self.seconds.push_back((second, 1)),
+        }
+        let is_old = |(at, _): &(u64, u64)| at + WINDOW.as_secs() <= second;
+        while self.seconds.front().is_some_and(is_old) {
+            self.seconds.pop_front();
+        }
+        self.count(now)
     }
-    while seconds
-        .front()
-        .is_some_and(|(first, _)| first + WINDOW.as_secs() <= second)
-    {
-        seconds.pop_front();
+
+    fn count(&self, now: Moment) -> u64 {
+        let recent = self
+            .seconds
+            .iter()
+            .filter(|(at, _)| at + WINDOW.as_secs() > second_of(now));
+        recent.map(|(_, count)| count).sum()
     }
-    let mut window = Amount::default();
-    for (_, sum) in seconds {
-        window.add(*sum);
-    }
-    window
+}
+
+fn second_of(moment: Moment) -> u64 {
+    moment.since(Moment::START).as_secs()
 }
 
 #[cfg(test)]
@@ -215,11 +224,11 @@ mod tests {
             },
         });
         guard.observe(&entry);
-        let held = guard.run.bytes;
+        let held = guard.held;
         assert!(held > 10 * zeros.len() as u64, "{held}");
         // The same message on its other way has no value of its own.
         guard.observe(&crate::journal::Entry::beside(&entry, entry.record.clone()));
-        assert_eq!(guard.run.bytes - held, zeros.len() as u64);
+        assert_eq!(guard.held - held, zeros.len() as u64);
     }
 
     #[test]
@@ -252,9 +261,39 @@ mod tests {
     }
 
     #[test]
-    fn a_few_huge_messages_end_it_as_well() {
-        let mut guard = FloodGuard::default();
-        after(&mut guard, 200, Duration::from_millis(1), 1 << 20);
-        assert!(guard.over().is_some());
+    fn huge_messages_end_it_by_the_memory_they_take_and_not_by_how_fast_they_come() {
+        for each in [Duration::from_millis(1), Duration::from_secs(1)] {
+            let mut guard = FloodGuard::within(100 << 20);
+            after(&mut guard, 99, each, 1 << 20);
+            assert_eq!(guard.over(), None);
+            after(&mut guard, 2, each, 1 << 20);
+            let why = guard.over().unwrap();
+            assert!(
+                why.contains("101 MB of memory") && why.contains("the device under test"),
+                "{why}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_the_harness_sends_takes_memory_as_well_and_is_no_message_of_the_device() {
+        let mut guard = FloodGuard::within(1 << 20);
+        let mut journal = Journal::new();
+        for _ in 0..=IN_WINDOW {
+            guard.observe(&journal.append(Occurrence::harness(
+                Stamp {
+                    moment: Moment::START,
+                    utc: jiff::Timestamp::UNIX_EPOCH,
+                },
+                Event::Sent {
+                    topic: "order".into(),
+                    qos: 0,
+                    retain: false,
+                    payload: Payload::keep(vec![b' '; 10].into()),
+                },
+            )));
+        }
+        assert_eq!(guard.over(), None);
+        assert_eq!(guard.held, 10 * (IN_WINDOW + 1));
     }
 }

@@ -42,6 +42,10 @@ impl Recorder {
             [] => None,
             entries => Some(judged(rules, entries)?),
         };
+        let mut guard = FloodGuard::default();
+        for entry in journal.entries() {
+            guard.observe_earlier(entry);
+        }
         let entry = journal.append(first);
         if let Some(writer) = &mut writer {
             writer.write(&entry.record)?;
@@ -51,7 +55,6 @@ impl Recorder {
             None => RunJudge::begin(rules, &entry)?,
         };
         judge.observe(&entry)?;
-        let mut guard = FloodGuard::default();
         guard.observe(&entry);
         Ok(Self {
             journal,

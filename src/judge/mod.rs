@@ -25,6 +25,7 @@ mod side;
 mod step;
 mod test;
 mod timeline;
+mod unheard;
 mod watches;
 mod window;
 

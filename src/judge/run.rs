@@ -26,6 +26,7 @@ use super::rules::{JudgeError, Rules};
 use super::said;
 use super::test::{Ground, TestJudge};
 use super::timeline::Timeline;
+use super::unheard::Unheard;
 use super::watches::{Watched, Watches};
 use crate::clock::{Moment, Stamp};
 use crate::journal::Entry;
@@ -55,6 +56,8 @@ pub struct RunJudge {
     watches: Watches,
     /// Who is on the tap, where that is known.
     company: Option<Company>,
+    /// What the device does not show to have heard, where nobody sees what reaches it.
+    unheard: Option<Unheard>,
     /// Whether the last entry was left out.
     left_out: bool,
     reactions: Reactions,
@@ -90,6 +93,8 @@ impl RunJudge {
             .collect();
         let watches = Watches::begin(&monitors, &ground, vehicles, tap);
         let reactions = Reactions::of(&header.vehicles);
+        let is_unseen = !tap && role == Role::Agv;
+        let unheard = is_unseen.then(|| Unheard::of(&ground.topics, &ground.pack));
         let company = Company::of(role, &ground.topics, &ground.pack);
         let timeline = if header.vehicles.is_empty() {
             Timeline::new(&header.topics)
@@ -107,6 +112,7 @@ impl RunJudge {
             records: first.seq(),
             watches,
             company,
+            unheard,
             reactions,
             instants: BTreeMap::new(),
             last_order: None,
@@ -151,6 +157,9 @@ impl RunJudge {
         if self.role == Role::Agv {
             self.note_instants(entry);
         }
+        if let Some(unheard) = &mut self.unheard {
+            unheard.observe(entry);
+        }
         match entry.event() {
             Event::Waived { waiver } => self.ground.waivers.push(waiver.clone()),
             Event::Planned { plan } => self.plan = (**plan).clone(),
@@ -185,6 +194,9 @@ impl RunJudge {
         if let Some(current) = &mut self.current {
             if matches!(entry.event(), Event::TestEnded { .. }) {
                 current.hide(hidden(&self.watches, &self.ground.waivers));
+                if let Some(why) = self.unheard.as_ref().and_then(Unheard::why) {
+                    current.interfered(&why);
+                }
             }
             current.observe(entry, subject.as_deref(), &self.timeline, &self.ground);
         }
@@ -309,6 +321,9 @@ impl RunJudge {
     fn break_off(&mut self, why: &str) {
         if let Some(mut current) = self.current.take() {
             current.hide(hidden(&self.watches, &self.ground.waivers));
+            if let Some(why) = self.unheard.as_ref().and_then(Unheard::why) {
+                current.interfered(&why);
+            }
             let mut result = current.break_off(self.last.moment, why, &self.ground);
             self.number(&mut result);
             self.done.push(result);

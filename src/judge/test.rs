@@ -520,6 +520,7 @@ impl TestJudge {
             if self.preamble.is_ok() && self.body.is_ok() {
                 self.body = Err(why.to_owned());
             }
+            self.allow_for_others();
             self.finish(at, ground);
         }
         self.result

@@ -4,6 +4,7 @@
 //! the harness), `memory` an in-process bus with MQTT's retain, will and QoS rules in virtual time. A link
 //! reports everything as journal occurrences and judges nothing.
 
+mod filter;
 pub mod memory;
 pub mod mqtt;
 

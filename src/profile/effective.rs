@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::hooks::{self, HookAction};
+use super::hook_action::HookAction;
+use super::hooks;
 use super::key::{KEYS, SAMPLE_ACTIONS, STATEMENTS};
 use super::layer::Layer;
 use super::value::Value;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::hooks::Hook;
+use super::hook_action::Hook;
 use super::value::Value;
 use super::{Deviation, KnownFailure, LayoutList};
 use crate::diagnostic::Span;

@@ -8,10 +8,12 @@
 
 mod claim;
 mod effective;
+mod hook_action;
 mod hooks;
 mod key;
 mod layer;
 mod load;
+mod placeholder;
 mod read;
 mod secret;
 mod surroundings;
@@ -29,15 +31,14 @@ use serde_json::{Map, Value, json};
 
 pub use claim::Claim;
 pub use effective::Effective;
-pub use hooks::{
-    HOOKS, Hook, HookAction, HookInfo, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE, fill,
-    find as find_hook, placeholders,
-};
+pub use hook_action::{Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
+pub use hooks::{HOOKS, HookInfo, find as find_hook};
 pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
     Statement,
 };
 pub use load::{check, load};
+pub use placeholder::{fill, placeholders};
 pub use secret::{Password, PasswordError, PasswordSource, SecretText, Secrets};
 pub use surroundings::Surroundings;
 pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};

@@ -119,8 +119,7 @@ impl Secrets {
                 text = text.replace(secret.as_str(), HIDDEN);
             }
         }
-        let words: Vec<String> = text.split(' ').map(address).collect();
-        words.join(" ")
+        text.split_inclusive(char::is_whitespace).map(address).collect()
     }
 }
 
@@ -142,9 +141,10 @@ fn address(word: &str) -> String {
     format!("{scheme}://{user}{host}{path}")
 }
 
-/// Punctuation behind an address that belongs to the sentence.
+/// What stands behind an address and belongs to the sentence: punctuation, and the space before the next word.
 fn trailing(path: &str) -> &str {
-    &path[path.trim_end_matches([':', ',', ')', ';', '`']).len()..]
+    let belongs = |letter: char| letter.is_whitespace() || ":,;)]}>`'\"".contains(letter);
+    &path[path.trim_end_matches(belongs).len()..]
 }
 
 /// A text that may hold secrets: parts as they are, and parts from somewhere else.
@@ -260,6 +260,7 @@ mod tests {
             ("--broker=wss://host/mqtt?x=SECRET", "--broker=wss://host/mqtt?…"),
             ("http://host/a#SECRET", "http://host/a?…"),
             ("https://host?key=SECRET", "https://host?…"),
+            ("\"ws://host/mqtt?x=SECRET\",\nnext", "\"ws://host/mqtt?…\",\nnext"),
             ("mqtt://host:1883 and no address", "mqtt://host:1883 and no address"),
         ] {
             assert_eq!(secrets.out_of(text), shown, "{text}");

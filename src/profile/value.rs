@@ -7,8 +7,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::SampleAction;
 use super::claim::Claim;
-use super::hooks;
 use super::key::{COMMON_PLACEHOLDERS, Kind, Place, TEMPLATE_PLACEHOLDERS};
+use super::placeholder::placeholders;
+use super::secret::Secrets;
 use super::time;
 use crate::diagnostic;
 
@@ -203,7 +204,7 @@ impl Value {
     /// The value as the report shows it.
     pub(super) fn shown(&self) -> String {
         match self {
-            Self::Text(text) => text.clone(),
+            Self::Text(text) => Secrets::default().out_of(text),
             Self::Flag(flag) => flag.to_string(),
             Self::Duration(duration) => time::show(*duration),
             Self::Number(number) => number.to_string(),
@@ -213,7 +214,10 @@ impl Value {
                 .map(|path| path.display().to_string())
                 .collect::<Vec<_>>()
                 .join(", "),
-            Self::Texts(texts) => texts.join(", "),
+            Self::Texts(texts) => {
+                let shown = texts.iter().map(|text| Secrets::default().out_of(text));
+                shown.collect::<Vec<_>>().join(", ")
+            }
             Self::Action(action) => action.shown(),
             Self::Claims(claims) => claims.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         }
@@ -300,10 +304,7 @@ fn json(value: &DeValue<'_>) -> Option<serde_json::Value> {
 
 /// Refuses `{name}` that stands for nothing.
 pub(super) fn unknown_placeholder(text: &str, known: &[&str]) -> Result<(), Refusal> {
-    match hooks::placeholders(text)
-        .into_iter()
-        .find(|(_, name)| !known.contains(name))
-    {
+    match placeholders(text).into_iter().find(|(_, name)| !known.contains(name)) {
         Some((_, name)) => Err(Refusal {
             code: "unknown-placeholder",
             ..Refusal::bad(format!("`{{{name}}}` stands for nothing here"))

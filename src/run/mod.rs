@@ -21,6 +21,7 @@ mod identity;
 mod ladder;
 mod lasting;
 mod library;
+mod operators;
 mod outputs;
 mod over_sockets;
 mod pace;

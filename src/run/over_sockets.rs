@@ -4,32 +4,31 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-use super::hooks::{DeviceProcess, Means, ProfileHooks};
+use super::hooks::Means;
 use super::library::Library;
+use super::operators::{Commands, hooks_of};
 use super::person::Person;
 use super::plan::{How, RunPlan};
 use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
-use super::site::{bench_of, certificates, reach, resolve};
+use super::site::{Topics, bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
 use crate::bench::endpoint::Endpoint;
 use crate::bench::{LinkError, Vantage};
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
-use crate::engine::{Composer, Engine, EngineError, HookOutcome, Operator, RecordError, Recorder};
+use crate::engine::{Composer, Engine, EngineError, Operator, RecordError, Recorder};
 use crate::journal::Journal;
 use crate::journal::event::{Event, Occurrence};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::link::mqtt::{BenchInfo, BenchOptions, MqttBench, MqttLink};
 use crate::pack::Pack;
-use crate::profile::{self, Effective, Profile, Secrets, Surroundings};
+use crate::profile::{Effective, Profile, Secrets, Surroundings};
 use crate::simulate::WithFleet;
-use crate::simulate::driver::RunningDevice;
 use crate::simulate::{BuiltIn, UnknownName};
 
 /// A run over real sockets.
@@ -133,7 +132,11 @@ impl SocketRun {
     ) -> Result<Self, Vec<Diagnostic>> {
         let profile = &effective.profile;
         let device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
-        let options = bench_of(profile, device.published(pack), surroundings)?;
+        let topics = Topics {
+            device: device.published(pack),
+            harness: device.told(pack),
+        };
+        let options = bench_of(profile, topics, surroundings)?;
         let mut profile = profile.clone();
         let secrets = resolve(&mut profile, &options, surroundings)?;
         let profile = &profile;
@@ -263,7 +266,7 @@ impl SocketRun {
                     authority: profile.bench.tls_ca.clone(),
                     secrets,
                 };
-                let operator = hooks(&profile, &info, self.device_log, folder, (person, means))?;
+                let operator = hooks_of(&profile, &info, self.device_log, folder, (person, means))?;
                 progress.expects_device(&info);
                 stage.run(link, &info, operator, progress, saved).await
             }
@@ -349,96 +352,4 @@ fn factsheet_of(device: &BuiltIn, library: &Library, pack: &Pack) -> Option<Valu
     let timeline = finished.recorder.judge().timeline();
     let sheets = timeline.of("factsheet");
     sheets.iter().rev().find_map(|entry| entry.json().cloned())
-}
-
-/// The hooks of a profile; starts the device if the profile says how.
-fn hooks(
-    profile: &Profile,
-    info: &BenchInfo,
-    device_log: Option<PathBuf>,
-    folder: PathBuf,
-    (person, means): (Option<Arc<dyn Person>>, Means),
-) -> std::io::Result<ProfileHooks> {
-    let (host, port) = info
-        .device_address
-        .rsplit_once(':')
-        .unwrap_or((&info.device_address, "1883"));
-    let device = &profile.device;
-    let common: BTreeMap<String, String> = [
-        ("broker-host", host.to_owned()),
-        ("broker-port", port.to_owned()),
-        ("manufacturer", device.manufacturer.clone().unwrap_or_default()),
-        ("serial-number", device.serial_number.clone().unwrap_or_default()),
-        (
-            "vehicle",
-            profile.vehicles.serial_numbers.first().cloned().unwrap_or_default(),
-        ),
-        ("free-port", free_port()?),
-    ]
-    .into_iter()
-    .map(|(name, value)| (name.to_owned(), value))
-    .collect();
-    let mut process = device.command.as_ref().map(|command| {
-        let filled = command
-            .iter()
-            .map(|word| profile::fill(word, &common, str::to_owned))
-            .collect();
-        DeviceProcess::new(filled, folder.clone(), device_log)
-    });
-    if let Some(process) = &mut process {
-        process.start()?;
-    }
-    Ok(ProfileHooks::new(
-        profile.hooks.clone(),
-        common,
-        folder,
-        process,
-        person,
-        means,
-    ))
-}
-
-/// Ports below those that an operating system gives to outgoing connections: what one of them is given is not free any
-/// more when the device is started again.
-const OWN_PORTS: std::ops::Range<u32> = 20_000..32_000;
-
-/// A port of this machine that nobody uses now. Harnesses that start at the same time begin to look in different places.
-fn free_port() -> std::io::Result<String> {
-    let span = OWN_PORTS.end - OWN_PORTS.start;
-    let first = std::process::id().wrapping_mul(97) % span;
-    for step in 0..100 {
-        let port = OWN_PORTS.start + (first + step) % span;
-        if std::net::TcpListener::bind(format!("127.0.0.1:{port}")).is_ok() {
-            return Ok(port.to_string());
-        }
-    }
-    let address = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?;
-    Ok(address.port().to_string())
-}
-
-/// Hooks of the built-in device: commands to its driver.
-struct Commands {
-    device: RunningDevice,
-    hooks: &'static [&'static str],
-}
-
-impl Operator for Commands {
-    fn hooks(&self) -> Vec<String> {
-        self.hooks.iter().map(|hook| (*hook).to_owned()).collect()
-    }
-
-    async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome {
-        if !self.hooks.contains(&hook) {
-            return HookOutcome::Missing;
-        }
-        if self.device.command(hook, Value::Object(parameters)).await {
-            HookOutcome::Done("done by the built-in device".to_owned())
-        } else {
-            HookOutcome::Failed("the built-in device is not running any more".to_owned())
-        }
-    }
-
-    fn usual_time(&self) -> Duration {
-        Duration::from_millis(1)
-    }
 }

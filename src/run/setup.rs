@@ -169,6 +169,21 @@ impl DeviceUnderTest {
         }
     }
 
+    /// The topics that the harness publishes: those of the other side.
+    #[must_use]
+    pub fn told(&self, pack: &Pack) -> Vec<String> {
+        match &self.fleet {
+            Some(fleet) => fleet.published(pack),
+            None => {
+                let other_side = Participant {
+                    role: Role::MasterControl,
+                    ..self.subject.clone()
+                };
+                other_side.published(pack)
+            }
+        }
+    }
+
     /// The first record of the run, and its set-up, on a bench that can do so much.
     #[must_use]
     pub fn on(self, bench: BenchFacts, request: Request, library: &Library, pack: &Pack) -> (RunHeader, Setup) {

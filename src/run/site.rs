@@ -61,10 +61,16 @@ pub(super) fn resolve(
     }
 }
 
+/// Who publishes where.
+pub(super) struct Topics {
+    pub(super) device: Vec<String>,
+    pub(super) harness: Vec<String>,
+}
+
 /// The bench that a profile describes.
 pub(super) fn bench_of(
     profile: &Profile,
-    topics: Vec<String>,
+    topics: Topics,
     surroundings: &Surroundings,
 ) -> Result<BenchOptions, Vec<Diagnostic>> {
     let bench = &profile.bench;
@@ -101,7 +107,8 @@ pub(super) fn bench_of(
             topics: bench.own_topics.clone(),
             client_id: bench.client_id.clone(),
         },
-        ..BenchOptions::loopback(topics)
+        harness_topics: topics.harness,
+        ..BenchOptions::loopback(topics.device)
     })
 }
 

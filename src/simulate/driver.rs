@@ -1,13 +1,10 @@
 //! Runs a reference device against a real broker or tap.
 //!
 //! The device decides everything; the driver owns the sockets and the clock. Messages of a device without a
-//! connection are dropped. Files are fetched by plain threads, so that a server that stalls keeps nobody
-//! waiting at the end.
+//! connection are dropped.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
-use bytes::Bytes;
 use serde_json::Value;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
@@ -15,27 +12,20 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep_until};
 
+use super::fetching::{Progress, fetch};
 use super::peer::outgoing;
+use super::witness::{Witness, report};
 use crate::bench::Outgoing;
 use crate::bench::client::{Client, ClientEvent, ClientOptions};
 use crate::bench::endpoint::Endpoint;
-use crate::bench::web;
 use crate::clock::{Moment, WallClock};
-use crate::journal::event::{Direction, Event, Payload, Source};
 use crate::link::mqtt::Reporter;
-use crate::maps::FETCH_TIMEOUT;
-use crate::reference::{Device, Download, Input, Output, Publication};
+use crate::reference::{Device, Input, Output, Publication};
 
 /// A device that wants to be woken again and again at the same moment gets on in steps of this.
 const LEAST_WAKE: Duration = Duration::from_millis(1);
 /// How long is waited until a broker has let a device in.
 const ENTRY_LIMIT: Duration = Duration::from_secs(15);
-/// Largest file a device fetches.
-const LARGEST_FILE: u64 = 256 << 20;
-/// How long a broker may take to publish a last will.
-const WILL_LIMIT: Duration = Duration::from_secs(5);
-/// How long a file may take once its first byte is here.
-const TRANSFER_LIMIT: Duration = Duration::from_secs(120);
 
 /// A command for a running device.
 #[derive(Debug)]
@@ -133,8 +123,6 @@ async fn run_device<D: Device>(
     };
     driver.run(commands, progress).await;
 }
-
-type Progress = (u64, Download);
 
 struct Driver<D> {
     device: D,
@@ -237,10 +225,15 @@ impl<D: Device> Driver<D> {
                 }
                 Output::Drop => {
                     self.established = false;
-                    let witness = self.witness().await;
+                    let witness = match (self.sent.clone(), self.will.clone()) {
+                        (Some(reporter), Some(will)) if self.connection.is_some() => {
+                            Some(Witness::open(&self.endpoint, &self.client_id, will, reporter).await)
+                        }
+                        _ => None,
+                    };
                     self.connection = None;
-                    if let Some((witness, will)) = witness {
-                        tokio::spawn(testify(witness, will));
+                    if let Some(witness) = witness {
+                        tokio::spawn(witness.testify());
                     }
                 }
                 Output::Raw(bytes) => {
@@ -280,65 +273,6 @@ impl<D: Device> Driver<D> {
         }
         client.publish(message);
     }
-
-    /// Somebody who listens for the last will of a device of the harness. It is the broker that sends it, so it counts
-    /// as sent when it comes.
-    async fn witness(&mut self) -> Option<(Witness, Outgoing)> {
-        let (reporter, will) = (self.sent.clone()?, self.will.clone()?);
-        self.connection.as_ref()?;
-        let (client, mut events) = Client::open(&ClientOptions {
-            endpoint: self.endpoint.clone(),
-            client_id: format!("{}-will", self.client_id),
-            keep_alive: Duration::from_secs(30),
-            clean_session: true,
-            will: None,
-            subscriptions: vec![(will.topic.clone(), 2)],
-        });
-        let listens = async { while !matches!(events.recv().await, Some(ClientEvent::Connected) | None) {} };
-        let _ = tokio::time::timeout(WILL_LIMIT, listens).await;
-        let witness = Witness {
-            client,
-            events,
-            reporter,
-        };
-        Some((witness, will))
-    }
-}
-
-/// A client that listens for a last will.
-struct Witness {
-    client: Client,
-    events: mpsc::Receiver<ClientEvent>,
-    reporter: Reporter,
-}
-
-/// Reports the last will when it comes; what else there is on its topic was published by the device itself.
-async fn testify(mut witness: Witness, will: Outgoing) {
-    let comes = async {
-        while let Some(event) = witness.events.recv().await {
-            match event {
-                ClientEvent::Message { payload, .. } if payload == will.payload => return true,
-                ClientEvent::Lost(_) => return false,
-                _ => {}
-            }
-        }
-        false
-    };
-    if tokio::time::timeout(WILL_LIMIT, comes).await.unwrap_or(false) {
-        report(&witness.reporter, &will).await;
-    }
-    witness.client.disconnect().await;
-}
-
-/// Reports what a device of the harness has sent.
-async fn report(reporter: &Reporter, message: &Outgoing) {
-    let event = Event::Sent {
-        topic: message.topic.clone(),
-        qos: message.qos,
-        retain: message.retain,
-        payload: Payload::keep(message.payload.clone()),
-    };
-    reporter.report(Source::Harness, Some(Direction::ToDevice), event).await;
 }
 
 async fn next_event(connection: &mut Option<(Client, mpsc::Receiver<ClientEvent>)>) -> ClientEvent {
@@ -349,36 +283,6 @@ async fn next_event(connection: &mut Option<(Client, mpsc::Receiver<ClientEvent>
         }
         None => std::future::pending().await,
     }
-}
-
-/// Fetches a file in a thread of its own.
-fn fetch(token: u64, url: String, authority: Option<PathBuf>, progress: mpsc::UnboundedSender<Progress>) {
-    std::thread::spawn(move || {
-        let begun = || drop(progress.send((token, Download::Begun)));
-        let end = match download(&url, authority.as_ref(), begun) {
-            Ok(body) => Download::Done(body),
-            Err(error) => Download::Failed(error.to_string()),
-        };
-        let _ = progress.send((token, end));
-    });
-}
-
-fn download(url: &str, authority: Option<&PathBuf>, begun: impl FnOnce()) -> Result<Bytes, ureq::Error> {
-    let agent = web::agent(url, authority, |limits| {
-        limits
-            .timeout_connect(Some(FETCH_TIMEOUT))
-            .timeout_recv_response(Some(FETCH_TIMEOUT))
-            .timeout_recv_body(Some(TRANSFER_LIMIT))
-    });
-    let agent = agent.map_err(|error| std::io::Error::other(error.to_string()))?;
-    let response = agent.get(url).call()?;
-    begun();
-    let body = response
-        .into_body()
-        .into_with_config()
-        .limit(LARGEST_FILE)
-        .read_to_vec()?;
-    Ok(body.into())
 }
 
 /// Sends bytes that no client library would send. They cannot go over the device's own connection, which

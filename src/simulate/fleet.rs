@@ -108,6 +108,13 @@ impl Fleet {
         all.flat_map(|subject| subject.published(pack)).collect()
     }
 
+    /// The topics these vehicles publish.
+    #[must_use]
+    pub fn published(&self, pack: &Pack) -> Vec<String> {
+        let all = self.vehicles.iter();
+        all.flat_map(|vehicle| vehicle.subject.published(pack)).collect()
+    }
+
     /// How to put a vehicle back where it is at the start of a test.
     #[must_use]
     pub fn reset(node: Option<&str>) -> Value {

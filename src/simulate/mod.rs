@@ -5,6 +5,7 @@
 
 mod built_in;
 pub mod driver;
+mod fetching;
 mod fleet;
 mod hook_server;
 mod peer;
@@ -12,6 +13,7 @@ mod reference_agv;
 mod reference_master_control;
 mod running_fleet;
 mod unknown;
+mod witness;
 
 pub use built_in::BuiltIn;
 pub use fleet::{Fleet, USUAL_FLEET};

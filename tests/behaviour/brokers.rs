@@ -1,22 +1,26 @@
 //! Brokers of customers: with logins, access rules, certificates and `WebSocket`s. What they refuse is said in plain words.
 
+use std::cell::Cell;
 use std::path::Path;
 use std::process::Command;
 
-use crate::bench::{Bench, Profile, QUICK};
+use crate::bench::{Bench, MANUFACTURER, Profile, QUICK, SERIAL};
 use crate::certificates;
-use crate::mosquitto::Mosquitto;
+use crate::mosquitto::{Mosquitto, free_port};
 use crate::scripted::topic;
 use crate::tool::{Ended, Running, tool};
 use crate::websockets;
 
-/// A file of users, of whom there is one.
+/// A file of users: the harness and a vehicle.
 fn users(folder: &Path) -> String {
     let file = folder.join("users");
-    let made = Command::new("mosquitto_passwd")
-        .args(["-b", "-c", &file.display().to_string(), "tck", "right-password"])
-        .status();
-    assert!(made.unwrap().success());
+    std::fs::write(&file, "").unwrap();
+    for user in ["tck", "agv"] {
+        let made = Command::new("mosquitto_passwd")
+            .args(["-b", &file.display().to_string(), user, "right-password"])
+            .status();
+        assert!(made.unwrap().success());
+    }
     open_up(&file);
     format!("allow_anonymous false\npassword_file {}\n", file.display())
 }
@@ -66,28 +70,23 @@ fn refused(broker: &str, more: &str, password: &str) -> Ended {
     judged(&Bench::new(), broker, more, password).end().code(5)
 }
 
-fn passes(bench: &Bench, broker: &str, more: &str) -> String {
+/// Starts a run with these settings of the bench, and a vehicle at its address.
+fn with_vehicle(bench: &Bench, broker: &str, more: &str, user: Option<&str>) -> (Running, Running) {
     let mut run = judged(bench, broker, more, "right-password");
     let address = run.line("the device is expected at mqtt://");
-    let port: u16 = address.rsplit(':').next().unwrap().parse().unwrap();
-    let mut agv = tool(
-        bench.path(),
-        &[
-            "simulate",
-            "agv",
-            "--broker",
-            &format!("mqtt://127.0.0.1:{port}"),
-            "--manufacturer",
-            crate::bench::MANUFACTURER,
-            "--serial",
-            crate::bench::SERIAL,
-            "--username",
-            "tck",
-        ],
-    );
-    let _agv = Running::start(agv.env("VDA5050_TCK_PASSWORD", "right-password"));
-    let ended = run.end().code(0);
-    ended.stdout
+    let broker = format!("mqtt://{address}");
+    let mut arguments = vec!["simulate", "agv", "--broker", &broker];
+    arguments.extend(["--manufacturer", MANUFACTURER, "--serial", SERIAL]);
+    arguments.extend(user.iter().flat_map(|user| ["--username", user]));
+    let mut agv = tool(bench.path(), &arguments);
+    let agv = Running::start(agv.env("VDA5050_TCK_PASSWORD", "right-password"));
+    (run, agv)
+}
+
+fn passes(bench: &Bench, broker: &str, more: &str) -> String {
+    let user = more.contains("username").then_some("tck");
+    let (run, _agv) = with_vehicle(bench, broker, more, user);
+    run.end().code(0).stdout
 }
 
 #[test]
@@ -210,6 +209,65 @@ fn websockets_are_brokers_like_others() {
 }
 
 #[test]
+fn the_websockets_of_mosquitto_are_reached_with_path_password_and_certificate() {
+    let ports = Cell::new((0, 0));
+    let Some(broker) = Mosquitto::start_with(|folder| {
+        ports.set((free_port(), free_port()));
+        let (plain, secured) = ports.get();
+        certificates::make(folder);
+        for name in ["ca.crt", "server.crt", "server.key"] {
+            open_up(&folder.join(name));
+        }
+        let users = users(folder);
+        let folder = folder.display();
+        format!(
+            "{users}listener {plain} 127.0.0.1\nprotocol websockets\n\
+             listener {secured} 127.0.0.1\nprotocol websockets\ncertfile {folder}/server.crt\nkeyfile {folder}/server.key\n"
+        )
+    }) else {
+        return;
+    };
+    let (plain, secured) = ports.get();
+    let login = "username = \"tck\"\n";
+    let authority = format!("tls-ca = \"{}\"\n", broker.folder().join("ca.crt").display());
+    let plain = format!("ws://127.0.0.1:{plain}/fleet/mqtt?token=not-for-readers");
+    let secured = format!("wss://localhost:{secured}/fleet/mqtt");
+    let bench = Bench::new();
+    passes(&bench, &plain, login);
+    for file in [
+        "journal.jsonl",
+        "result.json",
+        "report.html",
+        "junit.xml",
+        "manifest.json",
+    ] {
+        let text = std::fs::read_to_string(bench.bundle().join(file)).unwrap();
+        for secret in ["not-for-readers", "right-password"] {
+            assert!(!text.contains(secret), "{file} holds {secret}");
+        }
+    }
+    passes(&Bench::new(), &secured, &format!("{login}{authority}"));
+    refused(&plain, "", "").says("it lets nobody in without a login");
+    let wrong = refused(&plain, login, "wrong-password").says("it refuses the login of `tck`");
+    for secret in ["not-for-readers", "wrong-password"] {
+        assert!(!wrong.stderr.contains(secret), "{}", wrong.stderr);
+    }
+    refused(&secured, login, "right-password").says("its certificate is not trusted");
+    refused(&secured.replace("wss", "ws"), login, "right-password").says("the broker at ws://localhost");
+    // A vehicle of ours gets in the same way.
+    let mut agv = tool(
+        bench.path(),
+        &["simulate", "agv", "--broker", &secured, "--username", "tck", "--tls-ca"],
+    );
+    agv.arg(broker.folder().join("ca.crt"))
+        .env("VDA5050_TCK_PASSWORD", "right-password");
+    let mut agv = Running::start(&mut agv);
+    agv.line("1 simulated AGV(s) on ");
+    agv.interrupt();
+    agv.end().code(0);
+}
+
+#[test]
 fn a_vehicle_that_gets_no_order_because_of_access_rules_is_not_accused() {
     let device = topic("#");
     let device = device.trim_end_matches("/#");
@@ -223,10 +281,7 @@ fn a_vehicle_that_gets_no_order_because_of_access_rules_is_not_accused() {
         return;
     };
     let bench = Bench::new();
-    let mut run = judged(&bench, &broker.url(), "", "");
-    let address = run.line("the device is expected at mqtt://");
-    let port = address.rsplit(':').next().unwrap().parse().unwrap();
-    let _agv = bench.agv(port, &[]);
+    let (run, _agv) = with_vehicle(&bench, &broker.url(), "", None);
     let ended = run.end().code(5).says("reaches the device, which subscribes to it");
     assert!(
         ended.stderr.contains(&format!("topic readwrite {device}/#")),
@@ -234,4 +289,68 @@ fn a_vehicle_that_gets_no_order_because_of_access_rules_is_not_accused() {
         ended.stderr
     );
     bench.is_partial();
+    // The same is seen without a tap: what the harness publishes does not come back.
+    let bench = Bench::new();
+    let (run, _agv) = with_vehicle(&bench, &broker.url(), "tap = false\n", None);
+    run.end()
+        .code(5)
+        .says("does not allow that the harness publishes on")
+        .says(&format!("topic readwrite {device}/#"));
+    bench.is_partial();
+}
+
+#[test]
+fn a_vehicle_whose_messages_the_broker_keeps_to_itself_is_not_accused() {
+    // Whoever logs in under another name may do nothing.
+    let lines = format!("topic readwrite {}\ntopic readwrite vda5050-tck/#\n", topic("#"));
+    let Some(broker) = Mosquitto::start_with(|folder| rules(folder, &lines)) else {
+        return;
+    };
+    let bench = Bench::new();
+    let (run, _agv) = with_vehicle(&bench, &broker.url(), "", Some("fleet"));
+    run.end()
+        .code(5)
+        .says("of user `fleet` publishes on")
+        .says("reaches the harness")
+        .says("user fleet")
+        .says(&format!("topic readwrite {}", topic("#")));
+    assert_ne!(bench.result()["verdict"], "fail");
+    bench.is_partial();
+}
+
+#[test]
+fn a_vehicle_whose_states_do_not_come_where_nobody_sees_why_is_not_accused() {
+    let lines = format!(
+        "topic readwrite {}\ntopic readwrite vda5050-tck/#\n",
+        topic("connection")
+    );
+    let Some(broker) = Mosquitto::start_with(|folder| rules(folder, &lines)) else {
+        return;
+    };
+    let bench = Bench::new();
+    let (run, _agv) = with_vehicle(&bench, &broker.url(), "tap = false\n", None);
+    run.end().code(5).says("sent no state within");
+    assert_eq!(bench.result()["verdict"], "inconclusive");
+}
+
+#[test]
+fn a_vehicle_that_may_not_read_its_orders_is_not_accused_where_nobody_sees_it() {
+    let own = topic("#");
+    let lines =
+        format!("user tck\ntopic readwrite {own}\ntopic readwrite vda5050-tck/#\nuser agv\ntopic write {own}\n");
+    let Some(broker) = Mosquitto::start_with(|folder| {
+        let file = folder.join("rules");
+        std::fs::write(&file, &lines).unwrap();
+        open_up(&file);
+        format!("{}acl_file {}\n", users(folder), file.display())
+    }) else {
+        return;
+    };
+    let bench = Bench::new();
+    let more = "tap = false\nusername = \"tck\"\n";
+    let (run, _agv) = with_vehicle(&bench, &broker.url(), more, Some("agv"));
+    run.end()
+        .code(3)
+        .prints("without a tap nobody can tell whether the broker lets the device read it");
+    bench.is_whole();
 }

@@ -136,7 +136,7 @@ async fn a_broker_that_keeps_nothing_retained_is_refused_with_a_reason() {
 async fn a_broker_that_is_not_there_is_named() {
     let error = MqttBench::start(external("mqtt://127.0.0.1:1")).await.err().unwrap();
     assert!(
-        matches!(&error, LinkError::Broker { address, .. } if address == "127.0.0.1:1"),
+        matches!(&error, LinkError::Broker { broker, .. } if broker == "mqtt://127.0.0.1:1"),
         "{error}"
     );
 }

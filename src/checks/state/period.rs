@@ -24,7 +24,8 @@ pub(in crate::checks) const PERIOD: Check = Check {
     decides: &["STATE-02"],
     doc: "While the device is connected, a state follows the last one within time.statePeriod (30 s and a margin). An \
           interval longer than the defaultStateInterval of its own factsheet is a warning. Time during which the \
-          harness disturbs the link or the device is not connected does not count.",
+          harness disturbs the link or the device is not connected does not count, and neither does what a broker does not \
+          deliver: a state counts when the tap sees it, and without a tap a device of which no state ever came is not judged.",
     arguments: &[],
     start: |_| Box::new(Period::default()),
 };
@@ -45,6 +46,10 @@ struct Period {
     /// Last state, or the moment from which one was due: time and entry.
     since: Option<(Moment, u64)>,
     remarked: Option<u64>,
+    /// When the tap saw a state that was not delivered yet.
+    sent: Option<Moment>,
+    /// Whether a state was ever delivered.
+    seen: bool,
     /// How long the harness was held up since then.
     lag: Duration,
     /// `defaultStateInterval`, once a factsheet came.
@@ -54,16 +59,20 @@ struct Period {
 impl Period {
     fn judge(&mut self, now: Moment, seq: u64, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let Some((since, _)) = self.since else { return false };
-        let gap = now.since(since);
+        // Whatever becomes of a state that the device has sent, it has sent one.
+        let gap = self.sent.unwrap_or(now).since(since);
         let limit = context.time("statePeriod").unwrap_or(Duration::from_secs(31));
         let seconds = gap.as_secs_f64();
         let net = gap.saturating_sub(self.lag);
-        if gap > limit && net <= limit {
-            let mut finding = remark(
-                "STATE-02",
-                seq,
-                format!("no state for {seconds:.1} s, but the harness itself was held up"),
-            );
+        let excuse = if net <= limit {
+            Some("the harness itself was held up")
+        } else if !self.seen && !self.traffic.tap {
+            Some("none ever came, and without a tap nobody can tell whether the broker keeps them to itself")
+        } else {
+            None
+        };
+        if let Some(excuse) = excuse.filter(|_| gap > limit) {
+            let mut finding = remark("STATE-02", seq, format!("no state for {seconds:.1} s, but {excuse}"));
             finding.verdict = Some(Verdict::Inconclusive);
             findings.push(finding);
         } else if gap > limit {
@@ -89,7 +98,7 @@ impl Running for Period {
             | Event::Packet {
                 packet: Packet::Disconnect { .. } | Packet::Connect { .. },
                 ..
-            } => self.since = None,
+            } => (self.since, self.sent) = (None, None),
             Event::Packet {
                 packet: Packet::Connack { code: 0, .. },
                 ..
@@ -98,20 +107,23 @@ impl Running for Period {
             _ if outside_influence(entry) => self.since = None,
             _ => {}
         }
-        if let Some((_, topic, ..)) = device_publish(entry)
-            && context.topic_name(topic).is_none()
-            && entry.json().and_then(looks_like) == Some("state")
-        {
-            // States do come. That they come elsewhere is one mistake, which `topic/names` names.
-            self.since = None;
+        if let Some((_, topic, ..)) = device_publish(entry) {
+            match context.topic_name(topic) {
+                Some("state") => _ = self.sent.get_or_insert(now.0),
+                // States do come. That they come elsewhere is one mistake, which `topic/names` names.
+                None if entry.json().and_then(looks_like) == Some("state") => self.since = None,
+                _ => {}
+            }
         }
         let Some(message) = self.traffic.delivered(entry, context) else {
             return false;
         };
         match message.name {
             "state" => {
+                self.seen = true;
                 let judged = !self.traffic.disturbed && self.judge(now.0, now.1, context, findings);
                 self.since = (!self.traffic.disturbed).then_some(now);
+                self.sent = None;
                 self.lag = Duration::ZERO;
                 judged
             }
@@ -258,6 +270,26 @@ mod tests {
         let mut trace = Trace::tap();
         trace.connected(1).wait(40.0);
         assert_eq!(trace.judge(CHECK).summary(), ["STATE-02"]);
+    }
+
+    #[test]
+    fn what_a_broker_does_not_deliver_is_not_held_against_the_device() {
+        let mut kept = Trace::tap();
+        kept.connected(1);
+        for _ in 0..4 {
+            kept.wait(20.0).publish(1, "state", 0, false, &json!({}));
+        }
+        assert!(kept.judge(CHECK).findings.is_empty());
+        // One that comes late is late.
+        let mut late = Trace::tap();
+        late.connected(1).wait(40.0).publish(1, "state", 0, false, &json!({}));
+        assert_eq!(late.wait(20.0).judge(CHECK).summary(), ["STATE-02"]);
+        // Without a tap nobody knows.
+        let mut unseen = Trace::subscriber();
+        unseen.connection("ONLINE").wait(40.0);
+        assert_eq!(unseen.judge(CHECK).summary(), ["STATE-02 inconclusive"]);
+        unseen.state(&json!({})).wait(40.0);
+        assert_eq!(unseen.judge(CHECK).summary(), ["STATE-02", "STATE-02"]);
     }
 
     #[test]

@@ -293,7 +293,7 @@ impl MemoryLink {
         match &self.broken {
             None => Ok(()),
             Some(reason) => Err(LinkError::Broker {
-                address: "memory".to_owned(),
+                broker: "memory".to_owned(),
                 reason: reason.clone(),
             }),
         }

@@ -5,11 +5,12 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use super::{ANSWER_LIMIT, BenchOptions, Reporter};
+use super::options::{ANSWER_LIMIT, BenchOptions};
 use crate::bench::LinkError;
 use crate::bench::client::{Client, ClientEvent, ClientOptions, REFUSED_SUBSCRIPTION};
 use crate::bench::endpoint::Endpoint;
-use crate::bench::own::OwnNames;
+use crate::bench::inbox::Reporter;
+use crate::bench::own::{OwnNames, User};
 use crate::journal::event::{Direction, Event, Payload, Source};
 
 /// Keep-alive of the harness's own connections.
@@ -52,7 +53,7 @@ pub(super) async fn standing(
 fn refused(reason: String, endpoint: &Endpoint, options: &BenchOptions) -> LinkError {
     match reason.strip_prefix(REFUSED_SUBSCRIPTION) {
         Some(filters) => LinkError::Forbidden {
-            address: endpoint.address(),
+            broker: endpoint.url(),
             what: format!("the subscription to {filters}"),
             rules: rules(endpoint, options),
         },
@@ -60,19 +61,30 @@ fn refused(reason: String, endpoint: &Endpoint, options: &BenchOptions) -> LinkE
     }
 }
 
-pub(super) fn rules(endpoint: &Endpoint, options: &BenchOptions) -> String {
-    let user = endpoint
-        .credentials
-        .as_ref()
-        .map(|credentials| credentials.username.as_str());
-    options.own.access_rules(user, &options.device_topics)
+/// Under which name the harness logs in.
+pub(super) fn user(endpoint: &Endpoint) -> User {
+    let credentials = endpoint.credentials.as_ref();
+    User(credentials.map(|credentials| credentials.username.clone()))
+}
+
+fn rules(endpoint: &Endpoint, options: &BenchOptions) -> String {
+    options.own.access_rules(&user(endpoint), None, &options.device_topics)
 }
 
 pub(super) fn without_own_topics(what: &str, endpoint: &Endpoint, options: &BenchOptions) -> String {
     format!(
         "The broker at {} does not allow {what}, so it was not tested whether it keeps QoS, RETAIN and last wills, and \
          nothing is said about what must never come. These access rules allow it, as mosquitto has them: {}",
-        endpoint.address(),
+        endpoint.url(),
+        rules(endpoint, options).replace('\n', "; ")
+    )
+}
+
+pub(super) fn without_echo(endpoint: &Endpoint, options: &BenchOptions) -> String {
+    format!(
+        "The broker at {} does not let the harness read the topics on which it publishes, so nobody can tell whether it takes \
+         what is sent to the device. These access rules allow it, as mosquitto has them: {}",
+        endpoint.url(),
         rules(endpoint, options).replace('\n', "; ")
     )
 }

@@ -5,7 +5,8 @@ use toml::de::DeValue;
 
 use super::{Entry, Reader};
 use crate::diagnostic;
-use crate::profile::hooks::{HOOKS, Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
+use crate::profile::hook_action::{Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
+use crate::profile::hooks::HOOKS;
 use crate::profile::key::{COMMON_PLACEHOLDERS, Kind};
 use crate::profile::secret::SecretText;
 use crate::profile::value::{self, Value};
