@@ -449,7 +449,10 @@ impl TestJudge {
             (Some(trouble), _, _) => trouble.clone(),
             (None, Ok(()), _) if hidden.is_some() => hidden.unwrap_or_default(),
             (None, Err(why), _) => why.clone(),
-            (None, Ok(()), Err(why)) => format!("an earlier step failed: {why}"),
+            (None, Ok(()), Err(why)) => {
+                let unless = self.interference.as_ref().map(|other| format!("; but {other}"));
+                format!("an earlier step failed: {why}{}", unless.unwrap_or_default())
+            }
             (None, Ok(()), Ok(())) => "the test ended before this was judged".to_owned(),
         };
         let run: Vec<String> = self.result.steps.iter().map(|step| step.path.clone()).collect();

@@ -1,82 +1,14 @@
 //! Hooks that reach real systems: over HTTPS, with tokens that nobody reads afterwards.
 
-use std::io::{Read as _, Write as _};
-use std::net::{TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
-
-use tokio_rustls::rustls::pki_types::pem::PemObject as _;
-use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
-use tokio_rustls::rustls::{ServerConfig, ServerConnection, StreamOwned, crypto::ring};
+use std::path::PathBuf;
 
 use crate::bench::{Bench, Profile};
 use crate::certificates;
+use crate::https::Server;
 use crate::tool::{Running, tool};
 
 /// Asks for an emergency stop and its release.
 const STOP: &str = "state/emergency-stop";
-
-/// A fleet manager that speaks HTTPS: it answers what the path says, and keeps what it was asked.
-struct Fleet {
-    port: u16,
-    asked: Arc<Mutex<Vec<String>>>,
-}
-
-impl Fleet {
-    fn start(folder: &Path) -> Self {
-        let chain = CertificateDer::pem_file_iter(folder.join("server.crt")).unwrap();
-        let chain = chain.map(Result::unwrap).collect();
-        let key = PrivateKeyDer::from_pem_file(folder.join("server.key")).unwrap();
-        let config = ServerConfig::builder_with_provider(ring::default_provider().into())
-            .with_safe_default_protocol_versions()
-            .unwrap()
-            .with_no_client_auth()
-            .with_single_cert(chain, key)
-            .unwrap();
-        let config = Arc::new(config);
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let port = listener.local_addr().unwrap().port();
-        let asked = Arc::new(Mutex::new(Vec::new()));
-        let kept = Arc::clone(&asked);
-        std::thread::spawn(move || {
-            for socket in listener.incoming() {
-                let connection = ServerConnection::new(Arc::clone(&config)).unwrap();
-                answer(StreamOwned::new(connection, socket.unwrap()), &kept);
-            }
-        });
-        Self { port, asked }
-    }
-
-    fn url(&self, path: &str) -> String {
-        format!("https://localhost:{}/{path}", self.port)
-    }
-}
-
-fn answer(mut stream: StreamOwned<ServerConnection, TcpStream>, asked: &Mutex<Vec<String>>) {
-    let mut request = Vec::new();
-    let mut part = [0; 4096];
-    while !request.windows(4).any(|end| end == b"\r\n\r\n") {
-        match stream.read(&mut part) {
-            Ok(length @ 1..) => request.extend_from_slice(&part[..length]),
-            _ => return,
-        }
-    }
-    let request = String::from_utf8(request).unwrap();
-    let code = request
-        .split('/')
-        .nth(1)
-        .unwrap()
-        .split(['?', ' '])
-        .next()
-        .unwrap()
-        .to_owned();
-    asked.lock().unwrap().push(request);
-    let _ = write!(
-        stream,
-        "HTTP/1.1 {code} Because\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
-    );
-    let _ = stream.flush();
-}
 
 /// Everything a run has written, by file.
 fn written(bench: &Bench) -> Vec<(PathBuf, String)> {
@@ -100,7 +32,7 @@ fn a_request_with_a_token_is_made_over_https_and_no_secret_is_left_anywhere() {
     const SECRETS: [&str; 4] = ["token-of-env", "token-of-file", "token-of-url", "password-of-url"];
     let bench = Bench::new();
     certificates::make(bench.path());
-    let fleet = Fleet::start(bench.path());
+    let fleet = Server::start(bench.path());
     std::fs::write(bench.path().join("key"), "token-of-file\n").unwrap();
     let mut profile = Profile::impatient();
     profile.bench = "tls-ca = \"ca.crt\"\n".to_owned();
@@ -162,7 +94,7 @@ fn conflict_and_not_to_be_processed_are_understood_and_refused() {
     for code in ["409", "422"] {
         let bench = Bench::new();
         certificates::make(bench.path());
-        let fleet = Fleet::start(bench.path());
+        let fleet = Server::start(bench.path());
         let mut profile = Profile::impatient();
         profile.bench = "tls-ca = \"ca.crt\"\n".to_owned();
         let url = fleet.url(code);
@@ -186,7 +118,7 @@ fn conflict_and_not_to_be_processed_are_understood_and_refused() {
 fn a_server_that_nobody_vouches_for_and_a_token_that_is_not_there_are_named() {
     let bench = Bench::new();
     certificates::make(bench.path());
-    let fleet = Fleet::start(bench.path());
+    let fleet = Server::start(bench.path());
     let hooks = |headers: &str| {
         let url = fleet.url("204");
         format!(

@@ -16,6 +16,7 @@ mod exploring;
 mod following;
 mod hooks;
 mod hostile;
+mod https;
 mod inspecting;
 mod interrupted;
 mod mosquitto;

@@ -5,9 +5,11 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::bench::{Bench, MANUFACTURER, SERIAL};
+use crate::certificates;
+use crate::https::Server;
 use crate::mosquitto::{Mosquitto, free_port};
 use crate::scripted::topic;
 use crate::tool::{Ended, Running, run, tool};
@@ -50,6 +52,75 @@ fn it_is_online_until_it_is_interrupted_and_offline_afterwards() {
     agv.interrupt();
     agv.end().code(0);
     retained(mosquitto.port, "OFFLINE");
+}
+
+/// How an action that is sent to the vehicle ends.
+fn end_of_action(port: u16, action: &Value) -> Value {
+    let mut options = rumqttc::MqttOptions::new("commander", "127.0.0.1", port);
+    options.set_max_packet_size(1 << 20, 1 << 20);
+    let (client, mut connection) = rumqttc::Client::new(options, 10);
+    client.subscribe(topic("state"), rumqttc::QoS::AtMostOnce).unwrap();
+    let message = json!({
+        "headerId": 1, "timestamp": "2026-01-01T08:00:00.00Z", "version": "2.1.0",
+        "manufacturer": MANUFACTURER, "serialNumber": SERIAL, "actions": [action],
+    });
+    let message = message.to_string();
+    client
+        .publish(topic("instantActions"), rumqttc::QoS::AtMostOnce, false, message)
+        .unwrap();
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(30) {
+        let Ok(Ok(event)) = connection.recv_timeout(Duration::from_secs(1)) else {
+            continue;
+        };
+        let rumqttc::Event::Incoming(rumqttc::Packet::Publish(message)) = event else {
+            continue;
+        };
+        let state: Value = serde_json::from_slice(&message.payload).unwrap();
+        let mut actions = state["actionStates"].as_array().unwrap().iter();
+        let shown = actions.find(|shown| shown["actionId"] == action["actionId"]);
+        if let Some(shown) =
+            shown.filter(|shown| shown["actionStatus"] == "FINISHED" || shown["actionStatus"] == "FAILED")
+        {
+            return json!([shown["actionStatus"], state["maps"]]);
+        }
+    }
+    panic!("the action does not end");
+}
+
+#[test]
+fn maps_are_fetched_over_https_where_the_given_authority_vouches_for_the_server() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    certificates::make(bench.path());
+    let server = Server::start(bench.path());
+    for (more, status) in [(&["--tls-ca", "ca.crt"][..], "FINISHED"), (&[], "FAILED")] {
+        let mut agv = bench.agv_with(mosquitto.port, more);
+        agv.line("1 simulated AGV(s) on ");
+        let parameter = |key: &str, value: &str| json!({ "key": key, "value": value });
+        let ended = end_of_action(
+            mosquitto.port,
+            &json!({
+                "actionType": "downloadMap", "actionId": format!("fetch-{status}"), "blockingType": "NONE",
+                "actionParameters": [
+                    parameter("mapId", "hall"), parameter("mapVersion", "7"),
+                    parameter("mapDownloadLink", &server.url("200/hall.map")),
+                ],
+            }),
+        );
+        assert_eq!(ended[0], status);
+        let maps = ended[1].as_array().unwrap();
+        assert_eq!(
+            maps.iter().any(|map| map["mapId"] == "hall"),
+            status == "FINISHED",
+            "{maps:?}"
+        );
+        agv.interrupt();
+        agv.end().code(0);
+    }
+    let asked = server.asked.lock().unwrap();
+    assert_eq!(asked.len(), 1, "who is not trusted is not asked: {asked:?}");
+    assert!(asked[0].starts_with("GET /200/hall.map "), "{asked:?}");
 }
 
 #[test]
