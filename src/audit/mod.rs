@@ -7,8 +7,10 @@
 
 mod arrival;
 mod arrived;
+pub mod bundle;
 mod cause;
 mod continuity;
+pub mod crew;
 mod news;
 mod outcome;
 mod own_run;
@@ -18,6 +20,7 @@ mod scope;
 mod side;
 mod single;
 pub mod slice;
+pub mod time_line;
 mod topics;
 mod vehicle;
 mod wires;
@@ -187,7 +190,12 @@ impl<'r> Audit<'r> {
         if message.after_gap {
             self.interrupted();
         }
-        self.messages += 1;
+        self.numbered(self.messages + 1, message);
+    }
+
+    /// Shows it the message of that number.
+    fn numbered(&mut self, number: u64, message: Message) {
+        self.messages = number;
         self.first = self.first.or(message.at);
         self.last = message.at.or(self.last);
         let Some(named) = self.topics.read(&message.topic) else {
@@ -236,6 +244,11 @@ impl<'r> Audit<'r> {
 
     /// Shows it something of a connection.
     pub fn wire(&mut self, wire: Wire) {
+        self.wire_at(self.messages + 1, wire);
+    }
+
+    /// Shows it something of a connection before the message of that number.
+    fn wire_at(&mut self, number: u64, wire: Wire) {
         let named = match &wire.event {
             WireEvent::Packet {
                 packet: Packet::Publish { topic, .. },
@@ -252,7 +265,7 @@ impl<'r> Audit<'r> {
             places: &self.places,
             live: self.live,
         };
-        let missing = self.wires.take(wire, self.messages + 1, key, &mut self.vehicles, scene);
+        let missing = self.wires.take(wire, number, key, &mut self.vehicles, scene);
         for key in missing {
             if let Some(vehicle) = self.vehicles.get_mut(&key) {
                 vehicle.interrupted(scene);
@@ -314,6 +327,8 @@ impl<'r> Audit<'r> {
     }
 }
 
+#[cfg(test)]
+mod site_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

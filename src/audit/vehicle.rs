@@ -14,6 +14,7 @@ use super::news::Found;
 use super::outcome::Outcome;
 use super::result::VehicleResult;
 use super::side::Side;
+use super::time_line::TimeLine;
 use super::topics::Named;
 use crate::capture::Message;
 use crate::clock::{Moment, Stamp};
@@ -60,6 +61,7 @@ pub(super) struct Vehicle {
     stale: u64,
     /// When a message of this topic was seen last on its way from its sender.
     first_hand: BTreeMap<String, Option<jiff::Timestamp>>,
+    time_line: TimeLine,
     /// Whether its connections were judged.
     wired: bool,
     /// What came out while it spoke another version.
@@ -89,6 +91,7 @@ impl Vehicle {
             twice: 0,
             stale: 0,
             first_hand: BTreeMap::new(),
+            time_line: TimeLine::default(),
             wired: false,
             earlier: Vec::new(),
             news: Vec::new(),
@@ -176,10 +179,11 @@ impl Vehicle {
 
     /// Takes over what was found of a connection.
     pub fn wired(&mut self, role: Role, outcome: Outcome, scene: Scene<'_>) {
-        let mut sides = self.sides.iter_mut().flat_map(|sides| &mut sides.all);
-        if let Some(side) = sides.find(|side| side.role == role) {
+        let sides = self.sides.iter_mut().flat_map(|sides| &mut sides.all);
+        for side in sides.filter(|side| side.role == role) {
             self.wired = true;
             side.wired(outcome, scene);
+            return;
         }
     }
 
@@ -228,6 +232,9 @@ impl Vehicle {
 
     /// A message whose turn it is.
     fn pass(&mut self, arrived: Arrived, scene: Scene<'_>) {
+        if let Some(message) = arrived.entry.json().filter(|_| !arrived.stale) {
+            self.time_line.note(&arrived.name, message, arrived.at.utc);
+        }
         if self.is_updated(&arrived) {
             let concluded = self.conclude(scene);
             self.earlier.push(concluded);
@@ -459,6 +466,7 @@ impl Vehicle {
             twice: std::mem::take(&mut self.twice),
             retained: std::mem::take(&mut self.stale),
             vantage: if self.wired { "tap" } else { "subscriber" }.to_owned(),
+            time_line: std::mem::take(&mut self.time_line),
             sides,
         }
     }

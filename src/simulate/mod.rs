@@ -11,6 +11,7 @@ mod peer;
 mod reference_agv;
 mod reference_master_control;
 mod running_fleet;
+mod site;
 mod unknown;
 
 pub use built_in::BuiltIn;
@@ -19,4 +20,5 @@ pub use hook_server::HookServer;
 pub use reference_agv::{ReferenceAgv, Vehicle};
 pub use reference_master_control::ReferenceMasterControl;
 pub use running_fleet::WithFleet;
+pub use site::{Injected, KINDS, Kind, Messages, Site, SiteMessage};
 pub use unknown::UnknownName;

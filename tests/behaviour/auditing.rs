@@ -1,11 +1,12 @@
 //! `audit`: recordings of several tools, and what is found in them.
 
 use std::fs;
+use std::io::Write as _;
 
 use serde_json::Value;
 
 use crate::bench::{Bench, QUICK};
-use crate::tool::{Ended, run, run_in};
+use crate::tool::{Ended, Running, run, run_in, tool};
 
 fn capture(name: &str) -> String {
     format!("{}/fixtures/captures/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -163,4 +164,33 @@ fn a_slice_shows_its_finding_to_whoever_gets_it() {
         .run(&["audit", &whole, "--slice", "NO-SUCH"])
         .code(2)
         .says("NO-SUCH");
+}
+
+#[test]
+fn the_bundle_of_an_audit_is_for_programs_build_servers_and_people() {
+    let bench = Bench::new();
+    let whole = capture("horizon-missing.jsonl");
+    bench.run(&["audit", &whole, "--out", "audits/monday"]).code(1);
+    let read = |name: &str| fs::read_to_string(bench.path().join("audits/monday").join(name)).unwrap();
+    assert!(read("report.html").contains("<svg") && read("report.html").contains("STATE-12"));
+    assert!(read("junit.xml").contains("type=\"STATE-12\""));
+    let result: Value = serde_json::from_str(&read("result.json")).unwrap();
+    assert!(result["vehicles"][0]["timeLine"]["order"].is_array());
+}
+
+#[test]
+fn a_recording_that_grows_is_followed() {
+    let bench = Bench::new();
+    let whole = fs::read_to_string(capture("horizon-missing.jsonl")).unwrap();
+    let all: Vec<&str> = whole.lines().collect();
+    let path = bench.path().join("site.jsonl");
+    fs::write(&path, format!("{}\n", all[..5].join("\n"))).unwrap();
+    let mut following = Running::start(&mut tool(bench.path(), &["audit", "site.jsonl", "--follow"]));
+    let mut file = fs::OpenOptions::new().append(true).open(&path).unwrap();
+    writeln!(file, "{}", all[5..].join("\n")).unwrap();
+    following.until("a finding", |following| {
+        following.stdout().contains("STATE-12").then_some(())
+    });
+    following.interrupt();
+    following.end().code(1).prints("1 vehicle;");
 }
