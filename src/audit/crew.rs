@@ -5,8 +5,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use super::result::{AuditResult, Recording, verdict_of};
-use super::{Audit, AuditError, Options};
-use crate::capture::{Message, Told, Wire};
+use super::{Address, Audit, AuditError, Options};
+use crate::capture::{Message, Told, Wire, WireEvent};
+use crate::journal::event::Packet;
 use crate::judge::Rules;
 
 /// How many messages are handed over at once, and how many times as many wait.
@@ -18,7 +19,8 @@ const MOST: usize = 4;
 /// What a thread is told.
 enum Job {
     Message(u64, Message),
-    Wire(u64, Wire),
+    /// Whether it is a message of a vehicle that another thread judges.
+    Wire(u64, Wire, bool),
     Interrupted,
 }
 
@@ -52,14 +54,34 @@ pub struct Crew<'r> {
 }
 
 impl Crew<'_> {
+    /// How many messages were handed on.
+    #[must_use]
+    pub fn messages(&self) -> u64 {
+        self.desk.messages
+    }
+
+    /// Whose topic this is; `None` for one of no vehicle, or of one that is not wanted.
+    #[must_use]
+    pub fn address(&self, topic: &str) -> Option<Address> {
+        self.desk.address(topic)
+    }
+
     /// Hands on what is told next.
     pub fn take(&mut self, told: Told) {
         match told {
             Told::Message(message) => self.message(message),
             Told::Wire(wire) => {
                 let number = self.desk.messages + 1;
-                for hand in &mut self.hands {
-                    hand.take(Job::Wire(number, wire.clone()));
+                let owner = match &wire.event {
+                    WireEvent::Packet {
+                        packet: Packet::Publish { topic, .. },
+                        sent: true,
+                    } => self.desk.address(topic).map(|address| self.owner(&address)),
+                    _ => None,
+                };
+                for (at, hand) in self.hands.iter_mut().enumerate() {
+                    let elsewhere = owner.is_some_and(|owner| owner != at);
+                    hand.take(Job::Wire(number, wire.clone(), elsewhere));
                 }
             }
         }
@@ -79,12 +101,18 @@ impl Crew<'_> {
             desk.elsewhere += 1;
             return;
         };
+        let number = desk.messages;
+        let owner = self.owner(&address);
+        if let Some(hand) = self.hands.get_mut(owner) {
+            hand.take(Job::Message(number, message));
+        }
+    }
+
+    /// Which of the threads judges a vehicle.
+    fn owner(&self, address: &Address) -> usize {
         let mut hasher = DefaultHasher::new();
         address.vehicle.hash(&mut hasher);
-        let number = usize::try_from(hasher.finish() % self.hands.len().max(1) as u64).unwrap_or_default();
-        if let Some(hand) = self.hands.get_mut(number) {
-            hand.take(Job::Message(desk.messages, message));
-        }
+        usize::try_from(hasher.finish() % self.hands.len().max(1) as u64).unwrap_or_default()
     }
 }
 
@@ -140,7 +168,7 @@ fn work(rules: &Rules, options: &Options, inbox: &Receiver<Vec<Job>>) -> Result<
         for job in jobs {
             match job {
                 Job::Message(number, message) => audit.numbered(number, message),
-                Job::Wire(number, wire) => audit.wire_at(number, wire),
+                Job::Wire(number, wire, elsewhere) => audit.wire_at(number, wire, elsewhere),
                 Job::Interrupted => audit.interrupted(),
             }
         }
@@ -179,10 +207,14 @@ mod tests {
             }
         }
         let mut single = Audit::new(&library.rules, Options::default()).expect("options");
-        all.iter().for_each(|message| single.observe(message.clone()));
+        for message in &all {
+            single.observe(message.clone());
+        }
         let single = single.finish(Vec::new());
         let crew = judged::<AuditError>(&library.rules, &Options::default(), |crew| {
-            all.into_iter().for_each(|message| crew.take(Told::Message(message)));
+            for message in all {
+                crew.take(Told::Message(message));
+            }
             Ok(Vec::new())
         });
         let crew = crew.expect("judged");

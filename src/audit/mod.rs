@@ -11,6 +11,8 @@ pub mod bundle;
 mod cause;
 mod continuity;
 pub mod crew;
+pub mod export;
+mod header;
 mod news;
 mod outcome;
 mod own_run;
@@ -38,7 +40,7 @@ use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
 pub use single::{Flaw, single};
 use topics::{Named, Topics};
 use vehicle::Vehicle;
-use wires::Wires;
+use wires::{Publisher, Wires};
 
 /// How many vehicles are judged; messages of further ones are counted.
 const VEHICLES: usize = 10_000;
@@ -244,11 +246,12 @@ impl<'r> Audit<'r> {
 
     /// Shows it something of a connection.
     pub fn wire(&mut self, wire: Wire) {
-        self.wire_at(self.messages + 1, wire);
+        self.wire_at(self.messages + 1, wire, false);
     }
 
-    /// Shows it something of a connection before the message of that number.
-    fn wire_at(&mut self, number: u64, wire: Wire) {
+    /// Shows it something of a connection before the message of that number; `elsewhere` says that it is a message of a
+    /// vehicle that another thread judges.
+    fn wire_at(&mut self, number: u64, wire: Wire, elsewhere: bool) {
         let named = match &wire.event {
             WireEvent::Packet {
                 packet: Packet::Publish { topic, .. },
@@ -257,15 +260,18 @@ impl<'r> Audit<'r> {
             _ => None,
         };
         let wanted = |named: &&Named| self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
-        let key = named.as_ref().filter(wanted);
-        let key = key.map(|named| (named.key.clone(), named.name.as_str()));
+        let publisher = named.as_ref().filter(wanted).map(|named| Publisher {
+            vehicle: named.key.clone(),
+            topic: &named.name,
+            elsewhere,
+        });
         let scene = Scene {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
             live: self.live,
         };
-        let missing = self.wires.take(wire, number, key, &mut self.vehicles, scene);
+        let missing = self.wires.take(wire, number, publisher, &mut self.vehicles, scene);
         for key in missing {
             if let Some(vehicle) = self.vehicles.get_mut(&key) {
                 vehicle.interrupted(scene);
