@@ -10,15 +10,19 @@
     reason = "a test may fail by panicking"
 )]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use vda5050_tck::audit::{Options, own_run};
+use vda5050_tck::capture::{Item, Mapping, Recorded};
+use vda5050_tck::journal::file::JournalWriter;
 use vda5050_tck::judge::judge;
+use vda5050_tck::pack::Role;
 use vda5050_tck::qualify::decided;
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::Library;
+use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::{Accumulated, Verdict};
 
 /// Requirement id to verdict; nothing means that it must not be decided.
@@ -140,5 +144,85 @@ fn a_journal_without_its_end_gives_no_better_verdict() {
                 beginning.verdict
             );
         }
+    }
+}
+
+/// Monitor, requirement, verdict and count of what monitors found.
+type Found = BTreeSet<(String, String, Verdict, u64)>;
+
+fn of_run(result: &RunResult) -> Found {
+    let monitors = result.monitors.iter();
+    let all = monitors.flat_map(|monitor| monitor.findings.iter().map(move |finding| (monitor, finding)));
+    all.map(|(monitor, finding)| {
+        let requirement = finding.requirement.clone();
+        (monitor.id.clone(), requirement, finding.verdict, finding.count)
+    })
+    .collect()
+}
+
+/// What the audit finds in the file, which knows nothing of the run.
+fn of_audit(library: &Library, journal: &Path) -> Found {
+    let name = journal.display();
+    let mut recorded = Recorded::open(journal, 0, Mapping::default()).unwrap_or_else(|error| panic!("{error}"));
+    let Ok(Some(Item::Record(first))) = recorded.read() else {
+        panic!("{name} is no journal");
+    };
+    let vehicle = own_run(&library.rules, &Options::default(), 0, *first, &mut recorded);
+    let vehicle = vehicle.unwrap_or_else(|error| panic!("{name}: {error}"));
+    let sides = vehicle.sides.into_iter();
+    let all = sides.flat_map(|side| [side.findings, side.information].concat());
+    all.map(|finding| (finding.monitor, finding.requirement, finding.verdict, finding.count))
+        .collect()
+}
+
+#[test]
+fn the_journal_of_a_run_is_audited_like_the_run_was_judged() {
+    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let kept = std::fs::read_dir(root.join("fixtures/journals")).expect("fixtures/journals");
+    let mut journals: Vec<PathBuf> = kept.map(|entry| entry.expect("a folder").path()).collect();
+    journals.retain(|path| path.is_dir());
+    journals.push(root.join("reports/example"));
+    for folder in journals {
+        let path = folder.join("journal.jsonl");
+        let saved = vda5050_tck::journal::file::read(&path).expect("a journal");
+        let result = judge(&library.rules, saved.journal.entries()).expect("judged");
+        assert_eq!(of_audit(&library, &path), of_run(&result), "{}", path.display());
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    for (role, faults) in [
+        (
+            Role::Agv,
+            &["", "header-id-constant", "horizon-not-reported", "never-reconnects"][..],
+        ),
+        (
+            Role::MasterControl,
+            &["", "starts-elsewhere", "other-serial-number"][..],
+        ),
+    ] {
+        let mut found = 0;
+        for (fault, pack) in faults
+            .iter()
+            .flat_map(|fault| library.rules.packs.all().iter().map(move |pack| (fault, pack)))
+        {
+            let mut request = VirtualRun::of_role(role, &library, pack);
+            request.faults.extend((!fault.is_empty()).then(|| (*fault).to_owned()));
+            let run = run_silently(&library, pack, request).expect("a run");
+            let path = folder.path().join("journal.jsonl");
+            let mut writer = JournalWriter::create(&path).expect("a file");
+            for entry in run.recorder.journal().entries() {
+                writer.write(&entry.record).expect("written");
+            }
+            drop(writer);
+            let of_run = of_run(&run.result);
+            found += of_run.len();
+            assert_eq!(
+                of_audit(&library, &path),
+                of_run,
+                "{role} {fault}, VDA 5050 {}",
+                pack.version
+            );
+        }
+        assert!(found > 2, "{role}: nothing was found that could be compared");
     }
 }

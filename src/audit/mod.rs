@@ -7,8 +7,12 @@
 
 mod arrival;
 mod arrived;
+pub mod bundle;
 mod cause;
 mod continuity;
+pub mod crew;
+pub mod export;
+mod header;
 mod news;
 mod outcome;
 mod own_run;
@@ -18,6 +22,7 @@ mod scope;
 mod side;
 mod single;
 pub mod slice;
+pub mod time_line;
 mod topics;
 mod vehicle;
 mod wires;
@@ -35,7 +40,7 @@ use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
 pub use single::{Flaw, single};
 use topics::{Named, Topics};
 use vehicle::Vehicle;
-use wires::Wires;
+use wires::{Publisher, Wires};
 
 /// How many vehicles are judged; messages of further ones are counted.
 const VEHICLES: usize = 10_000;
@@ -187,7 +192,12 @@ impl<'r> Audit<'r> {
         if message.after_gap {
             self.interrupted();
         }
-        self.messages += 1;
+        self.numbered(self.messages + 1, message);
+    }
+
+    /// Shows it the message of that number.
+    fn numbered(&mut self, number: u64, message: Message) {
+        self.messages = number;
         self.first = self.first.or(message.at);
         self.last = message.at.or(self.last);
         let Some(named) = self.topics.read(&message.topic) else {
@@ -236,6 +246,12 @@ impl<'r> Audit<'r> {
 
     /// Shows it something of a connection.
     pub fn wire(&mut self, wire: Wire) {
+        self.wire_at(self.messages + 1, wire, false);
+    }
+
+    /// Shows it something of a connection before the message of that number; `elsewhere` says that it is a message of a
+    /// vehicle that another thread judges.
+    fn wire_at(&mut self, number: u64, wire: Wire, elsewhere: bool) {
         let named = match &wire.event {
             WireEvent::Packet {
                 packet: Packet::Publish { topic, .. },
@@ -244,15 +260,18 @@ impl<'r> Audit<'r> {
             _ => None,
         };
         let wanted = |named: &&Named| self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
-        let key = named.as_ref().filter(wanted);
-        let key = key.map(|named| (named.key.clone(), named.name.as_str()));
+        let publisher = named.as_ref().filter(wanted).map(|named| Publisher {
+            vehicle: named.key.clone(),
+            topic: &named.name,
+            elsewhere,
+        });
         let scene = Scene {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
             live: self.live,
         };
-        let missing = self.wires.take(wire, self.messages + 1, key, &mut self.vehicles, scene);
+        let missing = self.wires.take(wire, number, publisher, &mut self.vehicles, scene);
         for key in missing {
             if let Some(vehicle) = self.vehicles.get_mut(&key) {
                 vehicle.interrupted(scene);
@@ -314,6 +333,8 @@ impl<'r> Audit<'r> {
     }
 }
 
+#[cfg(test)]
+mod site_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Options;
 use super::result::{FindingResult, SideResult, VehicleResult};
+use super::time_line::TimeLine;
 use crate::capture::{Item, Recorded};
 use crate::journal::Entry;
 use crate::journal::event::{Event, Record, RunHeader};
@@ -79,6 +80,7 @@ pub fn own_run(
         twice: 0,
         retained: 0,
         vantage: header.vantage,
+        time_line: TimeLine::default(),
         sides: vec![side],
     })
 }

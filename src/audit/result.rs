@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use serde::Serialize;
 
+use super::time_line::TimeLine;
 use crate::capture::Place;
 use crate::pack::Role;
 use crate::verdict::{Accumulated, Verdict};
@@ -78,6 +79,9 @@ pub struct VehicleResult {
     pub retained: u64,
     /// `subscriber`, or `tap` where packets were recorded.
     pub vantage: String,
+    /// What it did over time.
+    #[serde(skip_serializing_if = "TimeLine::is_empty")]
+    pub time_line: TimeLine,
     /// Its sides.
     pub sides: Vec<SideResult>,
 }

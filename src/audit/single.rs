@@ -1,17 +1,14 @@
 //! One message, judged by itself: what it breaks whatever came before and comes after.
 
-use std::collections::BTreeMap;
-
 use bytes::Bytes;
-use serde_json::{Map, Value, json};
 
+use super::header::header;
 use super::scope::{self, Use};
 use crate::clock::{Moment, Stamp};
-use crate::journal::event::{Direction, Event, MockVehicle, Record, RunHeader, Source};
+use crate::journal::event::{Direction, Event, Record, Source};
 use crate::journal::{Entry, Payload};
 use crate::judge::{Rules, SideJudge};
-use crate::pack::{Pack, Role};
-use crate::profile::TimeLimits;
+use crate::pack::Pack;
 use crate::verdict::Verdict;
 
 /// What is wrong with a message.
@@ -60,7 +57,9 @@ pub fn single(rules: &Rules, pack: &Pack, name: &str, payload: &Bytes) -> Vec<Fl
         moment: Moment::START,
         utc: text("timestamp").parse().unwrap_or_default(),
     };
-    let header = header(publisher, pack, &text("manufacturer"), &text("serialNumber"));
+    let names = pack.topics().iter().map(|rule| rule.name.as_str());
+    let topics = names.map(|name| (name.to_owned(), topic(name))).collect();
+    let header = header(publisher, pack, &text("manufacturer"), &text("serialNumber"), topics);
     // Topics are no part of a message.
     let is_meant = |id: &str| scope::of(id) == Some(Use::EachMessage) && !id.starts_with("topic/");
     let Ok(mut judge) = SideJudge::begin(rules, &header, &|monitor| is_meant(&monitor.id)) else {
@@ -109,37 +108,10 @@ fn record(seq: u64, at: Stamp, event: Event) -> Record {
     }
 }
 
-fn header(role: Role, pack: &Pack, manufacturer: &str, serial_number: &str) -> RunHeader {
-    let names = pack.topics().iter().map(|rule| rule.name.as_str());
-    let topics: BTreeMap<String, String> = names.map(|name| (name.to_owned(), topic(name))).collect();
-    let identity = json!({ "manufacturer": manufacturer, "serialNumber": serial_number });
-    let mut bindings = Map::new();
-    bindings.insert("time".to_owned(), Value::Object(TimeLimits::default().bindings()));
-    bindings.insert("device".to_owned(), identity.clone());
-    let mut vehicles = Vec::new();
-    if role == Role::MasterControl {
-        bindings.insert("vehicle".to_owned(), identity);
-        vehicles.push(MockVehicle {
-            manufacturer: manufacturer.to_owned(),
-            serial_number: serial_number.to_owned(),
-            topics: topics.clone(),
-        });
-    }
-    RunHeader {
-        role: role.word().to_owned(),
-        protocol: pack.version.to_string(),
-        manufacturer: manufacturer.to_owned(),
-        serial_number: serial_number.to_owned(),
-        topics,
-        vehicles,
-        vantage: "subscriber".to_owned(),
-        bindings,
-        ..RunHeader::default()
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use serde_json::Value;
+
     use super::*;
     use crate::run::Library;
 

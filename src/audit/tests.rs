@@ -55,7 +55,7 @@ impl Dice {
 
 /// The same as a bad recorder has it: begun in the middle, one in a hundred lost, one in a hundred twice, and out of
 /// order within 50 milliseconds.
-fn spoiled(all: &[Message], seed: u64) -> Vec<Message> {
+pub(super) fn spoiled(all: &[Message], seed: u64) -> Vec<Message> {
     let mut dice = Dice(seed);
     let begin = usize::try_from(dice.below(all.len() as u64 / 2)).expect("small");
     let mut kept = Vec::new();

@@ -4,24 +4,25 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 
 use super::Scene;
 use super::arrival::{Known, Sorted};
 use super::arrived::{Arrived, is_at_rest, of_side, timestamp, version};
 use super::continuity::{Continuity, Step};
+use super::header::header;
 use super::news::Found;
 use super::outcome::Outcome;
 use super::result::VehicleResult;
 use super::side::Side;
+use super::time_line::TimeLine;
 use super::topics::Named;
 use crate::capture::Message;
 use crate::clock::{Moment, Stamp};
-use crate::journal::event::{Event, MockVehicle, Record, RunHeader, Source};
+use crate::journal::event::{Event, Record, RunHeader, Source};
 use crate::journal::{Entry, Payload};
 use crate::pack::{Pack, Role};
 use crate::pattern::whole;
-use crate::profile::TimeLimits;
 
 /// How many messages wait until the vehicle has said which version it speaks.
 const WAITING: usize = 64;
@@ -60,6 +61,7 @@ pub(super) struct Vehicle {
     stale: u64,
     /// When a message of this topic was seen last on its way from its sender.
     first_hand: BTreeMap<String, Option<jiff::Timestamp>>,
+    time_line: TimeLine,
     /// Whether its connections were judged.
     wired: bool,
     /// What came out while it spoke another version.
@@ -89,6 +91,7 @@ impl Vehicle {
             twice: 0,
             stale: 0,
             first_hand: BTreeMap::new(),
+            time_line: TimeLine::default(),
             wired: false,
             earlier: Vec::new(),
             news: Vec::new(),
@@ -228,6 +231,9 @@ impl Vehicle {
 
     /// A message whose turn it is.
     fn pass(&mut self, arrived: Arrived, scene: Scene<'_>) {
+        if let Some(message) = arrived.entry.json().filter(|_| !arrived.stale) {
+            self.time_line.note(&arrived.name, message, arrived.at.utc);
+        }
         if self.is_updated(&arrived) {
             let concluded = self.conclude(scene);
             self.earlier.push(concluded);
@@ -286,9 +292,8 @@ impl Vehicle {
             return;
         };
         self.identify();
-        let header = |role: Role| self.header(role, &pack);
         let roles = [Role::Agv, Role::MasterControl];
-        let sides = roles.map(|role| Side::begin(role, header(role), begun, self.timed, scene));
+        let sides = roles.map(|role| Side::begin(role, self.header(role, &pack), begun, self.timed, scene));
         self.sides = Some(Sides {
             pack,
             all: sides.into_iter().flatten().collect(),
@@ -316,33 +321,7 @@ impl Vehicle {
 
     fn header(&self, role: Role, pack: &Pack) -> RunHeader {
         let topics = self.named.all(pack.topics().iter().map(|rule| rule.name.as_str()));
-        let identity = json!({ "manufacturer": self.manufacturer, "serialNumber": self.serial_number });
-        let mut bindings = Map::new();
-        bindings.insert("time".to_owned(), Value::Object(TimeLimits::default().bindings()));
-        bindings.insert("device".to_owned(), identity.clone());
-        let vehicle = MockVehicle {
-            manufacturer: self.manufacturer.clone(),
-            serial_number: self.serial_number.clone(),
-            topics: topics.clone(),
-        };
-        let vehicles = if role == Role::MasterControl {
-            bindings.insert("vehicle".to_owned(), identity);
-            vec![vehicle]
-        } else {
-            Vec::new()
-        };
-        RunHeader {
-            format: "vda5050-tck.journal/1".to_owned(),
-            role: role.word().to_owned(),
-            protocol: pack.version.to_string(),
-            manufacturer: self.manufacturer.clone(),
-            serial_number: self.serial_number.clone(),
-            topics,
-            vehicles,
-            vantage: "subscriber".to_owned(),
-            bindings,
-            ..RunHeader::default()
-        }
+        header(role, pack, &self.manufacturer, &self.serial_number, topics)
     }
 
     /// Shows a message to both sides.
@@ -459,6 +438,7 @@ impl Vehicle {
             twice: std::mem::take(&mut self.twice),
             retained: std::mem::take(&mut self.stale),
             vantage: if self.wired { "tap" } else { "subscriber" }.to_owned(),
+            time_line: std::mem::take(&mut self.time_line),
             sides,
         }
     }

@@ -46,6 +46,8 @@ struct Connection {
 /// One side of one vehicle on a connection.
 #[derive(Default)]
 struct Judged {
+    /// Whether another thread judges the vehicle: here it only matters that the vehicle speaks on the connection.
+    elsewhere: bool,
     judge: Option<SideJudge>,
     waiting: Vec<Arc<Entry>>,
     outcome: Outcome,
@@ -63,6 +65,15 @@ pub(super) struct Wires {
 
 type Vehicles = BTreeMap<String, Vehicle>;
 
+/// Whose message a PUBLISH is.
+pub(super) struct Publisher<'a> {
+    pub vehicle: String,
+    /// Name of the topic.
+    pub topic: &'a str,
+    /// Whether another thread judges the vehicle.
+    pub elsewhere: bool,
+}
+
 impl Wires {
     /// A message came this way.
     pub fn carried(&mut self, carried: Carried, key: &str) {
@@ -78,13 +89,13 @@ impl Wires {
         }
     }
 
-    /// Takes in what was seen; `key` says whose message a PUBLISH of the client is. Gives the vehicles of whose messages
-    /// something is missing.
+    /// Takes in what was seen; `publisher` says whose message a PUBLISH of the client is. Gives the vehicles of whose
+    /// messages something is missing.
     pub fn take(
         &mut self,
         wire: Wire,
         number: u64,
-        key: Option<(String, &str)>,
+        publisher: Option<Publisher<'_>>,
         vehicles: &mut Vehicles,
         scene: Scene<'_>,
     ) -> BTreeSet<String> {
@@ -113,13 +124,8 @@ impl Wires {
             WireEvent::Packet { packet, sent: true } => match packet {
                 Packet::Connect { .. } => connection.connect = Some(entry(packet)),
                 Packet::Publish { .. } if wire.certain => {
-                    if let Some((key, name)) = key {
-                        let role = if is_command(name) {
-                            Role::MasterControl
-                        } else {
-                            Role::Agv
-                        };
-                        connection.publish(key, role, &entry(packet), vehicles, scene);
+                    if let Some(publisher) = publisher {
+                        connection.publish(publisher, &entry(packet), vehicles, scene);
                         if scene.live && now.since(connection.begun) > PROBATION {
                             connection.tell(vehicles, scene);
                         }
@@ -169,8 +175,13 @@ impl Wires {
 }
 
 impl Connection {
-    fn publish(&mut self, key: String, role: Role, entry: &Arc<Entry>, vehicles: &Vehicles, scene: Scene<'_>) {
-        let side = (key, role);
+    fn publish(&mut self, publisher: Publisher<'_>, entry: &Arc<Entry>, vehicles: &Vehicles, scene: Scene<'_>) {
+        let role = if is_command(publisher.topic) {
+            Role::MasterControl
+        } else {
+            Role::Agv
+        };
+        let side = (publisher.vehicle, role);
         if self.shared {
             return;
         }
@@ -189,6 +200,7 @@ impl Connection {
             self.sides.insert(
                 side.clone(),
                 Judged {
+                    elsewhere: publisher.elsewhere,
                     waiting,
                     ..Judged::default()
                 },
@@ -207,12 +219,12 @@ impl Connection {
 
     /// Whether it is known which version each of its vehicles speaks.
     fn is_known(&self, vehicles: &Vehicles) -> bool {
-        let mut keys = self.sides.keys();
-        keys.all(|(key, role)| {
-            vehicles
-                .get(key)
-                .is_some_and(|vehicle| vehicle.own_header(*role).is_some())
-        })
+        let has_version = |key: &String, role: Role| {
+            let vehicle = vehicles.get(key);
+            vehicle.is_some_and(|vehicle| vehicle.own_header(role).is_some())
+        };
+        let mut sides = self.sides.iter();
+        sides.all(|((key, role), judged)| judged.elsewhere || has_version(key, *role))
     }
 
     /// Something is missing: what was said before holds, and what follows begins anew.
@@ -242,6 +254,9 @@ impl Connection {
 
 impl Judged {
     fn show(&mut self, entry: &Arc<Entry>, side: &(String, Role), vehicles: &Vehicles, scene: Scene<'_>) {
+        if self.elsewhere {
+            return;
+        }
         self.begin(side, vehicles, scene);
         match &mut self.judge {
             Some(judge) => self.outcome.keep(judge.observe(entry), entry),
@@ -252,7 +267,7 @@ impl Judged {
 
     /// Begins to judge, as soon as it is known by which version.
     fn begin(&mut self, (key, role): &(String, Role), vehicles: &Vehicles, scene: Scene<'_>) {
-        if self.judge.is_some() {
+        if self.judge.is_some() || self.elsewhere {
             return;
         }
         let Some(mut header) = vehicles.get(key).and_then(|vehicle| vehicle.own_header(*role)) else {

@@ -3,9 +3,14 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use super::CaptureError;
 
+/// How long it takes until a file is looked at again that may have grown.
+const PAUSE: Duration = Duration::from_millis(100);
 /// How much is read at once.
 const BUFFER: usize = 1 << 16;
 const GZIP: &[u8] = &[0x1f, 0x8b];
@@ -23,6 +28,33 @@ pub fn open(path: &Path) -> Result<Box<dyn BufRead>, CaptureError> {
         File::open(path).map(|file| Box::new(file) as Box<dyn Read>)
     };
     raw.and_then(unpacked).map_err(|source| CaptureError { name, source })
+}
+
+/// Opens a file that grows: where it ends, more is waited for, until `stop` becomes true.
+///
+/// # Errors
+/// What the operating system says.
+pub fn follow(path: &Path, stop: Arc<AtomicBool>) -> io::Result<Box<dyn BufRead>> {
+    let file = File::open(path)?;
+    Ok(Box::new(BufReader::with_capacity(BUFFER, Growing { file, stop })))
+}
+
+/// See [`follow`].
+struct Growing {
+    file: File,
+    stop: Arc<AtomicBool>,
+}
+
+impl Read for Growing {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let read = self.file.read(buffer)?;
+            if read > 0 || buffer.is_empty() || self.stop.load(Ordering::Relaxed) {
+                return Ok(read);
+            }
+            std::thread::sleep(PAUSE);
+        }
+    }
 }
 
 /// What is read, unpacked if it is packed.

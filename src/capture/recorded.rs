@@ -2,6 +2,8 @@
 
 use std::io::{self, BufRead};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::{CaptureError, Counted, Item, Lines, Mapping, Mcap, Packets, Place, Read, input, mcap, packets};
 
@@ -30,6 +32,19 @@ impl Recorded {
         };
         let reader = input::open(path)?;
         Self::of(reader, number, mapping).map_err(fail)
+    }
+
+    /// Opens a recording that grows; it ends when `stop` becomes true.
+    ///
+    /// # Errors
+    /// What the operating system says, or what is wrong with the recording.
+    pub fn follow(path: &Path, mapping: Mapping, stop: Arc<AtomicBool>) -> Result<Self, CaptureError> {
+        let fail = |source: io::Error| CaptureError {
+            name: path.display().to_string(),
+            source,
+        };
+        let reader = input::follow(path, stop).map_err(fail)?;
+        Self::of(reader, 0, mapping).map_err(fail)
     }
 
     fn of(mut reader: Box<dyn BufRead>, number: usize, mapping: Mapping) -> io::Result<Self> {

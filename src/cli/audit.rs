@@ -6,10 +6,12 @@ use super::args::Audit as Arguments;
 use super::exit::Exit;
 use super::problem::Problem;
 use super::recordings::{broken, in_time, open, show};
+use crate::audit::crew::{self, Crew};
+use crate::audit::export::Export;
 use crate::audit::result::{Recording, VehicleResult, verdict_of};
-use crate::audit::{Audit, Options, own_run};
+use crate::audit::{AuditError, Options, bundle, own_run};
 use crate::capture::merge::Merged;
-use crate::capture::{CaptureError, Item, Told};
+use crate::capture::{CaptureError, Item, Message, Told};
 use crate::diagnostic::Diagnostic;
 use crate::journal::Record;
 use crate::journal::event::Event;
@@ -23,25 +25,47 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
         vehicles: arguments.vehicle.clone(),
         only: arguments.only.clone(),
     };
-    let mut audit = Audit::new(&library.rules, options.clone()).map_err(|error| usage(error.to_string()))?;
+    if arguments.follow {
+        return super::follow::follow(arguments, &library, options);
+    }
+    let not_written = |error: std::io::Error| Problem::Environment(format!("cannot write the tables: {error}"));
     let mut runs = Vec::new();
-    let recordings = read(arguments, &library, &options, &mut audit, &mut runs)?;
-    let mut result = audit.finish(recordings);
+    let mut export = match &arguments.export {
+        Some(folder) => Some(Export::begin(folder).map_err(not_written)?),
+        None => None,
+    };
+    let mut result = crew::judged::<Problem>(&library.rules, &options, |crew| {
+        read(arguments, &library, &options, crew, &mut runs, |crew, message| {
+            if let (Some(export), Some(address)) = (&mut export, crew.address(&message.topic)) {
+                let written = export.message(crew.messages() + 1, message, &address);
+                written.map_err(not_written)?;
+            }
+            Ok(())
+        })
+    })?;
     result.vehicles.extend(runs);
     result.verdict = verdict_of(&result.vehicles);
+    if let Some(export) = export {
+        export.finish(&result).map_err(not_written)?;
+    }
+    if let Some(folder) = &arguments.out {
+        let written = bundle::write(&result, folder);
+        written.map_err(|error| Problem::Environment(error.to_string()))?;
+    }
     if let Some(wanted) = &arguments.slice {
         return super::slice::slice(arguments, &library, &options, &result, wanted);
     }
     show(&result, arguments.format)
 }
 
-/// Reads all recordings. The journals of runs are judged by themselves, the rest by the audit.
+/// Reads all recordings. The journals of runs are judged by themselves, the rest is shown to `passing` and handed out.
 fn read(
     arguments: &Arguments,
     library: &Library,
     options: &Options,
-    audit: &mut Audit<'_>,
+    crew: &mut Crew<'_>,
     runs: &mut Vec<VehicleResult>,
+    mut passing: impl FnMut(&Crew<'_>, &Message) -> Result<(), Problem>,
 ) -> Result<Vec<Recording>, Problem> {
     let mut names = Vec::new();
     let mut units = Vec::new();
@@ -74,7 +98,10 @@ fn read(
             return Err(usage(text));
         }
         if in_time(told.at(), arguments) {
-            audit.take(told);
+            if let Told::Message(message) = &told {
+                passing(crew, message)?;
+            }
+            crew.take(told);
         }
         progress.one();
     }
@@ -119,6 +146,12 @@ impl Drop for Counting {
 
 fn usage(text: String) -> Problem {
     Diagnostic::whole("audit", text).into()
+}
+
+impl From<AuditError> for Problem {
+    fn from(error: AuditError) -> Self {
+        usage(error.to_string())
+    }
 }
 
 /// Whether it is the first record of one of our own runs.

@@ -11,6 +11,7 @@ pub mod exit;
 mod explained;
 mod explore;
 mod expression;
+mod follow;
 mod list;
 mod log;
 mod messages;

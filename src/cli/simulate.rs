@@ -1,11 +1,12 @@
 //! `simulate`: be a reference device on a broker.
 
+use std::io::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::args::{ConnectionArgs, Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl};
+use super::args::{ConnectionArgs, Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, SimulatedSite};
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
@@ -16,13 +17,14 @@ use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::pack::{Assets, Pack, Packs, Role};
 use crate::simulate::driver::RunningDevice;
-use crate::simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl};
+use crate::simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl, Site};
 
 /// `simulate`.
 pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let connection = match &arguments.what {
         Simulated::Agv(device) => &device.connection,
         Simulated::MasterControl(device) => &device.connection,
+        Simulated::Site(recording) => return site(recording),
     };
     let packs = Packs::load(&Assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
     let pack = super::pack_among(&packs, connection.protocol.as_deref())?;
@@ -36,8 +38,40 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         match &arguments.what {
             Simulated::Agv(device) => agvs(device, &pack, &endpoint, arguments.format).await,
             Simulated::MasterControl(device) => master_control(device, &pack, &endpoint, arguments.format).await,
+            Simulated::Site(recording) => site(recording),
         }
     })
+}
+
+/// Writes the recording of a fleet.
+fn site(arguments: &SimulatedSite) -> Result<Exit, Problem> {
+    let broken = |error: std::io::Error| Problem::Environment(format!("cannot write the recording: {error}"));
+    let site = Site {
+        seed: arguments.seed,
+        vehicles: usize::try_from(arguments.vehicles).unwrap_or(usize::MAX),
+        messages: arguments.messages,
+        faults: arguments.faults,
+    };
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let mut key = match &arguments.key {
+        Some(path) => Some(std::io::BufWriter::new(std::fs::File::create(path).map_err(broken)?)),
+        None => None,
+    };
+    for message in site.messages() {
+        match writeln!(out, "{}", message.line()) {
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => return Ok(Exit::Conforms),
+            written => written.map_err(broken)?,
+        }
+        if let (Some(key), Some(injected)) = (&mut key, &message.injected) {
+            let line = serde_json::to_string(injected).map_err(|error| Problem::Environment(error.to_string()))?;
+            writeln!(key, "{line}").map_err(broken)?;
+        }
+    }
+    out.flush().map_err(broken)?;
+    if let Some(key) = &mut key {
+        key.flush().map_err(broken)?;
+    }
+    Ok(Exit::Conforms)
 }
 
 /// Where the broker is, and how it lets in.

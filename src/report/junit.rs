@@ -106,6 +106,60 @@ pub fn by_requirement(result: &RunResult, sources: &Sources, flavour: Flavour<'_
     written(&report, result, flavour)
 }
 
+/// A case of something that is no run.
+#[derive(Clone, Debug)]
+pub struct Plain {
+    /// The suite.
+    pub suite: String,
+    /// Its name: the requirement.
+    pub name: String,
+    /// How it ended.
+    pub verdict: Option<Verdict>,
+    /// What was found.
+    pub text: String,
+}
+
+/// Cases as JUnit XML, each in its suite. A warning passes and says so.
+///
+/// # Errors
+/// When the XML writer refuses; it has no reason to.
+pub fn plain(cases: &[Plain]) -> Result<String, JunitError> {
+    let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
+    for case in cases {
+        let message = case.text.lines().next().unwrap_or_default();
+        let built = Case {
+            name: &case.name,
+            class: &case.suite,
+            seconds: 0.0,
+            outcome: outcome(case.verdict, &case.name, message, &case.text, Inconclusive::Error),
+            out: (case.verdict == Some(Verdict::Warning)).then(|| format!("warning: {}", case.text)),
+        }
+        .build();
+        match groups.last_mut().filter(|(name, _)| *name == case.suite) {
+            Some((_, cases)) => cases.push(built),
+            None => groups.push((&case.suite, vec![built])),
+        }
+    }
+    let mut report = ReportBuilder::new();
+    for (name, testcases) in groups {
+        report.add_testsuite(TestSuite {
+            name: attribute(name),
+            package: "vda5050-tck".to_owned(),
+            timestamp: OffsetDateTime::UNIX_EPOCH,
+            hostname: "localhost".to_owned(),
+            testcases,
+            system_out: None,
+            system_err: None,
+        });
+    }
+    let mut xml = Vec::new();
+    let built = report.build().write_xml(&mut xml);
+    built.map_err(|error| JunitError(error.to_string()))?;
+    let xml = String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))?;
+    let xml = xml.replace("><testcase ", ">\n<testcase ");
+    Ok(xml.replace("><testsuite ", ">\n<testsuite ") + "\n")
+}
+
 fn written(report: &ReportBuilder, result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
     let mut xml = Vec::new();
     let written = report.build().write_xml(&mut xml);

@@ -12,6 +12,7 @@ mod peer;
 mod reference_agv;
 mod reference_master_control;
 mod running_fleet;
+mod site;
 mod unknown;
 mod witness;
 
@@ -21,4 +22,5 @@ pub use hook_server::HookServer;
 pub use reference_agv::{ReferenceAgv, Vehicle};
 pub use reference_master_control::ReferenceMasterControl;
 pub use running_fleet::WithFleet;
+pub use site::{Injected, KINDS, Kind, Messages, Site, SiteMessage};
 pub use unknown::UnknownName;

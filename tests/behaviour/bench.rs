@@ -1,5 +1,6 @@
 //! A run against a device of its own: profile, folder, and the process that is judged.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -199,6 +200,33 @@ impl Bench {
         self.run(&["report", &shown, "--rejudge"])
             .code(0)
             .prints("byte for byte");
+        self.is_audited_like_its_run();
+    }
+
+    /// Holds that the audit finds in the journal what the monitors of the run found. Gives monitor, requirement and count.
+    #[track_caller]
+    pub fn is_audited_like_its_run(&self) -> BTreeSet<(String, String, String)> {
+        let journal = self.path().join("audited.jsonl");
+        std::fs::write(&journal, self.journal()).unwrap();
+        let audited = self.run(&["audit", &journal.display().to_string(), "--format", "json"]);
+        let audited: Value =
+            serde_json::from_str(&audited.stdout).unwrap_or_else(|error| panic!("{error}\n{}", audited.stderr));
+        let list = |holder: &Value, member: &str| holder[member].as_array().cloned().unwrap_or_default();
+        let found = |monitor: &Value, finding: &Value| {
+            [monitor, &finding["requirement"], &finding["count"]]
+                .map(ToString::to_string)
+                .into()
+        };
+        let side = &audited["vehicles"][0]["sides"][0];
+        let all = [list(side, "findings"), list(side, "information")].concat();
+        let of_audit: BTreeSet<_> = all.iter().map(|finding| found(&finding["monitor"], finding)).collect();
+        let monitors = list(&self.result(), "monitors");
+        let of_run = monitors.iter().flat_map(|monitor| {
+            let findings = list(monitor, "findings").into_iter();
+            findings.map(|finding| found(&monitor["id"], &finding))
+        });
+        assert_eq!(of_audit, of_run.collect());
+        of_audit
     }
 }
 

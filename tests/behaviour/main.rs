@@ -21,6 +21,7 @@ mod inspecting;
 mod interrupted;
 mod mosquitto;
 mod output;
+mod overhearing;
 mod papers;
 mod planning;
 mod prompting;

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use super::graph::is_counted;
 use super::vehicle::{Outside, Seen, Vehicle};
 use super::{Command, ELEMENTS, Found, released, short};
 use crate::checks::orders::number;
@@ -167,8 +168,8 @@ impl Running for BaseKept {
                 self.actions.insert(id);
             }
         }
-        let base = released_elements(order).collect::<Vec<_>>();
-        for (sequence, id) in base {
+        let counted = is_counted(order);
+        for (sequence, id) in released_elements(order).filter(|_| counted) {
             if self.base.len() < KEPT {
                 self.base.insert(sequence, id);
             }

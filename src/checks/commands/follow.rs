@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use serde_json::Value;
 
+use super::graph::is_counted;
 use super::sheet::grace;
 use super::vehicle::{Outside, Vehicle};
 use super::{Command, ELEMENTS, Found, content, fingerprint, in_sequence, released, short};
@@ -140,12 +141,13 @@ impl Order {
         if self.sent.len() == MESSAGES {
             self.sent.pop_front();
         }
+        let counted = is_counted(message);
         self.sent.push_back(Sent {
             update,
             print: content(message),
-            end: end(message),
+            end: end(message).filter(|_| counted),
         });
-        for (sequence, id) in base(message) {
+        for (sequence, id) in base(message).filter(|_| counted) {
             if self.base.len() < ELEMENTS {
                 self.base.insert(sequence, id);
             }

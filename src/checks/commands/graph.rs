@@ -67,6 +67,20 @@ fn nodes_and_edges(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found
     true
 }
 
+/// Whether the sequenceIds of nodes and edges together alternate and count up by one. An order that is counted otherwise is a
+/// mistake of its own, and no measure for what is sent after it.
+pub(super) fn is_counted(order: &Value) -> bool {
+    let of = |list, is_edge| {
+        let all = elements(order, list).take(super::ELEMENTS);
+        all.map(move |element| Some((number(element, "sequenceId")?, is_edge)))
+    };
+    let all: Option<Vec<(u64, bool)>> = of("nodes", false).chain(of("edges", true)).collect();
+    let Some(mut all) = all else { return false };
+    all.sort_unstable();
+    let alternates = |pair: &[(u64, bool)]| pair[0].0.checked_add(1) == Some(pair[1].0) && pair[0].1 != pair[1].1;
+    all.first().is_some_and(|(_, is_edge)| !is_edge) && all.windows(2).all(alternates)
+}
+
 /// Nodes and edges alternating, if there is one edge fewer.
 fn chain(order: &Value) -> Option<Vec<(bool, &Value)>> {
     let (nodes, edges) = (in_sequence(order, "nodes"), in_sequence(order, "edges"));

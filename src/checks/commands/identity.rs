@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
+use super::graph::is_counted;
 use super::vehicle::Vehicle;
 use super::{Command, ELEMENTS, Found, fingerprint, in_sequence, place_of, short};
 use crate::checks::orders::number;
@@ -138,6 +139,7 @@ impl Running for ActionIds {
         };
         let mut found = Found::new(entry, findings);
         let mut judged = false;
+        let counted = command.order().is_none_or(is_counted);
         let mut here: BTreeMap<&str, ()> = BTreeMap::new();
         for (place, action) in placed(command) {
             let Some(id) = short(action, "actionId").filter(|id| !id.is_empty()) else {
@@ -151,6 +153,9 @@ impl Running for ActionIds {
                     "ORD-MSG-17",
                     format!("actionId {} comes twice in one message", quote(&id)),
                 );
+                continue;
+            }
+            if !counted {
                 continue;
             }
             if let Some((known_place, known_print)) = self.known.get(&id) {

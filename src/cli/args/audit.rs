@@ -48,6 +48,15 @@ pub struct Audit {
     /// How topics are built, with {serialNumber}, and {interface}, {majorVersion}, {manufacturer} and {topic} where they have them
     #[arg(long, value_name = "TEMPLATE", help_heading = "Selection")]
     pub topic_template: Option<String>,
+    /// Write result.json, junit.xml and report.html, with a time line for each vehicle, into this folder
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write messages and findings as Parquet into this folder: a table for each topic, and one of findings
+    #[arg(long, value_name = "DIR")]
+    pub export: Option<PathBuf>,
+    /// Go on when the file ends, as long as it grows: each finding is a line, until Ctrl-C
+    #[arg(long, conflicts_with_all = ["slice", "out", "export"])]
+    pub follow: bool,
     /// Write the smallest journal that still shows a finding to standard output: the first one of this requirement or monitor
     #[arg(long, value_name = "FINDING")]
     pub slice: Option<String>,

@@ -30,7 +30,9 @@ pub use inspect::{Explain, List, Listing, Rendering, Report, Validate};
 pub use run::{CertificateArgs, Certify, Qualify, Run, Shard};
 pub use selection::SelectionArgs;
 pub use shell::{Completions, Man};
-pub use simulate::{ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, VehicleArg};
+pub use simulate::{
+    ConnectionArgs, PersonaArg, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, SimulatedSite, VehicleArg,
+};
 pub use watch::Watch;
 
 const AFTER_HELP: &str = "\

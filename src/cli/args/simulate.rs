@@ -30,6 +30,29 @@ pub enum Simulated {
     Agv(SimulatedAgv),
     /// A reference master control: it commands vehicles, and does what is asked of it over HTTP
     MasterControl(SimulatedMasterControl),
+    /// The recording of a fleet, for trying `audit`: written to standard output, one message a line
+    #[command(hide = true)]
+    Site(SimulatedSite),
+}
+
+/// `simulate site`.
+#[derive(Clone, Debug, Args)]
+pub struct SimulatedSite {
+    /// How many messages
+    #[arg(long, value_name = "NUMBER", default_value_t = 10_000)]
+    pub messages: u64,
+    /// How many vehicles
+    #[arg(long, value_name = "NUMBER", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=9_999))]
+    pub vehicles: u32,
+    /// How many of the messages are faulty
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    pub faults: u64,
+    /// The same recording for the same seed
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// Where it is written what is wrong where, one fault a line
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
 }
 
 /// How a simulated device reaches its broker.

@@ -55,6 +55,23 @@ fn mistakes_in_updates_are_found() {
 }
 
 #[test]
+fn an_order_that_is_counted_wrongly_is_one_mistake_and_no_measure_for_its_update() {
+    let mut trace = begun();
+    let with_action = |mut order: Value, node: usize| {
+        order["nodes"][node]["actions"] = json!([action("pick", "a1", &pick())]);
+        order
+    };
+    let mut first = with_action(order("o1", 0, 0, 1, 3), 1);
+    first["nodes"][1]["sequenceId"] = json!(3);
+    trace.commands("order", &first).wait(2.0);
+    trace.shows(&under_way("o1", 0, 1)).wait(2.0);
+    trace.commands("order", &with_action(order("o1", 1, 1, 3, 4), 0));
+    let found = all(&trace);
+    let counted = |finding: &String| finding.starts_with("ORD-UPD-11");
+    assert!(!found.is_empty() && found.iter().all(counted), "{found:?}");
+}
+
+#[test]
 fn an_update_the_vehicle_did_not_take_may_be_replaced() {
     let mut trace = begun();
     trace.commands("order", &order("o1", 0, 0, 2, 4)).wait(2.0);
