@@ -32,7 +32,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// How it is stored: BOOLEAN, INT64, DOUBLE or BYTE_ARRAY.
+    /// How it is stored: BOOLEAN, INT64, DOUBLE or `BYTE_ARRAY`.
     fn stored(self) -> u64 {
         match self {
             Self::Bool => 0,

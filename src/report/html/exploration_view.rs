@@ -55,7 +55,7 @@ pub fn situations(result: &ExplorationResult) -> Grid {
         let row = one.stimulus.as_str();
         ((row, one.situation.as_str()), one.answers)
     });
-    grid(cells.collect(), |row| row.to_owned())
+    grid(cells.collect(), str::to_owned)
 }
 
 /// Broken members by the way in which they were broken.
