@@ -450,8 +450,8 @@ impl TestJudge {
             (None, Ok(()), _) if hidden.is_some() => hidden.unwrap_or_default(),
             (None, Err(why), _) => why.clone(),
             (None, Ok(()), Err(why)) => {
-                let unless = self.interference.as_ref().map(|other| format!("; but {other}"));
-                format!("an earlier step failed: {why}{}", unless.unwrap_or_default())
+                let other = self.interference.as_ref().map(|other| format!("{other}; "));
+                format!("{}an earlier step failed: {why}", other.unwrap_or_default())
             }
             (None, Ok(()), Ok(())) => "the test ended before this was judged".to_owned(),
         };

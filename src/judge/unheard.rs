@@ -64,8 +64,8 @@ impl Unheard {
     pub fn why(&self) -> Option<Arc<str>> {
         let topic = self.of_test.iter().find(|topic| self.sent.contains_key(*topic))?;
         let why = format!(
-            "the device has shown nothing so far of what was published on {topic}, and without a tap nobody can tell whether the \
-             broker lets the device read it"
+            "without a tap nobody can tell whether the broker lets the device read {topic}, and it has shown nothing so far of \
+             what came there"
         );
         Some(why.into())
     }

@@ -351,6 +351,6 @@ fn a_vehicle_that_may_not_read_its_orders_is_not_accused_where_nobody_sees_it() 
     let (run, _agv) = with_vehicle(&bench, &broker.url(), more, Some("agv"));
     run.end()
         .code(3)
-        .prints("without a tap nobody can tell whether the broker lets the device read it");
+        .prints("without a tap nobody can tell whether the broker lets the device read");
     bench.is_whole();
 }

@@ -128,32 +128,32 @@ fn delivered() -> Occurrence {
     at(Moment::START, Source::Link, Direction::FromDevice, event)
 }
 
-fn lost(delivered_before: bool) -> Option<Undelivered> {
-    Some(Undelivered::ToHarness {
+fn lost(delivered_before: bool) -> Undelivered {
+    Undelivered::ToHarness {
         topic: "a/state".to_owned(),
         client: "agv".to_owned(),
         user: Some("fleet".to_owned()),
         delivered_before,
-    })
+    }
 }
 
 #[test]
 fn what_the_device_publishes_and_the_broker_drops_is_named_at_any_time() {
     let mut delivery = spoken(1);
     assert_eq!(delivery.overdue(Moment::START), None);
-    assert_eq!(delivery.overdue(LATER), lost(false));
+    assert_eq!(delivery.overdue(LATER), Some(lost(false)));
     let mut later = spoken(0);
     later.observe(&delivered());
     assert_eq!(later.overdue(LATER), None);
     later.observe(&packet(Direction::FromDevice, publish("a/state", 0)));
-    assert_eq!(later.overdue(LATER), lost(true));
+    assert_eq!(later.overdue(LATER), Some(lost(true)));
 }
 
 #[test]
 fn a_broker_that_ends_the_connection_over_a_message_does_not_allow_it() {
     let mut refused = spoken(0);
     refused.observe(&closed(Close::Broker));
-    assert_eq!(refused.overdue(LATER), lost(false));
+    assert_eq!(refused.overdue(LATER), Some(lost(false)));
     let mut ended = spoken(0);
     ended.observe(&delivered());
     ended.observe(&packet(Direction::FromDevice, publish("a/state", 0)));
@@ -203,5 +203,5 @@ fn a_machine_that_stood_still_gives_the_broker_its_time_again() {
     };
     delivery.observe(&at(LATER, Source::Harness, Direction::FromDevice, lag));
     assert_eq!(delivery.overdue(LATER), None);
-    assert_eq!(delivery.overdue(LATER + TO_DEVICE), lost(false));
+    assert_eq!(delivery.overdue(LATER + TO_DEVICE), Some(lost(false)));
 }
