@@ -25,6 +25,10 @@ use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{Library, VirtualRun, run_silently};
 use vda5050_tck::verdict::{Accumulated, Verdict};
 
+/// The allocator of the program: a run is a million small trees.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Requirement id to verdict; nothing means that it must not be decided.
 type Verdicts = BTreeMap<String, Option<Verdict>>;
 
@@ -189,25 +193,18 @@ fn the_journal_of_a_run_is_audited_like_the_run_was_judged() {
         let result = judge(&library.rules, saved.journal.entries()).expect("judged");
         assert_eq!(of_audit(&library, &path), of_run(&result), "{}", path.display());
     }
-    let folder = tempfile::tempdir().expect("a folder");
     for (role, faults) in [
-        (
-            Role::Agv,
-            &["", "header-id-constant", "horizon-not-reported", "never-reconnects"][..],
-        ),
-        (
-            Role::MasterControl,
-            &["", "starts-elsewhere", "other-serial-number"][..],
-        ),
+        (Role::Agv, &["header-id-constant", "horizon-not-reported"][..]),
+        (Role::MasterControl, &["other-serial-number"][..]),
     ] {
+        let faultless = library.rules.packs.all().iter().map(|pack| (pack, None));
+        let faulty = faults.iter().map(|fault| (library.rules.packs.latest(), Some(*fault)));
         let mut found = 0;
-        for (fault, pack) in faults
-            .iter()
-            .flat_map(|fault| library.rules.packs.all().iter().map(move |pack| (fault, pack)))
-        {
+        for (pack, fault) in faultless.chain(faulty) {
             let mut request = VirtualRun::of_role(role, &library, pack);
-            request.faults.extend((!fault.is_empty()).then(|| (*fault).to_owned()));
+            request.faults.extend(fault.map(str::to_owned));
             let run = run_silently(&library, pack, request).expect("a run");
+            let folder = tempfile::tempdir().expect("a folder");
             let path = folder.path().join("journal.jsonl");
             let mut writer = JournalWriter::create(&path).expect("a file");
             for entry in run.recorder.journal().entries() {
@@ -216,13 +213,9 @@ fn the_journal_of_a_run_is_audited_like_the_run_was_judged() {
             drop(writer);
             let of_run = of_run(&run.result);
             found += of_run.len();
-            assert_eq!(
-                of_audit(&library, &path),
-                of_run,
-                "{role} {fault}, VDA 5050 {}",
-                pack.version
-            );
+            let what = format!("{role} {fault:?}, VDA 5050 {}", pack.version);
+            assert_eq!(of_audit(&library, &path), of_run, "{what}");
         }
-        assert!(found > 2, "{role}: nothing was found that could be compared");
+        assert!(found > 0, "{role}: nothing was found that could be compared");
     }
 }
