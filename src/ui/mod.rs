@@ -4,6 +4,7 @@
 //! escaped, because they may hold anything. What is told is decided elsewhere.
 
 mod full_screen;
+mod keyboard;
 mod listing;
 mod output;
 mod progress;

@@ -7,11 +7,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, poll, read};
+use crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use crossterm::terminal::{disable_raw_mode, enable_raw_mode};
 use indicatif::ProgressBar;
 use tokio::sync::watch;
 
+use super::keyboard::typed;
 use super::output::escaped;
 use crate::run::{Answer, Person, Wanted};
 
@@ -89,16 +90,21 @@ impl Desk {
             .test
             .as_deref()
             .map_or_else(String::new, |test| format!(", test {}", escaped(test)));
-        let mut heading = format!("\r\n-- question {number}{test} --\r\n");
-        if let Some(step) = &about.step {
-            let _ = write!(heading, "   {}\r\n", escaped(step));
-        }
-        let bold = console::Style::new().for_stderr().bold();
-        for line in what.lines() {
-            let _ = write!(heading, "   {}\r\n", bold.apply_to(escaped(line)));
-        }
-        heading
+        format!("\r\n-- question {number}{test} --\r\n{}", wanted_of(about, what))
     }
+}
+
+/// What a person is to do, and for which step.
+fn wanted_of(about: &About, what: &str) -> String {
+    let mut text = String::new();
+    if let Some(step) = &about.step {
+        let _ = write!(text, "   {}\r\n", escaped(step));
+    }
+    let bold = console::Style::new().for_stderr().bold();
+    for line in what.lines() {
+        let _ = write!(text, "   {}\r\n", bold.apply_to(escaped(line)));
+    }
+    text
 }
 
 impl Person for Desk {
@@ -107,11 +113,15 @@ impl Person for Desk {
         let about = held(&self.shared.about).clone();
         about.bar.suspend(|| {
             let mut terminal = io::stderr();
-            let heading = self.heading(&about, what);
             if *self.shared.stop.borrow() {
-                let _ = write!(terminal, "{heading}   The run ends, and does not wait for this.\r\n");
+                let wanted = wanted_of(&about, what);
+                let _ = write!(
+                    terminal,
+                    "\r\n-- the run ends, and does not wait for this --\r\n{wanted}"
+                );
                 return Answer::GivenUp;
             }
+            let heading = self.heading(&about, what);
             let answer = match Raw::on() {
                 Ok(_raw) => put(&heading, within, wanted, &self.shared.stop, &mut terminal),
                 Err(error) => Err(error),
@@ -158,9 +168,7 @@ fn put(
     terminal: &mut impl Write,
 ) -> io::Result<Answer> {
     // What was typed before the question is no answer to it.
-    while poll(Duration::ZERO)? {
-        let _ = read()?;
-    }
+    while typed(Duration::ZERO)?.is_some() {}
     write!(terminal, "\x07{heading}")?;
     let until = Instant::now() + within;
     let mut shown = None;
@@ -177,8 +185,7 @@ fn put(
         if wanted.is_given_up() || *stop.borrow() {
             break Answer::GivenUp;
         }
-        if poll(GLANCE.min(left))?
-            && let Event::Key(key) = read()?
+        if let Some(Event::Key(key)) = typed(GLANCE.min(left))?
             && let Some(answer) = meaning(key)
         {
             break answer;

@@ -3,12 +3,13 @@
 mod marked;
 mod view;
 
-use std::io::{self, IsTerminal as _};
+use std::io;
 use std::time::Duration;
 
 use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
+use super::keyboard::typed;
 use crate::watch::session::{Contact, Happening, Viewer};
 use crate::watch::{Notice, Watch};
 use view::{Focus, View};
@@ -54,19 +55,16 @@ impl Viewer for FullScreen {
     }
 
     fn tick(&mut self, watch: &Watch<'_>, contact: Contact) -> bool {
-        // A terminal that is gone has no end of events.
-        if !io::stdin().is_terminal() {
-            return false;
-        }
         let glances: Vec<_> = watch.glances().collect();
-        while event::poll(Duration::ZERO).unwrap_or(false) {
-            match event::read() {
-                Ok(Event::Key(key)) if key.kind != KeyEventKind::Release => {
+        loop {
+            match typed(Duration::ZERO) {
+                Ok(None) => break,
+                Ok(Some(Event::Key(key))) if key.kind != KeyEventKind::Release => {
                     if !press(&mut self.view, key) {
                         return false;
                     }
                 }
-                Ok(_) => {}
+                Ok(Some(_)) => {}
                 Err(_) => return false,
             }
         }
