@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::company::{Company, Part};
 use super::grounds::Grounds;
 use super::rules::{JudgeError, Rules};
 use super::test::Ground;
@@ -19,6 +20,8 @@ pub struct SideJudge {
     ground: Ground,
     timeline: Timeline,
     watches: Watches,
+    /// Who is on the tap besides the device, where a journal tells.
+    company: Option<Company>,
 }
 
 impl SideJudge {
@@ -40,15 +43,41 @@ impl SideJudge {
             watches: Watches::begin(&monitors, &ground, vehicles, header.vantage == "tap"),
             timeline,
             ground,
+            company: None,
         })
+    }
+
+    /// The same for the journal of a run, which tells who is on the tap besides the device: what bystanders do is not judged.
+    #[must_use]
+    pub fn among_others(mut self) -> Self {
+        self.company = Company::of(self.ground.role, &self.ground.topics, &self.ground.pack);
+        self
     }
 
     /// Shows it the next entry and takes what was found since.
     pub fn observe(&mut self, entry: &Arc<Entry>) -> Vec<Observed> {
+        let mut part = Part::Judged;
+        if let Some(company) = &mut self.company {
+            part = company.observe(entry);
+            self.ground.interference = company.interference(entry.at().moment).cloned();
+        }
+        match part {
+            Part::Judged => self.judge(entry),
+            Part::Bystander => {}
+            Part::Joined(before) => {
+                for entry in &before {
+                    self.judge(entry);
+                }
+                self.judge(entry);
+            }
+        }
+        self.watches.take()
+    }
+
+    fn judge(&mut self, entry: &Arc<Entry>) {
         let subject = self.timeline.subject_of(entry);
         self.watches
             .observe(entry, subject.as_deref(), &self.timeline, &self.ground);
-        self.watches.take()
     }
 
     /// The traffic is known to end here: takes what is found by that.
