@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 use vda5050_tck::capture::{Item, Mapping, Recorded, WireEvent};
@@ -24,7 +25,8 @@ impl Tcpdump {
     /// failure.
     fn start(folder: &Path, port: u16) -> Option<Self> {
         // Its own output is the capture: it gives up its rights, and may not write into this folder then.
-        let line = format!("exec tcpdump -i lo -n -U -s 0 -B 16384 -w - 'tcp port {port}' > {CAPTURE}");
+        let line =
+            format!("exec tcpdump -i lo -n -U --immediate-mode -s 0 -B 16384 -w - 'tcp port {port}' > {CAPTURE}");
         let mut command = Command::new("sh");
         command.args(["-c", &line]);
         command.current_dir(folder).stdin(Stdio::null());
@@ -46,8 +48,16 @@ impl Tcpdump {
         Some(Self(running))
     }
 
-    /// Ends; the capture is whole then.
-    fn end(self) {
+    /// Ends once nothing more is written; the capture is whole then. What the kernel still holds would be lost.
+    fn end(self, folder: &Path) {
+        let size = || std::fs::metadata(folder.join(CAPTURE)).unwrap().len();
+        loop {
+            let before = size();
+            std::thread::sleep(Duration::from_secs(1));
+            if size() == before {
+                break;
+            }
+        }
         self.0.interrupt();
         let ended = self.0.end();
         assert!(ended.stderr.contains("0 packets dropped by kernel"), "{}", ended.stderr);
@@ -112,7 +122,7 @@ fn what_tcpdump_captures_of_a_run_gives_what_the_tap_of_the_run_gave() {
     };
     let _agv = bench.agv(port, &["horizon-not-reported", "will-qos-0", "connection-not-retained"]);
     run.end().code(1);
-    tcpdump.end();
+    tcpdump.end(bench.path());
     let journal = bench.path().join("journal.jsonl");
     std::fs::write(&journal, bench.journal()).unwrap();
     let (tap, overheard) = (seen_by_tap(&journal), seen_by_tcpdump(&bench.path().join(CAPTURE)));
