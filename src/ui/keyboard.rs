@@ -10,10 +10,9 @@ use crossterm::event::{self, Event};
 /// # Errors
 /// The terminal is gone or no terminal. A terminal that is gone has no end of events, so nothing is read from it.
 pub(super) fn typed(within: Duration) -> io::Result<Option<Event>> {
-    if !is_ready(within)? {
-        return Ok(None);
-    }
-    if event::poll(Duration::ZERO)? {
+    is_ready(Duration::ZERO)?;
+    // Several keys may have been read at once: those that are left are no longer waiting at the terminal.
+    if event::poll(Duration::ZERO)? || (!within.is_zero() && is_ready(within)? && event::poll(Duration::ZERO)?) {
         return event::read().map(Some);
     }
     Ok(None)

@@ -3,6 +3,8 @@
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::pack::{Version, VersionRange};
+
 /// A fault of one message.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
@@ -20,7 +22,7 @@ enum Change {
     Set(&'static str, &'static str),
     /// The member at a pointer is left out.
     Remove(&'static str),
-    /// A member stands there twice, which the newest version alone calls wrong: its messages have to obey the schema.
+    /// A member stands there twice, which is wrong where messages have to obey the schema.
     Twice(&'static str),
     /// The bytes are changed.
     Bytes(fn(&str) -> Vec<u8>),
@@ -181,13 +183,26 @@ pub const KINDS: &[Kind] = &[
     ),
 ];
 
+/// The versions whose messages have to obey the schema, and with it the rules of JSON.
+const BY_SCHEMA: &str = ">=2.1";
+
+/// Whether a message says that it is of such a version.
+fn obeys_schema(text: &str) -> bool {
+    let message: Option<Value> = serde_json::from_str(text).ok();
+    let version = message.and_then(|message| message.get("version")?.as_str()?.parse::<Version>().ok());
+    let range = BY_SCHEMA.parse::<VersionRange>().ok();
+    version
+        .zip(range)
+        .is_some_and(|(version, range)| range.contains(version))
+}
+
 impl Kind {
     /// The message with this fault; `None` where the message has no such member, or has it like that already.
     pub(super) fn spoil(&self, payload: &[u8]) -> Option<Vec<u8>> {
         let text = std::str::from_utf8(payload).ok()?;
         let changed = match self.change {
             Bytes(change) => change(text),
-            Twice(_) if text.contains("\"version\":\"2.0") => return None,
+            Twice(_) if !obeys_schema(text) => return None,
             Twice(member) => text.replacen('{', &format!("{{{member},"), 1).into_bytes(),
             Set(pointer, value) => {
                 let mut message: Value = serde_json::from_str(text).ok()?;
