@@ -51,7 +51,8 @@ impl Tcpdump {
     /// Ends once nothing more is written; the capture is whole then. What the kernel still holds would be lost.
     fn end(self, folder: &Path) {
         let size = || std::fs::metadata(folder.join(CAPTURE)).unwrap().len();
-        loop {
+        // A vehicle that tries to connect again goes on being captured.
+        for _ in 0..5 {
             let before = size();
             std::thread::sleep(Duration::from_secs(1));
             if size() == before {
