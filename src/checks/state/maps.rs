@@ -29,7 +29,8 @@ type Pair = (String, String);
 #[derive(Default)]
 struct Maps {
     traffic: Traffic,
-    listed: BTreeSet<Pair>,
+    /// What the last state listed; nothing is known of it before the first, and after somebody had to do with the vehicle.
+    listed: Option<BTreeSet<Pair>>,
     deleted: BTreeSet<Pair>,
 }
 
@@ -37,7 +38,7 @@ impl Running for Maps {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         if outside_influence(entry) {
-            self.listed.clear();
+            self.listed = None;
         }
         if let Some(message) = to_vehicle("instantActions", entry, context) {
             for action in actions(message).filter(|action| text(action, "actionType") == "deleteMap") {
@@ -82,7 +83,8 @@ impl Running for Maps {
                 findings.push(broken("MAP-11", seq, text));
             }
         }
-        for pair in self.listed.difference(&now) {
+        let known = self.listed.as_ref();
+        for pair in known.into_iter().flat_map(|listed| listed.difference(&now)) {
             if !self.deleted.contains(pair) {
                 let text = format!("{} is gone, although no deleteMap was sent for it", label(pair));
                 findings.push(broken("MAP-31", seq, text));
@@ -90,11 +92,11 @@ impl Running for Maps {
         }
         // A map that comes back is a new one: the old deleteMap does not cover its next disappearance. It may
         // still be about to be executed while the entry stands, so only entries that reappear count.
-        let back: Vec<Pair> = now.difference(&self.listed).cloned().collect();
-        for pair in back {
+        let back = known.into_iter().flat_map(|listed| now.difference(listed));
+        for pair in back.cloned().collect::<Vec<Pair>>() {
             self.deleted.remove(&pair);
         }
-        self.listed = now;
+        self.listed = Some(now);
         elements(state, "maps").next().is_some() || localized
     }
 }
@@ -181,6 +183,20 @@ mod tests {
         let mut trace = Trace::subscriber();
         trace.state(&maps(&[("hall", "1", "ENABLED"), ("yard", "1", "DISABLED")]));
         trace.hook().state(&maps(&[("hall", "1", "ENABLED")]));
+        assert!(trace.judge("state/maps").findings.is_empty());
+    }
+
+    #[test]
+    fn a_map_is_deleted_as_asked_though_somebody_has_just_had_to_do_with_the_vehicle() {
+        let both = maps(&[("hall", "1", "ENABLED"), ("hall", "2", "DISABLED")]);
+        let mut trace = Trace::subscriber();
+        trace.state(&both).hook();
+        trace.instant(
+            "deleteMap",
+            "x",
+            &json!([{ "key": "mapId", "value": "hall" }, { "key": "mapVersion", "value": "2" }]),
+        );
+        trace.state(&both).state(&maps(&[("hall", "1", "ENABLED")]));
         assert!(trace.judge("state/maps").findings.is_empty());
     }
 }
