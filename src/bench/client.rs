@@ -259,6 +259,7 @@ fn why(error: &ConnectionError, accepted: bool, endpoint: &Endpoint) -> String {
             "it does not allow the client id (BadClientId); see `client-id`".to_owned()
         }
         ConnectionError::ConnectionRefused(code) => format!("it refuses the connection ({code:?})"),
+        ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => "it does not answer".to_owned(),
         ConnectionError::Io(error) if !accepted && is_nobody_there(error) => unreachable(error),
         ConnectionError::Io(_) | ConnectionError::MqttState(_) if !accepted => {
             let hint = match (&endpoint.tls, &endpoint.websocket) {

@@ -89,16 +89,21 @@ impl Desk {
             .test
             .as_deref()
             .map_or_else(String::new, |test| format!(", test {}", escaped(test)));
-        let mut heading = format!("\r\n-- question {number}{test} --\r\n");
-        if let Some(step) = &about.step {
-            let _ = write!(heading, "   {}\r\n", escaped(step));
-        }
-        let bold = console::Style::new().for_stderr().bold();
-        for line in what.lines() {
-            let _ = write!(heading, "   {}\r\n", bold.apply_to(escaped(line)));
-        }
-        heading
+        format!("\r\n-- question {number}{test} --\r\n{}", wanted_of(about, what))
     }
+}
+
+/// What a person is to do, and for which step.
+fn wanted_of(about: &About, what: &str) -> String {
+    let mut text = String::new();
+    if let Some(step) = &about.step {
+        let _ = write!(text, "   {}\r\n", escaped(step));
+    }
+    let bold = console::Style::new().for_stderr().bold();
+    for line in what.lines() {
+        let _ = write!(text, "   {}\r\n", bold.apply_to(escaped(line)));
+    }
+    text
 }
 
 impl Person for Desk {
@@ -107,11 +112,15 @@ impl Person for Desk {
         let about = held(&self.shared.about).clone();
         about.bar.suspend(|| {
             let mut terminal = io::stderr();
-            let heading = self.heading(&about, what);
             if *self.shared.stop.borrow() {
-                let _ = write!(terminal, "{heading}   The run ends, and does not wait for this.\r\n");
+                let wanted = wanted_of(&about, what);
+                let _ = write!(
+                    terminal,
+                    "\r\n-- the run ends, and does not wait for this --\r\n{wanted}"
+                );
                 return Answer::GivenUp;
             }
+            let heading = self.heading(&about, what);
             let answer = match Raw::on() {
                 Ok(_raw) => put(&heading, within, wanted, &self.shared.stop, &mut terminal),
                 Err(error) => Err(error),

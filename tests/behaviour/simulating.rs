@@ -276,10 +276,9 @@ fn post(address: &str, path: &str, body: &str) -> String {
 
 #[test]
 fn hooks_say_what_there_is_and_what_is_wrong() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
     let bench = Bench::new();
-    // Nothing but a port is needed: the connection is tried again and again.
-    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
-    let url = format!("mqtt://{}", silent.local_addr().unwrap());
+    let url = mosquitto.url();
     let mut running = Running::start(&mut tool(
         bench.path(),
         &["simulate", "master-control", "--broker", &url],
@@ -316,6 +315,17 @@ fn hooks_say_what_there_is_and_what_is_wrong() {
 
     running.interrupt();
     running.end().code(0);
+}
+
+#[test]
+fn a_broker_that_says_nothing_is_5() {
+    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("mqtt://{}", silent.local_addr().unwrap());
+    for what in ["agv", "master-control"] {
+        run(&["simulate", what, "--broker", &url])
+            .code(5)
+            .says_one_error("it does not answer");
+    }
 }
 
 #[test]
