@@ -38,6 +38,7 @@ mod motion;
 mod motion_signs;
 mod mqtt;
 mod orders;
+mod rhythm;
 mod state;
 mod topic;
 mod topic_heard;

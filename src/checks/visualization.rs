@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use super::rhythm::Rhythm;
 use super::traffic::{Traffic, broken, lag, outside_influence, remark};
 use super::{Check, CheckContext, CheckFinding, Running};
 use crate::clock::Moment;
 use crate::journal::Entry;
-use crate::journal::event::{Event, Packet};
 
 /// `visualization/rate`.
 pub(super) const RATE: Check = Check {
@@ -48,7 +48,7 @@ struct Rate {
     traffic: Traffic,
     /// visualizationInterval, once a factsheet came.
     stated: Option<Duration>,
-    last: Option<Moment>,
+    rhythm: Rhythm,
     gaps: VecDeque<Duration>,
     /// Since when the vehicle could have published.
     since: Option<Moment>,
@@ -100,19 +100,14 @@ impl Running for Rate {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
         let now = entry.at().moment;
-        let packet =
-            |wanted: fn(&Packet) -> bool| matches!(entry.event(), Event::Packet { packet, .. } if wanted(packet));
-        let ends = matches!(entry.event(), Event::Closed { .. } | Event::Fault { .. })
-            || packet(|packet| matches!(packet, Packet::Disconnect { .. } | Packet::Connect { .. }))
-            || outside_influence(entry);
-        if ends {
-            self.last = None;
+        if self.rhythm.note(entry) || outside_influence(entry) {
+            self.rhythm.forget();
             self.since = None;
             self.gaps.clear();
         }
         if let Some(late) = lag(entry) {
             // The interval in which the harness was late is not counted.
-            self.last = None;
+            self.rhythm.forget();
             self.since = self.since.map(|since| since + late);
         }
         let Some(message) = self
@@ -134,9 +129,7 @@ impl Running for Rate {
             }
             "visualization" => {
                 self.published = true;
-                if let Some(last) = self.last.replace(now) {
-                    self.gaps.push_back(now.since(last));
-                }
+                self.gaps.extend(self.rhythm.beat(now, self.stated));
                 self.presence_only || self.judge(entry.seq(), findings)
             }
             "state" => {
@@ -154,6 +147,7 @@ mod tests {
     use serde_json::json;
 
     use super::super::trace::Trace;
+    use crate::journal::event::LinkFault;
 
     fn trace(stated: f64) -> Trace {
         let mut trace = Trace::subscriber();
@@ -192,6 +186,23 @@ mod tests {
             trace.message("visualization", &json!({}));
         }
         assert!(trace.judge("visualization/rate").findings.is_empty());
+    }
+
+    #[test]
+    fn messages_that_a_link_fault_held_back_come_all_at_once() {
+        let mut trace = trace(1.0);
+        trace.fault(LinkFault::Silence { direction: None }).wait(20.0).fault(LinkFault::Restore);
+        for _ in 0..20 {
+            trace.wait(0.001).message("visualization", &json!({}));
+        }
+        for _ in 0..20 {
+            trace.wait(1.0).message("visualization", &json!({}));
+        }
+        assert!(trace.judge("visualization/rate").findings.is_empty());
+        for _ in 0..10 {
+            trace.wait(3.0).message("visualization", &json!({}));
+        }
+        assert_eq!(trace.judge("visualization/rate").summary(), ["VIS-02"]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use crate::checks::rhythm::Rhythm;
 use crate::checks::topic::looks_like;
 use crate::checks::traffic::{Traffic, broken, device_publish, outside_influence, remark, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
@@ -165,22 +166,13 @@ struct OwnLimits {
     traffic: Traffic,
     arrays: Map<String, Value>,
     interval: Option<Duration>,
-    last: Option<Moment>,
+    rhythm: Rhythm,
 }
 
 impl Running for OwnLimits {
     fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.traffic.note(entry);
-        if matches!(
-            entry.event(),
-            Event::Fault { .. }
-                | Event::Packet {
-                    packet: Packet::Connect { .. },
-                    ..
-                }
-        ) {
-            self.last = None;
-        }
+        self.rhythm.note(entry);
         let Some(message) = self.traffic.delivered(entry, context) else {
             return false;
         };
@@ -220,20 +212,19 @@ impl Running for OwnLimits {
                         findings.push(broken("FACT-11", entry.seq(), text));
                     }
                 }
-                let now = entry.at().moment;
-                if let (Some(least), Some(last)) = (self.interval, self.last)
+                let gap = self.rhythm.beat(entry.at().moment, self.interval);
+                if let (Some(least), Some(gap)) = (self.interval, gap)
                     && !self.traffic.disturbed
                     // Arrival times jitter; half the interval cannot be jitter alone.
-                    && now.since(last) * 2 < least
+                    && gap * 2 < least
                 {
                     let text = format!(
                         "two states {:.3} s apart, the factsheet says at least {:.3} s",
-                        now.since(last).as_secs_f64(),
+                        gap.as_secs_f64(),
                         least.as_secs_f64()
                     );
                     findings.push(remark("FACT-14", entry.seq(), text));
                 }
-                self.last = Some(now);
                 !self.arrays.is_empty() || self.interval.is_some()
             }
             _ => false,
@@ -341,5 +332,18 @@ mod tests {
             trace.judge("state/own-limits").summary(),
             ["FACT-11", "FACT-14 warning"]
         );
+    }
+
+    #[test]
+    fn states_that_a_link_fault_held_back_do_not_follow_too_fast() {
+        let mut trace = Trace::subscriber();
+        trace.message("factsheet", &json!({ "protocolLimits": { "timing": { "minStateInterval": 0.5 } } }));
+        trace.fault(LinkFault::Silence { direction: None }).wait(20.0).fault(LinkFault::Restore);
+        for _ in 0..20 {
+            trace.wait(0.001).state(&json!({}));
+        }
+        assert!(trace.judge("state/own-limits").findings.is_empty());
+        trace.wait(0.5).state(&json!({})).wait(0.1).state(&json!({}));
+        assert_eq!(trace.judge("state/own-limits").summary(), ["FACT-14 warning"]);
     }
 }

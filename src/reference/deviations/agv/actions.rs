@@ -64,7 +64,8 @@ records! {
             let held = is_behind(action, agv.book.base_end.1) && agv.waits_at_decision_point();
             !held || say(m, "WAITING", "PAUSED")
         });
-    fault "cancel-shows-paused" ["ORD-CANCEL-05", "ASTATE-04"] "An action that cannot be interrupted is reported PAUSED while the cancellation waits for it."
+    fault "cancel-shows-paused" ["ORD-CANCEL-05"] "An action that cannot be interrupted is reported PAUSED while the cancellation waits for it."
+        because "ORD-CANCEL-05, that the action stays RUNNING, is a recommendation; PAUSED is a fault where it lasts though nothing holds the vehicle."
         => action(|agv, action, m| !action.of_order() || agv.book.cancel.is_none() || say(m, "RUNNING", "PAUSED"));
     fault "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant."
         => action(|_, _, m| say(m, "FINISHED", "DONE"));

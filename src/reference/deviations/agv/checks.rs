@@ -66,6 +66,7 @@ records! {
         because "Whether a vehicle ignores a field that its factsheet does not list, or honours it, cannot be seen; the ruling of OPT-02 is a warning."
         => overlooking(|_, what| matches!(what, Objection::Unused(..)));
     fault "min-height-ignored" ["OPT-02", "ORD-REJ-05"] "An order with minHeight is accepted although the vehicle does not know the field."
+        because "Whether a vehicle ignores a field that its factsheet does not list, or honours it, cannot be seen; the ruling of OPT-02 is a warning."
         => overlooking(|_, what| matches!(what, Objection::Unused(path, _) if path.ends_with("minHeight")));
     fault "unsupported-field-in-update-ignored" ["OPT-02", "ORD-REJ-05"] "It refuses unsupported optional fields in new orders only and takes over an order update with such a field, ignoring the field."
         => updating(|agv, order| if !agv.config.trajectories {

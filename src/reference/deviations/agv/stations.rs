@@ -76,6 +76,7 @@ records! {
             !silent.into_iter().any(|deed| is(action, deed))
         });
     fault "failure-blames-first-action" ["BP-03"] "It references the first action of the order in the error about a failed one, whichever failed."
+        because "BP-03, that the failed action is referenced, is a recommendation."
         => failure(|agv, action, e| {
             if let Some(first) = agv.actions.iter().find(|other| other.of_order() && action.of_order()) {
                 let named = e.references.iter_mut().filter(|(key, _)| key == "actionId");

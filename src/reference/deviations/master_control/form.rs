@@ -142,6 +142,7 @@ records! {
     fault "nul-after-json" ["MQTT-02", "JSON-10"] "Sends the terminating zero byte of its string with every message."
         => plain().writes(|_, _, text| text.push(0));
     fault "byte-order-mark" ["JSON-03"] "It begins every order message with a byte order mark."
+        because "The message is UTF-8, and the ruling of JSON-03 leaves a warning for the mark."
         => plain().writes(|name, _, text| {
             if name == "order" {
                 *text = [b"\xef\xbb\xbf".as_slice(), text].concat();

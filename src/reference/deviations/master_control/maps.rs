@@ -54,6 +54,7 @@ records! {
         because "It breaks a recommendation only."
         => plain().asked(|(), _, _, command, _| command != "download-map");
     fault "download-refused-during-order" ["MAP-10"] "It drops the roll-out of a map to a vehicle that drives an order."
+        because "It breaks a recommendation only."
         => plain().asked(|(), _, vehicle, command, _| command != "download-map" || vehicle.running.is_none());
     fault "enable-before-download" ["MAP-10"] "It sends enableMap for a map it rolls out before downloadMap."
         because "MAP-10 recommends that a map is on board before it is activated, and obliges nobody."
