@@ -107,9 +107,6 @@ const DURATION: &[Parameter] = &[optional("duration", "NUMBER")];
 /// Highest lift in metres; a pick or drop above it cannot be performed.
 pub(crate) const MAX_HEIGHT: f64 = 2.0;
 
-/// Names of the load handling devices.
-pub(crate) const LOAD_POSITIONS: [&str; 1] = ["LHD1"];
-
 const PICK: &[Parameter] = &[
     required("stationType", "STRING"),
     required("loadType", "STRING"),

@@ -256,7 +256,7 @@ impl Agv {
 
     fn place_load(&mut self, id: &str, load_type: &str) {
         if self.loads.is_empty() {
-            let position = super::action_kinds::LOAD_POSITIONS[0].to_owned();
+            let position = super::config::LOAD_POSITIONS[0].to_owned();
             self.loads.push(super::Load {
                 id: id.to_owned(),
                 kind: load_type.to_owned(),

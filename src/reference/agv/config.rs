@@ -8,9 +8,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use super::action_kinds::LOAD_POSITIONS;
-use super::instant::MAX_INSTANT_ACTIONS;
 use super::read::MAX_STRING;
+
+/// Names of the load handling devices.
+pub(crate) const LOAD_POSITIONS: [&str; 1] = ["LHD1"];
+
+/// At most this many actions of one instantActions message are taken.
+pub(crate) const MAX_INSTANT_ACTIONS: usize = 50;
 
 /// A node of the layout the vehicle knows.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,8 @@
 use serde_json::{Map, Value, json};
 
 use super::ability::SLOWEST;
-use super::action_kinds::{self, ActionKind, LOAD_POSITIONS, MAX_HEIGHT};
+use super::action_kinds::{self, ActionKind, MAX_HEIGHT};
+use super::config::LOAD_POSITIONS;
 use super::errors::MAX_ERRORS;
 use super::path::{HALF_LENGTH, HALF_WIDTH};
 use super::points::Part;

@@ -14,9 +14,6 @@ use super::order_message::{ActionRequest, Blocking, read_parameters};
 use super::points::{Cause, Event, Permission};
 use super::read::{Defect, Fields};
 
-/// At most this many actions of one message are taken.
-pub(crate) const MAX_INSTANT_ACTIONS: usize = 50;
-
 /// At most this many instant actions are remembered between two orders; the oldest that have ended give way.
 const MAX_REMEMBERED: usize = 500;
 

@@ -5,8 +5,8 @@
 
 use serde_json::Value;
 
-use super::action_kinds::LOAD_POSITIONS;
 use super::actions::{Action, Origin};
+use super::config::LOAD_POSITIONS;
 use super::deeds::{Area, Outcome, Problem};
 use super::{Agv, Load};
 

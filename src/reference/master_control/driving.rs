@@ -5,27 +5,12 @@
 
 use super::Site;
 use super::order::Window;
-use super::seam::{Event, Measure, Occasion, Permission, Plan};
+use super::seam::{Event, Fate, Measure, Occasion, Permission, Plan};
 use super::seen::State;
 use super::vehicle::{Running, Transport, Vehicle};
 
 /// A transport is not begun more often than this.
 const MAX_BEGUN: u32 = 3;
-
-/// What has become of the running order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fate {
-    /// It goes on.
-    Runs,
-    /// It is done, or given up.
-    Over,
-    /// The vehicle does not have it any more, or refused it for where it stands.
-    Again,
-    /// The rest has to be called off.
-    CalledOff,
-    /// The same, because a trigger did not come in time.
-    TooLate,
-}
 
 impl Site {
     /// Looks after the running order.

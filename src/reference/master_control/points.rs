@@ -271,3 +271,18 @@ pub(crate) struct Joining {
     /// How long to wait after a lost link; `None` for ever.
     pub(crate) retry: Option<Duration>,
 }
+
+/// What has become of the running order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fate {
+    /// It goes on.
+    Runs,
+    /// It is done, or given up.
+    Over,
+    /// The vehicle does not have it any more, or refused it for where it stands.
+    Again,
+    /// The rest has to be called off.
+    CalledOff,
+    /// The same, because a trigger did not come in time.
+    TooLate,
+}

@@ -9,12 +9,11 @@ use serde_json::Value;
 
 use super::Site;
 use super::config::MasterControlConfig;
-use super::driving::Fate;
 use super::seen::State;
 use super::vehicle::{Running, Vehicle};
 
 pub(crate) use super::points::{
-    Event, Field, Heard, Joining, Made, Measure, Occasion, Outgoing, Permission, Plan, Span,
+    Event, Fate, Field, Heard, Joining, Made, Measure, Occasion, Outgoing, Permission, Plan, Span,
 };
 
 /// One that is switched on.

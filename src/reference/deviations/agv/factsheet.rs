@@ -1,7 +1,7 @@
 //! Deviations of what the factsheet says (section 6.15).
 
 use super::hooks::{Object, factsheet, sending, text};
-use crate::reference::agv::instant::MAX_INSTANT_ACTIONS;
+use crate::reference::agv::config::MAX_INSTANT_ACTIONS;
 use crate::reference::agv::seam::Deviation;
 use crate::reference::deviations::record::Record;
 use crate::reference::deviations::words::Words;

@@ -210,7 +210,6 @@ records! {
             phases
         });
     fault "hard-starts-beside-none" ["BLOCK-05", "BLOCK-06"] "It starts a HARD action while a NONE action before it is still running."
-        because "An action that blocks nothing runs beside it; that BLOCK-05 also reaches back to what runs already is a matter of reading."
         => forbidding(|_, what| matches!(what, Permission::Await(action, _) if action.request.blocking == Blocking::None));
     fault "hard-ignores-earlier-node" ["BLOCK-05"] "A HARD action begins although a NONE action of an earlier node or edge is still running."
         because "The node of the other action is left behind; that BLOCK-05 reaches so far is a matter of reading."

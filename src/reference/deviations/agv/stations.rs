@@ -2,8 +2,9 @@
 
 use super::hooks::{after, brief, failed, fails_unseen, failure, holding, instead, is, keep, succeeded};
 use crate::clock::Moment;
-use crate::reference::agv::action_kinds::{Deed, LOAD_POSITIONS};
+use crate::reference::agv::action_kinds::Deed;
 use crate::reference::agv::actions::Action;
+use crate::reference::agv::config::LOAD_POSITIONS;
 use crate::reference::agv::deeds::{Area, Outcome, Problem};
 use crate::reference::agv::rejection::{Refusal, Rule};
 use crate::reference::agv::seam::{Cause, Deviation, Event, Part, Relation};

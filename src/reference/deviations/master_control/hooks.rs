@@ -8,10 +8,9 @@ use serde_json::{Map, Value};
 use crate::reference::ConnectOptions;
 use crate::reference::deviations::words::Words;
 use crate::reference::master_control::dispatch::Way;
-use crate::reference::master_control::driving::Fate;
 use crate::reference::master_control::order::Window;
 use crate::reference::master_control::seam::{
-    Deviation, Event, Field, Heard, Joining, Made, Measure, Outgoing, Permission, Plan, Span,
+    Deviation, Event, Fate, Field, Heard, Joining, Made, Measure, Outgoing, Permission, Plan, Span,
 };
 use crate::reference::master_control::seen::State;
 use crate::reference::master_control::vehicle::{Leg, Running, Stop, Transport, Vehicle};

@@ -7,6 +7,7 @@
 mod declared;
 mod orders;
 mod speech;
+mod told;
 mod words;
 
 use std::time::Duration;

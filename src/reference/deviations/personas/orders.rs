@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::Persona;
-use super::words::Told;
+use super::told::Told;
 use crate::reference::agv::Agv;
 use crate::reference::agv::errors::{ActiveError, Life};
 use crate::reference::agv::order_message::Order;

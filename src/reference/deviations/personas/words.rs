@@ -1,12 +1,11 @@
 //! The words themselves, and what each changes.
 
-use std::time::Duration;
-
 use serde_json::Value;
 
+use super::Persona;
 use super::orders::Rejection;
 use super::speech::republish;
-use super::{LONGEST, Persona};
+use super::told::Told;
 use crate::reference::Output;
 use crate::reference::agv::Agv;
 
@@ -39,38 +38,6 @@ pub const WORDS: &[&str] = &[
     "publish",
     "speak-version",
 ];
-
-/// What a word says, read leniently: a test was linted before.
-pub(super) struct Told<'a>(&'a Value);
-
-impl Told<'_> {
-    pub(super) fn text(&self, key: &str) -> Option<String> {
-        let text = self.0.get(key)?.as_str()?;
-        Some(text.to_owned()).filter(|text| !text.is_empty())
-    }
-
-    fn time(&self, key: &str) -> Option<Duration> {
-        let seconds = self.0.get(key)?.as_f64()?;
-        Some(Duration::from_secs_f64(seconds.clamp(0.0, LONGEST)))
-    }
-
-    pub(super) fn count(&self, usual: u64) -> u64 {
-        self.0.get("count").and_then(Value::as_u64).unwrap_or(usual)
-    }
-
-    pub(super) fn flag(&self, key: &str) -> Option<bool> {
-        self.0.get(key)?.as_bool()
-    }
-
-    /// A merge patch; `None` when it says nothing.
-    fn patch(&self, key: &str) -> Option<Value> {
-        let patch = self.0.get(key)?;
-        patch
-            .as_object()
-            .is_some_and(|members| !members.is_empty())
-            .then(|| patch.clone())
-    }
-}
 
 impl Persona {
     /// A word about how to behave; whether it is one. A state tells what it changed.
