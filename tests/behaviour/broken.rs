@@ -145,6 +145,26 @@ fn a_device_that_is_started_again_by_the_harness_is_judged_on() {
 }
 
 #[test]
+fn a_device_that_the_harness_ends_in_good_order_signs_off_and_comes_back() {
+    let profile = Profile {
+        device: started_by_the_harness(),
+        more: "[hooks.shutdown]\nbuiltin = \"stop-command\"\n[hooks.start]\nbuiltin = \"start-command\"".to_owned(),
+        ..Profile::default()
+    };
+    let bench = Bench::new();
+    let (run, _) = bench.start(&profile, &["connection/graceful-goodbye", QUICK]);
+    run.end().code(0);
+    let tests = bench.result()["tests"].clone();
+    let goodbye = tests
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|test| test["id"] == "connection/graceful-goodbye");
+    assert_eq!(goodbye.unwrap()["verdict"], "pass", "{tests}");
+    bench.is_whole();
+}
+
+#[test]
 fn a_broker_killed_in_the_middle_of_a_test_is_5_and_the_journal_is_kept() {
     let Some(mosquitto) = Mosquitto::start() else { return };
     let bench = Bench::new();
