@@ -191,7 +191,10 @@ mod tests {
     #[test]
     fn messages_that_a_link_fault_held_back_come_all_at_once() {
         let mut trace = trace(1.0);
-        trace.fault(LinkFault::Silence { direction: None }).wait(20.0).fault(LinkFault::Restore);
+        trace
+            .fault(LinkFault::Silence { direction: None })
+            .wait(20.0)
+            .fault(LinkFault::Restore);
         for _ in 0..20 {
             trace.wait(0.001).message("visualization", &json!({}));
         }

@@ -337,8 +337,14 @@ mod tests {
     #[test]
     fn states_that_a_link_fault_held_back_do_not_follow_too_fast() {
         let mut trace = Trace::subscriber();
-        trace.message("factsheet", &json!({ "protocolLimits": { "timing": { "minStateInterval": 0.5 } } }));
-        trace.fault(LinkFault::Silence { direction: None }).wait(20.0).fault(LinkFault::Restore);
+        trace.message(
+            "factsheet",
+            &json!({ "protocolLimits": { "timing": { "minStateInterval": 0.5 } } }),
+        );
+        trace
+            .fault(LinkFault::Silence { direction: None })
+            .wait(20.0)
+            .fault(LinkFault::Restore);
         for _ in 0..20 {
             trace.wait(0.001).state(&json!({}));
         }
