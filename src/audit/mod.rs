@@ -10,6 +10,7 @@ mod arrived;
 pub mod bundle;
 mod cause;
 mod continuity;
+mod conversation;
 pub mod crew;
 pub mod export;
 mod header;

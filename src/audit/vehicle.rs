@@ -1,15 +1,15 @@
-//! One vehicle of a recording, with the master control that commands it.
+//! One vehicle of a recording, with the master control that commands it: what came, in its order, and by which version of
+//! the protocol its [`conversation`](super::conversation) is judged.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::Value;
 
 use super::Scene;
 use super::arrival::{Known, Sorted};
-use super::arrived::{Arrived, is_at_rest, of_side, timestamp, version};
-use super::continuity::{Continuity, Step};
+use super::arrived::{Arrived, timestamp, version};
+use super::conversation::{Concluded, Conversation};
 use super::header::header;
 use super::news::Found;
 use super::outcome::Outcome;
@@ -21,7 +21,7 @@ use crate::capture::Message;
 use crate::clock::{Moment, Stamp};
 use crate::journal::event::{Event, Record, RunHeader, Source};
 use crate::journal::{Entry, Payload};
-use crate::pack::{Pack, Role};
+use crate::pack::{Pack, Role, Version};
 use crate::pattern::whole;
 
 /// How many messages wait until the vehicle has said which version it speaks.
@@ -30,12 +30,6 @@ const WAITING: usize = 64;
 const FIRST_HAND: Duration = Duration::from_secs(60);
 /// How often the version of a vehicle may change; a vehicle that changes it more often is judged by the last one.
 const STRETCHES: usize = 16;
-
-/// The sides, once the version is known.
-struct Sides {
-    pack: Arc<Pack>,
-    all: Vec<Side>,
-}
 
 /// See the module.
 pub(super) struct Vehicle {
@@ -50,12 +44,9 @@ pub(super) struct Vehicle {
     /// Topics of which something came.
     begun: BTreeSet<String>,
     waiting: Vec<Arrived>,
-    sides: Option<Sides>,
+    conversation: Conversation,
     /// The version it names, where there are no rules for it.
     foreign: Option<String>,
-    continuity: Continuity,
-    /// By role: how far the clock of the sender is from that of the recorder.
-    clocks: BTreeMap<&'static str, i64>,
     counts: BTreeMap<String, u64>,
     twice: u64,
     stale: u64,
@@ -83,10 +74,8 @@ impl Vehicle {
             sorted: BTreeMap::new(),
             begun: BTreeSet::new(),
             waiting: Vec::new(),
-            sides: None,
+            conversation: Conversation::default(),
             foreign: None,
-            continuity: Continuity::default(),
-            clocks: BTreeMap::new(),
             counts: BTreeMap::new(),
             twice: 0,
             stale: 0,
@@ -173,14 +162,12 @@ impl Vehicle {
 
     /// The header of a judge of one of its sides, once its version is known.
     pub fn own_header(&self, role: Role) -> Option<RunHeader> {
-        let sides = self.sides.as_ref()?;
-        Some(self.header(role, &sides.pack))
+        Some(self.header(role, self.conversation.pack()?))
     }
 
     /// Takes over what was found of a connection.
     pub fn wired(&mut self, role: Role, outcome: Outcome, scene: Scene<'_>) {
-        let mut sides = self.sides.iter_mut().flat_map(|sides| &mut sides.all);
-        if let Some(side) = sides.find(|side| side.role == role) {
+        if let Some(side) = self.conversation.sides_mut().find(|side| side.role == role) {
             self.wired = true;
             side.wired(outcome, scene);
         }
@@ -192,17 +179,13 @@ impl Vehicle {
             self.pass(arrived, scene);
         }
         self.sorted.clear();
-        self.continuity.interrupted();
-        let since = self.now;
-        for side in self.sides.iter_mut().flat_map(|sides| &mut sides.all) {
-            side.broken(since);
-        }
+        self.conversation.interrupted(self.now);
     }
 
     /// What was found since this was asked last.
     pub fn news(&mut self) -> Vec<Found> {
         let mut news = std::mem::take(&mut self.news);
-        for side in self.sides.iter_mut().flat_map(|sides| &mut sides.all) {
+        for side in self.conversation.sides_mut() {
             news.append(&mut side.news);
         }
         news
@@ -238,8 +221,8 @@ impl Vehicle {
             let concluded = self.conclude(scene);
             self.earlier.push(concluded);
         }
-        if self.sides.is_some() {
-            self.show(&arrived, scene);
+        if self.conversation.pack().is_some() {
+            self.conversation.show(&arrived, scene);
             return;
         }
         if self.foreign.is_some() {
@@ -263,14 +246,12 @@ impl Vehicle {
             return false;
         };
         let Some(said) = version(message) else { return false };
-        let is_other = match (&self.sides, &self.foreign) {
-            (Some(sides), _) => said
-                .parse()
-                .is_ok_and(|said: crate::pack::Version| said != sides.pack.version),
+        let is_other = match (self.conversation.pack(), &self.foreign) {
+            (Some(pack), _) => said.parse().is_ok_and(|said: Version| said != pack.version),
             (None, Some(foreign)) => said != *foreign,
             (None, None) => false,
         };
-        is_other && !self.continuity.goes_on(&arrived.name, message)
+        is_other && !self.conversation.goes_on(&arrived.name, message)
     }
 
     /// Finds the version, and judges what waited for it.
@@ -294,12 +275,9 @@ impl Vehicle {
         self.identify();
         let roles = [Role::Agv, Role::MasterControl];
         let sides = roles.map(|role| Side::begin(role, self.header(role, &pack), begun, self.timed, scene));
-        self.sides = Some(Sides {
-            pack,
-            all: sides.into_iter().flatten().collect(),
-        });
+        self.conversation.begin(pack, sides.into_iter().flatten().collect());
         for arrived in std::mem::take(&mut self.waiting) {
-            self.show(&arrived, scene);
+            self.conversation.show(&arrived, scene);
         }
     }
 
@@ -324,70 +302,12 @@ impl Vehicle {
         header(role, pack, &self.manufacturer, &self.serial_number, topics)
     }
 
-    /// Shows a message to both sides.
-    fn show(&mut self, arrived: &Arrived, scene: Scene<'_>) {
-        let Some(Sides { pack, all }) = &mut self.sides else {
-            return;
-        };
-        let Some(rule) = pack.topic(&arrived.name) else { return };
-        let publisher = rule.publisher;
-        let message = arrived.entry.json();
-        if !arrived.stale {
-            let moment = arrived.at.moment;
-            if let Some(since) = self.continuity.crossed(&arrived.name, message, moment) {
-                let commanding = all.iter_mut().filter(|side| side.role == Role::MasterControl);
-                commanding.for_each(|side| side.broken(since));
-            }
-            let step = self.continuity.note(&arrived.name, message, moment);
-            let begins_anew = arrived.name == "connection";
-            for side in all.iter_mut() {
-                match step {
-                    Step::Hole(since) => side.broken(since),
-                    // Nobody knows what becomes of a vehicle while it is away.
-                    Step::Begins if begins_anew && side.role == Role::MasterControl => side.broken(arrived.at.moment),
-                    Step::Follows if arrived.name == "state" => side.confirmed(scene),
-                    _ => {}
-                }
-            }
-            // What was sent of an order before is not known: judging begins where none is under way.
-            let may_begin = arrived.name == "state" && step == Step::Follows && message.is_some_and(is_at_rest);
-            if may_begin && all.iter().any(|side| !side.watches()) {
-                self.continuity.forget();
-                self.continuity.learn(&arrived.name, message);
-                for side in all.iter_mut() {
-                    side.broken(Moment::from_micros(u64::MAX));
-                    side.mended(scene);
-                }
-            }
-        }
-        // How far the clocks are apart is not known to be the mistake of the device.
-        let word = publisher.word();
-        let said = message.and_then(timestamp).filter(|_| !arrived.stale);
-        if let Some(said) = said.filter(|_| !self.clocks.contains_key(word)) {
-            let apart = said.as_microsecond().saturating_sub(arrived.at.utc.as_microsecond());
-            self.clocks.insert(word, apart);
-        }
-        for side in all {
-            let own = side.role == publisher;
-            side.messages += u64::from(own);
-            if arrived.stale && !own {
-                continue;
-            }
-            let apart = self.clocks.get(word).copied().unwrap_or_default();
-            let entry = of_side(arrived, own, apart);
-            side.observe(&entry, arrived.at.utc, scene);
-            if own && publisher == Role::Agv {
-                side.confirmed(scene);
-            }
-        }
-    }
-
     /// Nothing comes any more that would say which version it speaks.
     pub fn ready(&mut self, scene: Scene<'_>) {
         for arrived in self.held() {
             self.pass(arrived, scene);
         }
-        if self.sides.is_none() && self.foreign.is_none() {
+        if self.conversation.pack().is_none() && self.foreign.is_none() {
             self.settle(scene, true);
         }
     }
@@ -402,22 +322,12 @@ impl Vehicle {
 
     /// What came out since the vehicle speaks this version.
     fn conclude(&mut self, scene: Scene<'_>) -> VehicleResult {
-        if self.sides.is_none() && self.foreign.is_none() {
+        if self.conversation.pack().is_none() && self.foreign.is_none() {
             self.settle(scene, true);
         }
         self.news = self.news();
         let foreign = self.foreign.take();
-        self.clocks.clear();
-        let (protocol, sides) = match self.sides.take() {
-            Some(Sides { pack, all }) => (
-                Some(pack.version.to_string()),
-                all.into_iter()
-                    .filter(|side| side.messages > 0)
-                    .map(|side| side.finish(scene))
-                    .collect(),
-            ),
-            None => (None, Vec::new()),
-        };
+        let Concluded { protocol, sides, holes } = self.conversation.conclude(scene);
         let not_judged = protocol.is_none().then(|| match &foreign {
             Some(version) => format!("protocol version {version}, which this program does not have"),
             None => "no message names a protocol version".to_owned(),
@@ -434,7 +344,7 @@ impl Vehicle {
             protocol,
             not_judged,
             messages: std::mem::take(&mut self.counts),
-            holes: std::mem::take(&mut self.continuity).holes,
+            holes,
             twice: std::mem::take(&mut self.twice),
             retained: std::mem::take(&mut self.stale),
             vantage: if self.wired { "tap" } else { "subscriber" }.to_owned(),

@@ -1,10 +1,11 @@
 //! Devices nobody of this project wrote: the AGV and the master control of the npm package vda-5050-lib, each as it is
 //! shipped and with one obstacle removed. The harness must find exactly what stands in their lists of expected findings,
-//! each traced to a place in the library, and must accuse them of nothing else.
+//! each traced to a place in the library, and must accuse them of nothing else. The audit of each journal must find what the
+//! monitors of its run found.
 //!
 //! Both variants of both devices are run at once, each on several benches (`--shard`), because most of the time is waiting.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -138,6 +139,56 @@ impl Bench {
         }
         Ok(result)
     }
+
+    /// What the audit of its journal finds otherwise than the monitors of the run did; empty when nothing.
+    fn audited(&self, result: &Value) -> String {
+        let journal = ["journal.jsonl", "journal.jsonl.gz"].into_iter();
+        let Some(journal) = journal.filter_map(|name| find(&self.out, name)).next() else {
+            return format!("{}: there is no journal\n", self.name);
+        };
+        let audit = Command::new(env!("CARGO_BIN_EXE_vda5050-tck"))
+            .args(["audit", "--format", "json"])
+            .arg(&journal)
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        let audited: Value = serde_json::from_slice(&audit.stdout).unwrap_or_default();
+        let (run, audited) = (of_run(result), of_audit(&audited));
+        let mut report = String::new();
+        for [monitor, requirement, verdict, count] in audited.symmetric_difference(&run) {
+            let by = if run.contains(&[monitor, requirement, verdict, count].map(Clone::clone)) {
+                "the run alone"
+            } else {
+                "the audit alone"
+            };
+            let _ = writeln!(
+                report,
+                "{}: {monitor} {requirement} {verdict}, {count} times, by {by}",
+                self.name
+            );
+        }
+        report
+    }
+}
+
+/// Monitor, requirement, verdict and count of what monitors found.
+type ByMonitors = BTreeSet<[String; 4]>;
+
+fn by_monitor(monitor: &Value, finding: &Value) -> [String; 4] {
+    [monitor, &finding["requirement"], &finding["verdict"], &finding["count"]].map(ToString::to_string)
+}
+
+fn of_run(result: &Value) -> ByMonitors {
+    let monitors = list(result, "monitors");
+    let all = monitors.flat_map(|monitor| list(monitor, "findings").map(move |finding| (monitor, finding)));
+    all.map(|(monitor, finding)| by_monitor(&monitor["id"], finding))
+        .collect()
+}
+
+fn of_audit(audited: &Value) -> ByMonitors {
+    let sides = list(audited, "vehicles").flat_map(|vehicle| list(vehicle, "sides"));
+    let all = sides.flat_map(|side| list(side, "findings").chain(list(side, "information")));
+    all.map(|finding| by_monitor(&finding["monitor"], finding)).collect()
 }
 
 fn find(folder: &Path, name: &str) -> Option<PathBuf> {
@@ -244,7 +295,10 @@ fn read(device: &Device, variants: [(&str, Vec<Bench>); 2]) -> String {
         for mut bench in benches {
             // Every bench is waited for, so that none is left behind.
             match bench.result() {
-                Ok(result) => found.read(&result, variant, &mut report),
+                Ok(result) => {
+                    found.read(&result, variant, &mut report);
+                    report += &bench.audited(&result);
+                }
                 Err(why) => drop(writeln!(report, "{why}")),
             }
         }
@@ -265,6 +319,19 @@ fn the_harness_finds_in_foreign_devices_what_is_listed_and_nothing_else() {
     let reports = started.map(|(benches, device)| benches.map(|benches| read(&device, benches)));
     let report: String = reports.into_iter().flatten().collect();
     assert!(report.is_empty(), "{report}");
+}
+
+#[test]
+fn what_only_the_run_or_only_the_audit_found_is_a_difference() {
+    let finding = serde_json::json!({ "requirement": "A-1", "verdict": "fail", "count": 2 });
+    let run = serde_json::json!({ "monitors": [{ "id": "a/b", "findings": [finding] }] });
+    let mut found = finding.clone();
+    found["monitor"] = "a/b".into();
+    let audit = |findings: Value| serde_json::json!({ "vehicles": [{ "sides": [{ "findings": findings, "information": [] }] }] });
+    assert_eq!(of_run(&run), of_audit(&audit(serde_json::json!([found]))));
+    assert_eq!(of_run(&run).len(), 1);
+    found["count"] = 3.into();
+    assert_ne!(of_run(&run), of_audit(&audit(serde_json::json!([found]))));
 }
 
 #[test]

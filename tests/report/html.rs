@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use roxmltree::{Document, Node, ParsingOptions};
 use vda5050_tck::report::html;
 use vda5050_tck::report::sources::Sources;
+use vda5050_tck::verdict::Verdict;
 
 use crate::samples;
 
@@ -312,4 +313,47 @@ fn write_the_samples_for_a_person_to_look_at() {
     for (name, page) in ["pass", "fail", "hostile", "bare"].iter().zip(pages()) {
         std::fs::write(format!("{dir}/{name}.html"), page).expect("write");
     }
+}
+
+#[test]
+fn a_page_that_would_be_too_large_leaves_out_everything_but_what_shows_failures() {
+    let (mut result, journal) = samples::fail();
+    let broken = result.tests[0].clone();
+    let whole = html::render(&result, &samples::sources(), Some(&journal)).expect("html");
+    assert!(!whole.contains("Left out to keep this page small"));
+    let mut long = result.tests[1].clone();
+    long.steps = broken.steps.iter().cycle().take(40).cloned().collect();
+    long.journal = broken.journal;
+    for at in 0..400 {
+        let (mut undecided, mut passed) = (long.clone(), long.clone());
+        undecided.id = format!("connection/undecided-{at}");
+        passed.id = format!("connection/passed-{at}");
+        passed.verdict = Some(Verdict::Pass);
+        passed.reason = None;
+        passed.decisions.clear();
+        result.tests.extend([undecided, passed]);
+    }
+    let page = html::render(&result, &samples::sources(), Some(&journal)).expect("html");
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+    assert!(page.contains("Left out to keep this page small: the steps of tests that passed, and messages"));
+    let card = |page: &str, id: &str| {
+        let begin = page
+            .find(&format!("<code>{id}</code></h3>"))
+            .expect("a card of the test");
+        let rest = &page[begin..];
+        rest[..rest.find("\n</details>\n<details class=\"test").unwrap_or(rest.len())].to_owned()
+    };
+    // Two undecided tests have one cause: the first one is shown for all.
+    assert!(card(&page, "connection/last-will").contains("the device did not connect again"));
+    for id in ["connection/undecided-7", "connection/passed-7"] {
+        let card = card(&page, id);
+        assert!(card.contains("left out to keep the page small") && !card.contains("<table class=\"steps\">"));
+    }
+    let diagram = |page: &str| {
+        let card = card(page, &broken.id);
+        assert!(card.contains("<table class=\"steps\">"), "no steps");
+        let begin = card.find("<svg").expect("a diagram");
+        card[begin..].split("</details>").next().map(str::to_owned)
+    };
+    assert_eq!(diagram(&page), diagram(&whole), "what shows the failure is thinned");
 }

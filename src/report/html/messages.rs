@@ -12,7 +12,7 @@ const PAGE_LIMIT: usize = 600;
 /// Most bytes that messages take up in one page, roughly.
 const BYTES: usize = 2_000_000;
 /// Roughly what a line takes up beside its text.
-const OF_A_LINE: usize = 90;
+const OF_A_LINE: usize = 50;
 /// Most bytes of a payload that are set on lines.
 const PAYLOAD_LIMIT: usize = 64 * 1024;
 

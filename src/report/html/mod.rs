@@ -5,6 +5,7 @@
 //! the sequence diagrams, which are templates of their own.
 
 mod escape;
+mod evidence;
 mod exploration_view;
 mod matrix;
 mod messages;
@@ -12,6 +13,7 @@ mod overview_view;
 mod pretty;
 mod source_view;
 mod test_view;
+mod thinning;
 mod timeline;
 pub(super) mod view;
 
@@ -32,16 +34,35 @@ use matrix::ChapterView;
 use messages::{Gallery, MessageView};
 use overview_view::{AdviceView, FindingView, advice_views, finding_views};
 use test_view::TestView;
+use thinning::Thinning;
 use view::{Badge, CountRow, MonitorView};
 
-/// The result as one HTML page. Without a journal it has no messages and no sequence diagrams.
+/// The result as one HTML page. Without a journal it has no messages and no sequence diagrams. A page that would be too
+/// large is thinned until it is not, see [`thinning`], and says so.
 ///
 /// # Errors
 /// When the template cannot be written; it has no reason to.
 pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) -> Result<String, askama::Error> {
+    let mut page = String::new();
+    for thinning in Thinning::ALL {
+        page = thinned(result, sources, journal, thinning)?;
+        if page.len() <= thinning::LARGE {
+            break;
+        }
+    }
+    Ok(page)
+}
+
+/// The page with this left out.
+fn thinned(
+    result: &RunResult,
+    sources: &Sources,
+    journal: Option<&Journal>,
+    thinning: Thinning,
+) -> Result<String, askama::Error> {
     let anchors = Anchors::of(result);
     let mut gallery = Gallery::new(journal);
-    let tests = test_view::views(result, sources, &anchors, &mut gallery)?;
+    let tests = test_view::views(result, sources, &anchors, &thinning.of(result), &mut gallery)?;
     let monitors = view::monitors(result, sources, &anchors, &mut gallery);
     let monitor_messages = gallery.take();
     let findings = finding_views(result, sources, &anchors, |seq| gallery.shows(seq));
@@ -80,6 +101,7 @@ pub fn render(result: &RunResult, sources: &Sources, journal: Option<&Journal>) 
         not_applicable: tests.iter().any(|test| test.not_applicable),
         tests,
         shown_tests,
+        left_out: thinning.said(),
         monitors,
         monitor_messages,
         capabilities: &result.capabilities,
@@ -136,6 +158,8 @@ struct Page<'a> {
     chapters: Vec<ChapterView>,
     tests: Vec<TestView>,
     shown_tests: usize,
+    /// What was left out of the tests.
+    left_out: Option<&'static str>,
     not_applicable: bool,
     monitors: Vec<MonitorView>,
     monitor_messages: Vec<MessageView>,

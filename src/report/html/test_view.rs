@@ -1,12 +1,11 @@
 //! One test of the page: what was decided, by which clause and which message, and what happened around it.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use super::Anchors;
+use super::evidence::{choose, marked};
 use super::messages::{Gallery, MessageView};
 use super::source_view::{SourceView, source_view};
+use super::thinning::Thinned;
 use super::view::Badge;
-use crate::journal::Event;
 use crate::report::headline::reference;
 use crate::report::repeated;
 use crate::report::sources::Sources;
@@ -15,12 +14,8 @@ use crate::report::{clean, sequence};
 use crate::result::{Decision, RunResult, TestResult};
 use crate::verdict::Verdict;
 
-/// Most messages shown of one test.
-const MESSAGES: usize = 24;
 /// Most bytes of diagrams in a page. Where there are more, the journal has what they would show.
 const DIAGRAMS: usize = 1_500_000;
-/// Stimuli shown before and after each deciding message.
-const STIMULI: usize = 3;
 
 /// One test.
 pub struct TestView {
@@ -104,6 +99,7 @@ pub fn views(
     result: &RunResult,
     sources: &Sources,
     anchors: &Anchors,
+    thinned: &Thinned<'_>,
     gallery: &mut Gallery<'_>,
 ) -> Result<Vec<TestView>, askama::Error> {
     let mut order: Vec<(usize, &TestResult)> = result.tests.iter().enumerate().collect();
@@ -112,12 +108,29 @@ pub fn views(
     let mut drawn = 0;
     let mut all = Vec::with_capacity(order.len());
     for (at, test) in order {
-        let view = view(at, test, drawn < DIAGRAMS, result, sources, anchors, gallery)?;
+        let evidence = if thinned.leaves_out(&test.id, test_verdict(test)) {
+            Evidence::LeftOut
+        } else if drawn < DIAGRAMS {
+            Evidence::Whole
+        } else {
+            Evidence::NotDrawn
+        };
+        let view = view(at, test, evidence, result, sources, anchors, gallery)?;
         drawn += view.diagram.as_ref().map_or(0, String::len);
         all.push(view);
     }
     link(&mut all);
     Ok(all)
+}
+
+/// How much the page shows of what happened in a test.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Evidence {
+    Whole,
+    /// All but the diagram, because there are too many.
+    NotDrawn,
+    /// Nothing.
+    LeftOut,
 }
 
 /// What a reader looks at first: what is broken, then remarks, then what broke the harness, then what stayed open.
@@ -152,7 +165,7 @@ fn link(all: &mut [TestView]) {
 fn view(
     at: usize,
     test: &TestResult,
-    draws: bool,
+    evidence: Evidence,
     result: &RunResult,
     sources: &Sources,
     anchors: &Anchors,
@@ -161,9 +174,10 @@ fn view(
     let verdict = test_verdict(test);
     let finding = !matches!(verdict, None | Some(Verdict::Pass));
     let source = sources.test(&test.id);
-    let left_out = if finding { choose(test, gallery) } else { None };
+    let shown = finding && evidence != Evidence::LeftOut;
+    let mut left_out = if shown { choose(test, gallery) } else { None };
     let diagram = match (gallery.journal(), test.journal) {
-        (Some(journal), Some(window)) if finding && draws => {
+        (Some(journal), Some(window)) if shown && evidence == Evidence::Whole => {
             let marked = marked(test);
             let steps = test
                 .steps
@@ -187,6 +201,16 @@ fn view(
         }
         _ => None,
     };
+    let not_drawn = shown && evidence == Evidence::NotDrawn && gallery.journal().is_some();
+    if not_drawn {
+        let missing = "The diagram is left out, because the page has so many; the journal has what it would show.";
+        left_out = Some(left_out.map_or_else(|| missing.to_owned(), |said| format!("{said} {missing}")));
+    } else if evidence == Evidence::LeftOut {
+        let missing = if finding { "Steps and messages" } else { "The steps" };
+        left_out = Some(format!(
+            "{missing} are left out to keep the page small; result and journal have them."
+        ));
+    }
     let decisions = test
         .decisions
         .iter()
@@ -218,6 +242,7 @@ fn view(
         steps: test
             .steps
             .iter()
+            .filter(|_| evidence != Evidence::LeftOut)
             .map(|step| StepView {
                 path: step.path.clone(),
                 verb: step.verb.clone(),
@@ -233,105 +258,10 @@ fn view(
                 seconds: seconds(step.seconds),
             })
             .collect(),
-        source: source.filter(|_| finding).map(|source| source_view(source, test)),
+        source: source.filter(|_| shown).map(|source| source_view(source, test)),
         diagram,
         messages: gallery.take(),
         left_out,
-    })
-}
-
-/// The records a diagram points out.
-fn marked(test: &TestResult) -> BTreeMap<u64, String> {
-    let mut worst: BTreeMap<u64, Verdict> = BTreeMap::new();
-    let mut marked = BTreeMap::new();
-    for decision in test.findings() {
-        if let Some(nearest) = &decision.nearest {
-            marked.insert(nearest.seq, "nearest miss".to_owned());
-        }
-        if let Some(witness) = decision.witness {
-            let entry = worst.entry(witness).or_insert(decision.verdict());
-            *entry = entry.join(decision.verdict());
-        }
-    }
-    marked.extend(worst.into_iter().map(|(seq, verdict)| (seq, verdict.word().to_owned())));
-    marked
-}
-
-/// Asks for the messages of a test: those that decided, the nearest misses, the stimuli around them. Says what
-/// was left out.
-fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
-    let journal = gallery.journal()?;
-    // The most important first, because there is a limit.
-    let pointed_out = marked(test);
-    let mut places: BTreeMap<u64, Vec<&str>> = BTreeMap::new();
-    for decision in test.findings() {
-        if let Some(witness) = decision.witness {
-            places.entry(witness).or_default();
-        }
-        if let Some(nearest) = &decision.nearest {
-            places.entry(nearest.seq).or_default().push(&nearest.path);
-        }
-    }
-    for of_one in places.values_mut().filter(|places| places.is_empty()) {
-        // Nothing to mark, but the message is shown unfolded.
-        of_one.push("");
-    }
-    let mut wanted: Vec<(u64, &str)> = pointed_out.iter().map(|(seq, role)| (*seq, role.as_str())).collect();
-    let mut centres: BTreeSet<u64> = pointed_out.keys().copied().collect();
-    wanted.extend(
-        test.findings()
-            .filter_map(|finding| finding.waited.as_ref())
-            .map(|w| (w.since, "stimulus")),
-    );
-    let (first, last) = test.journal?;
-    let all: Vec<_> = journal
-        .entries()
-        .iter()
-        .filter(|entry| (first..=last).contains(&entry.seq()))
-        .collect();
-    let sent: Vec<u64> = all
-        .iter()
-        .filter(|entry| matches!(entry.event(), Event::Sent { .. } | Event::Fault { .. }))
-        .map(|entry| entry.seq())
-        .collect();
-    if centres.is_empty() {
-        centres.insert(last);
-    }
-    for centre in &centres {
-        let split = sent.partition_point(|seq| seq < centre);
-        wanted.extend(sent[..split].iter().rev().take(STIMULI).map(|seq| (*seq, "stimulus")));
-        wanted.extend(sent[split..].iter().take(1).map(|seq| (*seq, "stimulus")));
-    }
-    wanted.extend(
-        test.steps
-            .iter()
-            .filter_map(|step| step.took)
-            .map(|seq| (seq, "taken by a step")),
-    );
-    let mut asked = BTreeSet::new();
-    for (seq, role) in wanted {
-        if asked.len() >= MESSAGES && !asked.contains(&seq) {
-            continue;
-        }
-        if gallery.show(seq, role, places.get(&seq).map_or(&[], Vec::as_slice)) {
-            asked.insert(seq);
-        }
-    }
-    // What the tap saw of them is the same messages once more.
-    let seen_once = |event: &Event| {
-        matches!(
-            event,
-            Event::Message { .. } | Event::Sent { .. } | Event::Retained { .. }
-        )
-    };
-    let recorded = || all.iter().filter(|entry| seen_once(entry.event()));
-    let messages = recorded().count();
-    let shown = recorded().filter(|entry| gallery.shows(entry.seq())).count();
-    (shown < messages).then(|| {
-        format!(
-            "{shown} of the {} recorded during this test; the journal has all of them.",
-            many(messages, "message")
-        )
     })
 }
 

@@ -194,6 +194,7 @@ impl Messages {
             message: self.told,
             topic: told.topic.clone(),
             kind: KINDS[at].name,
+            requirement: KINDS[at].breaks,
         });
         self.injected += 1;
         if at == self.turn || KINDS[self.turn].topic == name {
