@@ -16,6 +16,7 @@ mod list;
 mod log;
 mod messages;
 mod papers;
+mod pieces;
 mod pipeline;
 mod plan;
 mod problem;
