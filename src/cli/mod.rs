@@ -12,6 +12,7 @@ mod explained;
 mod explore;
 mod expression;
 mod follow;
+mod language;
 mod list;
 mod log;
 mod messages;
