@@ -4,7 +4,6 @@ use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::Deserialize as _;
 use serde::de::IgnoredAny;
 
 use super::args::{Format, Validate};
@@ -13,6 +12,7 @@ use super::messages::{self, Counted};
 use super::problem::Problem;
 use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
+use crate::journal::place;
 use crate::profile;
 use crate::report::json as result_file;
 use crate::run::Library;
@@ -141,40 +141,25 @@ fn read(path: &Path) -> Result<(Vec<u8>, Box<dyn Read>), Problem> {
     Ok((beginning, input))
 }
 
-/// What a JSON file of many bytes is, told without keeping what is in it.
-#[derive(serde::Deserialize)]
-struct Outline {
-    #[serde(rename = "metaInformation")]
-    meta: Option<IgnoredAny>,
-    layouts: Option<IgnoredAny>,
-    #[serde(default, deserialize_with = "text")]
-    format: Option<String>,
-}
-
-/// A text; anything else is nothing.
-fn text<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
-    let value = serde_json::Value::deserialize(deserializer)?;
-    Ok(value.as_str().map(str::to_owned))
-}
-
 fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
     let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    if let Ok(outline) = serde_json::from_slice::<Outline>(json) {
-        if outline.meta.is_some() && outline.layouts.is_some() {
+    if serde_json::from_slice::<IgnoredAny>(json).is_ok() {
+        // A file of many bytes is told by its members, and not kept as a whole.
+        let member = |name: &str| place::member(json, name);
+        if member("metaInformation").is_some() && member("layouts").is_some() {
             // The text itself, so that a mistake is shown where it stands.
             return Ok(match layout(&Source::new(name, String::from_utf8_lossy(bytes))) {
                 Ok(what) => Found::Good(what),
                 Err(all) => Found::Bad(all),
             });
         }
-        if outline.format.is_some_and(|format| format.contains(".result/")) {
-            return Ok(match result_file::from_str(&String::from_utf8_lossy(bytes), name) {
+        let format = member("format").map(|range| String::from_utf8_lossy(&json[range]));
+        if format.is_some_and(|format| format.contains(".result/")) {
+            return Ok(match result_file::from_str(&String::from_utf8_lossy(json), name) {
                 Ok(result) => Found::Good(format!("a result of {} tests", result.tests.len())),
                 Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
             });
         }
-    }
-    if serde_json::from_slice::<IgnoredAny>(json).is_ok() {
         return one(name, bytes, arguments, library);
     }
     let Ok(text) = std::str::from_utf8(bytes) else {
