@@ -182,7 +182,7 @@ fn tag(verdict: Option<Verdict>) -> &'static str {
     match verdict {
         Some(Verdict::Pass) => "PASS  ",
         Some(Verdict::Warning) => "WARN  ",
-        Some(Verdict::Inconclusive) => "OPEN  ",
+        Some(Verdict::Inconclusive) => "INCONCLUSIVE ",
         Some(Verdict::Error) => "ERROR ",
         Some(Verdict::Fail) => "FAIL  ",
         None => "n/a   ",

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::checks;
 use crate::pack::{Pack, Requirement, Role};
-use crate::profile::HOOKS;
+use crate::profile::{HOOKS, SAMPLE_ACTIONS, STATEMENTS};
 use crate::reference::Fault;
 use crate::run::Library;
 use crate::simulate::BuiltIn;
@@ -34,6 +34,9 @@ pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
             "parameters": hook.parameters }),
         );
     }
+    if let Some(doc) = setting(id) {
+        found.push(json!({ "kind": "setting", "id": id, "doc": doc }));
+    }
     for (role, fault) in faults().filter(|(_, fault)| fault.name == id) {
         found.push(
             json!({ "kind": "fault", "id": id, "role": role.word(), "wrong": fault.wrong,
@@ -41,6 +44,18 @@ pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
         );
     }
     found
+}
+
+/// What the profile says of the device, by the name of the key in `[device]`.
+pub(super) fn settings() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let statements = STATEMENTS.iter().map(|one| (one.name, one.doc));
+    statements.chain(SAMPLE_ACTIONS.iter().map(|one| (one.name, one.doc)))
+}
+
+/// What a key of `[device]` means, with `device.` or without.
+pub(super) fn setting(id: &str) -> Option<&'static str> {
+    let name = id.strip_prefix("device.").unwrap_or(id);
+    settings().find(|(known, _)| *known == name).map(|(_, doc)| doc)
 }
 
 fn faults() -> impl Iterator<Item = (Role, &'static Fault)> {

@@ -27,8 +27,8 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
     if arguments.filter.is_some() && arguments.what != Listing::Tests {
         return Err(Diagnostic::whole("usage", "`--filter` is about `list tests`").into());
     }
-    if arguments.page && arguments.what != Listing::Requirements {
-        return Err(Diagnostic::whole("usage", "`--page` is about `list requirements`").into());
+    if arguments.page && !matches!(arguments.what, Listing::Requirements | Listing::Language) {
+        return Err(Diagnostic::whole("usage", "`--page` is about `list requirements` and `list language`").into());
     }
     let library = Library::load(arguments.suites.own())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
@@ -106,6 +106,8 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         (Listing::Hooks, Format::Json) => lines(HOOKS.iter().map(|hook| {
             json!({ "name": hook.name, "role": hook.role.word(), "parameters": hook.parameters, "doc": hook.doc })
         })),
+        (Listing::Language, Format::Text) => super::language::page(&library).map_err(Problem::Environment)?,
+        (Listing::Language, Format::Json) => lines(super::language::objects(&library).map_err(Problem::Environment)?.into_iter()),
         (Listing::Vehicle, Format::Text) => ui::vehicle_words(VEHICLE_WORDS),
         (Listing::Vehicle, Format::Json) => lines(VEHICLE_WORDS.iter().map(|word| {
             json!({ "name": word.name, "parameters": word.parameters, "doc": word.doc })
@@ -287,6 +289,9 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             let _ = writeln!(text, "parameters: {}", hook.parameters.join(", "));
         }
     }
+    if let Some(doc) = super::explained::setting(id) {
+        let _ = writeln!(text, "setting {id} of a profile\n\n{doc}");
+    }
     for role in [Role::Agv, Role::MasterControl] {
         let Some(fault) = BuiltIn::faults(role).iter().find(|fault| fault.name == id) else {
             continue;
@@ -313,6 +318,7 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             .chain(checks::registry().iter().map(|check| check.name))
             .chain(HOOKS.iter().map(|hook| hook.name))
             .chain(all_faults().map(|fault| fault.name))
+            .chain(super::explained::settings().map(|(name, _)| name))
             .collect();
         let hint = match diagnostic::closest(id, known) {
             Some(close) => format!("did you mean `{close}`?"),

@@ -1,16 +1,18 @@
 //! Messages of `validate`: one or many in a file, each judged by itself.
 
-use std::ops::Range;
+use std::io::BufRead;
 use std::path::Path;
 
 use bytes::Bytes;
 use serde_json::{Value, json};
 
 use super::args::{Format, Validate};
+use super::pieces::{Content, Form, Pieces};
 use super::problem::Problem;
 use crate::audit::{Flaw, single};
 use crate::diagnostic::{Diagnostic, closest};
-use crate::journal::json::Parsed;
+use crate::journal::event::PAYLOAD_LIMIT;
+use crate::journal::json::{JsonProblem, Parsed};
 use crate::journal::place;
 use crate::pack::Pack;
 use crate::report::clean::{line, short};
@@ -28,18 +30,16 @@ pub struct Counted {
     pub warned: usize,
 }
 
-/// Whether a file holds many messages: lines of JSON, or an array.
-pub fn is_batch(path: &Path, bytes: &[u8]) -> bool {
+/// How the messages of a file stand in it, as its beginning shows; `None` when it holds one message, or something else.
+pub fn form(path: &Path, beginning: &[u8]) -> Option<Form> {
     let extension = path.extension().and_then(|extension| extension.to_str());
     if matches!(extension, Some("jsonl" | "ndjson")) {
-        return true;
+        return Some(Form::Lines);
     }
-    let text = bytes.trim_ascii_start();
-    if text.starts_with(b"[") {
-        return Parsed::of_bytes(bytes).value().is_some_and(|value| {
-            let all = value.as_array();
-            all.is_some_and(|all| !all.is_empty() && all.iter().all(Value::is_object))
-        });
+    let text = beginning.trim_ascii_start();
+    if let Some(rest) = text.strip_prefix(b"[") {
+        // A table of TOML begins with a bracket, too.
+        return rest.trim_ascii_start().starts_with(b"{").then_some(Form::Array);
     }
     // One message may stand on several lines, but then its first line is not whole.
     let mut lines = text
@@ -47,20 +47,35 @@ pub fn is_batch(path: &Path, bytes: &[u8]) -> bool {
         .filter(|line| !line.trim_ascii().is_empty());
     let is_whole =
         |line: &[u8]| line.starts_with(b"{") && serde_json::from_slice::<serde::de::IgnoredAny>(line).is_ok();
-    lines.next().is_some_and(is_whole) && lines.next().is_some()
+    (lines.next().is_some_and(is_whole) && lines.next().is_some()).then_some(Form::Lines)
 }
 
 /// Checks every message of a file.
-pub fn batch(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Result<Counted, Problem> {
+pub fn batch(
+    name: &str,
+    input: impl BufRead,
+    form: Form,
+    arguments: &Validate,
+    library: &Library,
+) -> Result<Counted, Problem> {
     let mut counted = Counted::default();
-    let ranges: Vec<Range<usize>> = if bytes.trim_ascii_start().starts_with(b"[") {
-        place::elements(bytes)
-    } else {
-        lines(bytes)
-    };
-    for range in ranges {
+    let mut pieces = Pieces::new(input, form);
+    let unreadable = |error| Diagnostic::whole("unreadable", format!("cannot read {name}: {error}"));
+    while let Some(piece) = pieces.next().map_err(unreadable)? {
         counted.messages += 1;
-        let found = message(bytes, range, arguments, library);
+        let begin = Begin {
+            line: piece.line,
+            column: piece.column,
+        };
+        let found = match piece.content {
+            Content::Message(bytes) => message(&bytes, begin, arguments, library),
+            Content::TooLarge(length) => too_large(length, begin),
+            Content::Broken(why) => {
+                counted.messages -= 1;
+                let hint = "every element of the array before this place was judged";
+                Checked::refused(begin, why.to_owned(), Some(hint.to_owned()))
+            }
+        };
         counted.add(&found.flaws);
         for flaw in &found.flaws {
             show(name, Some(counted.messages), flaw, arguments.format)?;
@@ -75,7 +90,12 @@ pub fn alone(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) 
         messages: 1,
         ..Counted::default()
     };
-    let found = message(bytes, 0..bytes.len(), arguments, library);
+    let begin = Begin { line: 1, column: 1 };
+    let found = if bytes.len() > PAYLOAD_LIMIT {
+        too_large(bytes.len() as u64, begin)
+    } else {
+        message(bytes, begin, arguments, library)
+    };
     counted.add(&found.flaws);
     for flaw in &found.flaws {
         show(name, None, flaw, arguments.format)?;
@@ -109,43 +129,55 @@ struct Checked {
     flaws: Vec<Placed>,
 }
 
-/// The bytes of each line that holds something.
-fn lines(bytes: &[u8]) -> Vec<Range<usize>> {
-    let mut begin = 0;
-    let mut all = Vec::new();
-    for line in bytes.split_inclusive(|byte| *byte == b'\n') {
-        if !line.trim_ascii().is_empty() {
-            all.push(begin..begin + line.len());
-        }
-        begin += line.len();
-    }
-    all
+/// Where a message begins in its file, counted from 1.
+#[derive(Clone, Copy)]
+struct Begin {
+    line: usize,
+    column: usize,
 }
 
-fn message(file: &[u8], range: Range<usize>, arguments: &Validate, library: &Library) -> Checked {
-    let text = &file[range.clone()];
+impl Checked {
+    /// A message that could not be judged, and what to do about it.
+    fn refused(begin: Begin, title: String, hint: Option<String>) -> Self {
+        Self {
+            what: String::new(),
+            flaws: vec![Placed {
+                flaw: Flaw {
+                    requirements: Vec::new(),
+                    verdict: Verdict::Fail,
+                    monitor: "validate".to_owned(),
+                    text: title,
+                    interpretation: None,
+                },
+                pointer: None,
+                line: begin.line,
+                column: begin.column,
+                sentence: None,
+                nearest: hint,
+            }],
+        }
+    }
+}
+
+/// A message that is not judged, because it is larger than a run would keep it.
+fn too_large(length: u64, begin: Begin) -> Checked {
+    let hint = "a file may hold any number of messages, one a line or as elements of one array";
+    Checked::refused(
+        begin,
+        format!("not judged: the message has {length} bytes, and {PAYLOAD_LIMIT} are the most that are judged"),
+        Some(hint.to_owned()),
+    )
+}
+
+fn message(text: &[u8], begin: Begin, arguments: &Validate, library: &Library) -> Checked {
     // A line ends with a line feed that is none of the message.
     let text = text.strip_suffix(b"\n").unwrap_or(text);
-    let (first_line, first_column) = place::line_and_column(file, range.start);
     let parsed = Parsed::of_bytes(text);
+    if parsed.problems().contains(&JsonProblem::TooDeep) {
+        return Checked::refused(begin, format!("not judged: {}", JsonProblem::TooDeep), None);
+    }
     let value = parsed.value();
-    let own = |title: String, nearest: Option<String>| Checked {
-        what: String::new(),
-        flaws: vec![Placed {
-            flaw: Flaw {
-                requirements: Vec::new(),
-                verdict: Verdict::Fail,
-                monitor: "validate".to_owned(),
-                text: title,
-                interpretation: None,
-            },
-            pointer: None,
-            line: first_line,
-            column: first_column,
-            sentence: None,
-            nearest,
-        }],
-    };
+    let own = |title: String, nearest: Option<String>| Checked::refused(begin, title, nearest);
     let packs = &library.rules.packs;
     let said = value.and_then(|value| value.get("version")?.as_str());
     let wanted = arguments.protocol.as_deref().or(said);
@@ -186,7 +218,10 @@ fn message(file: &[u8], range: Range<usize>, arguments: &Validate, library: &Lib
     let flaws = single(&library.rules, pack, topic, &Bytes::copy_from_slice(text));
     let placed = flaws.into_iter().map(|flaw| {
         let (pointer, at) = whereabouts(&flaw, topic, text, value);
-        let (line, column) = place::line_and_column(file, range.start + at);
+        let (line, column) = match place::line_and_column(text, at) {
+            (1, column) => (begin.line, begin.column + column - 1),
+            (line, column) => (begin.line + line - 1, column),
+        };
         let sentences = flaw.requirements.iter().rev();
         let mut sentences = sentences.filter_map(|id| library.rules.catalogue.get(id));
         let nearest = pointer

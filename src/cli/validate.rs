@@ -1,10 +1,10 @@
 //! `validate`: check files, told apart by their content.
 
-use std::io::Read as _;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde_json::Value;
+use serde::de::IgnoredAny;
 
 use super::args::{Format, Validate};
 use super::exit::Exit;
@@ -12,10 +12,13 @@ use super::messages::{self, Counted};
 use super::problem::Problem;
 use crate::course::Layout;
 use crate::diagnostic::{Diagnostic, Source};
-use crate::journal::json::Parsed;
+use crate::journal::place;
 use crate::profile;
 use crate::report::json as result_file;
 use crate::run::Library;
+
+/// A file that is read as a whole may have so many bytes.
+const WHOLE: usize = 32 << 20;
 
 /// What is wrong with a file, or what it is.
 enum Found {
@@ -31,14 +34,20 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
     let mut wrong = 0;
     for path in &expanded(&arguments.files)? {
         let name = path.display().to_string();
-        let text = read(path)?;
-        let found = if messages::is_batch(path, &text) {
-            let counted = messages::batch(&name, &text, arguments, &library)?;
+        let (beginning, rest) = read(path)?;
+        let found = if let Some(form) = messages::form(path, &beginning) {
+            let all = BufReader::new(beginning.as_slice().chain(rest));
+            let counted = messages::batch(&name, all, form, arguments, &library)?;
             wrong += usize::from(counted.wrong > 0);
             summary(&name, counted, arguments.format)?;
             continue;
+        } else if beginning.len() > WHOLE {
+            let title =
+                format!("{name} is larger than {WHOLE} bytes, and holds neither lines nor an array of messages");
+            let hint = "many messages are read one a line, or as elements of one array";
+            Found::Bad(vec![Diagnostic::whole("too-large", title).hint(hint)])
         } else {
-            check(&name, &text, path, arguments, &library)?
+            check(&name, &beginning, path, arguments, &library)?
         };
         match (found, arguments.format) {
             (Found::Good(what), Format::Text) => super::print(&format!("{name}: {what}\n"))?,
@@ -114,20 +123,44 @@ fn expanded(files: &[PathBuf]) -> Result<Vec<PathBuf>, Problem> {
     Ok(all)
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Problem> {
-    let read = if path.as_os_str() == "-" {
-        let mut bytes = Vec::new();
-        std::io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
+/// The beginning of a file, which is all of it unless it is very large, and what is left.
+fn read(path: &Path) -> Result<(Vec<u8>, Box<dyn Read>), Problem> {
+    let unreadable = |error| Diagnostic::whole("unreadable", format!("cannot read {}: {error}", path.display()));
+    let mut input: Box<dyn Read> = if path.as_os_str() == "-" {
+        Box::new(std::io::stdin().lock())
     } else {
-        std::fs::read(path)
+        Box::new(std::fs::File::open(path).map_err(unreadable)?)
     };
-    read.map_err(|error| Diagnostic::whole("unreadable", format!("cannot read {}: {error}", path.display())).into())
+    let mut beginning = Vec::new();
+    let limit = WHOLE as u64 + 1;
+    input
+        .by_ref()
+        .take(limit)
+        .read_to_end(&mut beginning)
+        .map_err(unreadable)?;
+    Ok((beginning, input))
 }
 
 fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
-    let parsed = Parsed::of_bytes(bytes);
-    if let Some(value) = parsed.value() {
-        return json_file(name, value, bytes, arguments, library);
+    let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    if serde_json::from_slice::<IgnoredAny>(json).is_ok() {
+        // A file of many bytes is told by its members, and not kept as a whole.
+        let member = |name: &str| place::member(json, name);
+        if member("metaInformation").is_some() && member("layouts").is_some() {
+            // The text itself, so that a mistake is shown where it stands.
+            return Ok(match layout(&Source::new(name, String::from_utf8_lossy(bytes))) {
+                Ok(what) => Found::Good(what),
+                Err(all) => Found::Bad(all),
+            });
+        }
+        let format = member("format").map(|range| String::from_utf8_lossy(&json[range]));
+        if format.is_some_and(|format| format.contains(".result/")) {
+            return Ok(match result_file::from_str(&String::from_utf8_lossy(json), name) {
+                Ok(result) => Found::Good(format!("a result of {} tests", result.tests.len())),
+                Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
+            });
+        }
+        return one(name, bytes, arguments, library);
     }
     let Ok(text) = std::str::from_utf8(bytes) else {
         return Ok(Found::Bad(vec![Diagnostic::whole(
@@ -163,33 +196,6 @@ fn looks_like_toml(text: &str) -> bool {
         .map(str::trim)
         .find(|line| !line.is_empty() && !line.starts_with('#'))
         .is_some_and(|line| line.starts_with('[') || line.contains(" = "))
-}
-
-fn json_file(
-    name: &str,
-    value: &Value,
-    bytes: &[u8],
-    arguments: &Validate,
-    library: &Library,
-) -> Result<Found, Problem> {
-    if value.get("metaInformation").is_some() && value.get("layouts").is_some() {
-        // The text itself, so that a mistake is shown where it stands.
-        return Ok(match layout(&Source::new(name, String::from_utf8_lossy(bytes))) {
-            Ok(what) => Found::Good(what),
-            Err(all) => Found::Bad(all),
-        });
-    }
-    if value
-        .get("format")
-        .and_then(Value::as_str)
-        .is_some_and(|format| format.contains(".result/"))
-    {
-        return Ok(match result_file::from_str(&value.to_string(), name) {
-            Ok(result) => Found::Good(format!("a result of {} tests", result.tests.len())),
-            Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
-        });
-    }
-    one(name, bytes, arguments, library)
 }
 
 /// A file with one message.

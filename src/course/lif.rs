@@ -196,7 +196,7 @@ fn choose_type(source: &Arc<Source>, file: &File, wanted: Option<&str>) -> Resul
         )),
         (None, Some(only)) if types.len() == 1 => Ok((*only).to_owned()),
         (None, None) => Err(refuse(
-            "no node is for any vehicle type".to_owned(),
+            "no node has vehicleTypeNodeProperties".to_owned(),
             "a node needs `vehicleTypeNodeProperties` for the vehicle to use it".to_owned(),
         )),
         (None, Some(_)) => Err(refuse(

@@ -45,16 +45,16 @@ pub fn repeated(text: &[u8]) -> Vec<(String, Range<usize>)> {
     all
 }
 
-/// The bytes of each element of an array.
+/// The bytes of a member of the outermost object.
 #[must_use]
-pub fn elements(text: &[u8]) -> Vec<Range<usize>> {
-    let mut all = Vec::new();
-    walk(text, &mut |path, name, value| {
-        if name.is_none() && path.matches('/').count() == 1 {
-            all.push(value);
+pub fn member(text: &[u8], name: &str) -> Option<Range<usize>> {
+    let mut found = None;
+    walk(text, &mut |path, at, value| {
+        if at.is_some() && path.strip_prefix('/') == Some(name) {
+            found = Some(value);
         }
     });
-    all
+    found
 }
 
 /// Line and column of a byte, both counted from 1; columns are characters.
@@ -242,11 +242,11 @@ mod tests {
     }
 
     #[test]
-    fn an_array_has_elements() {
-        let text = b" [ {\"a\": [1, 2]}, {\"b\": {}} ] ";
-        let found: Vec<&[u8]> = elements(text).into_iter().map(|range| &text[range]).collect();
-        assert_eq!(found, [&b"{\"a\": [1, 2]}"[..], b"{\"b\": {}}"]);
-        assert!(elements(b"{\"a\": 1}").is_empty());
+    fn a_member_of_the_outermost_object_is_found_and_none_deeper() {
+        let text = br#"{"a": {"b": 1}, "c": "x"}"#;
+        assert_eq!(member(text, "c").map(|range| &text[range]), Some(&b"\"x\""[..]));
+        assert_eq!(member(text, "b"), None);
+        assert_eq!(member(b"[1]", "0"), None);
     }
 
     #[test]

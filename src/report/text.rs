@@ -53,12 +53,12 @@ impl Color {
     }
 }
 
-/// What stands in front of a line: `PASS`, `WARN`, `????`, `ERR`, `FAIL`, `n/a`; six columns with the gap.
+/// What stands in front of a line: `PASS`, `WARN`, `INCONCLUSIVE`, `ERROR`, `FAIL`, `n/a`, with the gap.
 pub(super) fn tag(verdict: Option<Verdict>) -> &'static str {
     match verdict {
         Some(Verdict::Pass) => "PASS  ",
         Some(Verdict::Warning) => "WARN  ",
-        Some(Verdict::Inconclusive) => "OPEN  ",
+        Some(Verdict::Inconclusive) => "INCONCLUSIVE ",
         Some(Verdict::Error) => "ERROR ",
         Some(Verdict::Fail) => "FAIL  ",
         None => "n/a   ",
@@ -69,13 +69,14 @@ pub(super) fn tag(verdict: Option<Verdict>) -> &'static str {
 #[must_use]
 pub fn test_line(test: &TestResult, color: Color) -> String {
     let verdict = statement::test_verdict(test);
-    let tag = color.verdict(verdict).apply_to(tag(verdict));
+    let word = tag(verdict);
+    let tag = color.verdict(verdict).apply_to(word);
     let id = line(&test.id);
     if let Some(why) = test.not_applicable.as_ref().filter(|_| verdict.is_none()) {
         return format!("{tag}{id}  {}\n", color.dim().apply_to(short(&line(why), 120)));
     }
     let time = seconds(test.seconds);
-    let used = 6 + measure_text_width(&id) + time.len();
+    let used = word.len() + measure_text_width(&id) + time.len();
     let gap = " ".repeat(WIDTH.saturating_sub(used).max(1));
     format!("{tag}{id}{gap}{}\n", color.dim().apply_to(time))
 }

@@ -137,7 +137,7 @@ impl Capabilities {
                 Some(false) if SAMPLE_ACTIONS.iter().any(|sample| sample.name == name) => {
                     Gate::NotApplicable(format!("the profile says that the device has no `{name}`"))
                 }
-                Some(false) => Gate::NotApplicable(format!("the profile says that the device is not `{name}`")),
+                Some(false) => Gate::NotApplicable(format!("`device.{name}` is false in the profile")),
                 None if name == ACTIVE_MAP => Gate::Unobservable(NO_ACTIVE_MAP.to_owned()),
                 None => Gate::Unobservable(match SAMPLE_ACTIONS.iter().find(|sample| sample.name == name) {
                     Some(sample) => format!("the profile does not name `device.{name}`: {}", sample.doc),

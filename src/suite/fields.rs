@@ -52,7 +52,7 @@ impl Problems {
         self.at(
             "wrong-type",
             &node.span,
-            format!("{wanted} is wanted here"),
+            format!("expected {wanted}, found {}", node.kind_word()),
             format!("this is {}", node.kind_word()),
         );
     }

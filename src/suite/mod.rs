@@ -29,7 +29,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 pub use exceptions::{Exceptions, Unfound, Unproven};
-pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
+pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Variable, Vocabulary, harness_topics, variables};
 
 use crate::diagnostic::Diagnostic;
 use crate::pack::{Assets, Catalogue, Packs};

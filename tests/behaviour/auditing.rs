@@ -1,5 +1,6 @@
 //! `audit`: recordings of several tools, and what is found in them.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write as _;
 
@@ -91,6 +92,75 @@ fn the_journal_of_a_run_gives_what_the_run_gave() {
     let bench = Bench::new();
     bench.run(&["run", "--virtual", "--fault", "header-id-constant", QUICK]);
     assert!(!bench.is_audited_like_its_run().is_empty());
+}
+
+/// The messages of a journal as `mosquitto_sub -F %J` would have printed them, and the side that was tested.
+fn printed(journal: &str) -> (String, String) {
+    let mut role = String::new();
+    let mut lines = String::new();
+    for line in journal.lines() {
+        let record: Value = serde_json::from_str(line).unwrap();
+        let event = &record["event"];
+        let stored = match event["kind"].as_str() {
+            Some("run-begun") => {
+                event["header"]["role"].as_str().unwrap().clone_into(&mut role);
+                continue;
+            }
+            Some("message") => event["retain"].as_bool().unwrap(),
+            Some("sent") => false,
+            _ => continue,
+        };
+        let Some(payload) = event["payload"].as_str() else {
+            continue;
+        };
+        let line = serde_json::json!({ "tst": record["at"]["utc"], "topic": event["topic"], "qos": event["qos"],
+            "retain": u8::from(stored), "payload": payload });
+        lines += &format!("{line}\n");
+    }
+    (lines, role)
+}
+
+/// How often each monitor found what, on one side or on both. The audit of a capture tells causes apart, a run does not.
+fn by_monitor(audited: &Value, role: Option<&str>) -> BTreeMap<String, u64> {
+    let list = |holder: &Value, member: &str| holder[member].as_array().cloned().unwrap_or_default();
+    let sides = list(audited, "vehicles")
+        .into_iter()
+        .flat_map(|vehicle| list(&vehicle, "sides"));
+    let sides = sides.filter(|side| role.is_none_or(|role| side["role"] == role));
+    let mut all = BTreeMap::new();
+    for finding in sides.flat_map(|side| [list(&side, "findings"), list(&side, "information")].concat()) {
+        let what = ["monitor", "requirement", "verdict"].map(|member| finding[member].to_string());
+        *all.entry(what.join(" ")).or_default() += finding["count"].as_u64().unwrap();
+    }
+    all
+}
+
+/// What only the tap sees, or only who knows of the run, cannot be found in lines; the rest can. What the harness sends in a
+/// test is wrong on purpose, and so the other side is left aside.
+#[test]
+fn the_messages_of_a_journal_give_as_lines_what_the_journal_gives() {
+    let bench = Bench::new();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let kept = fs::read_dir(root.join("fixtures/journals")).unwrap();
+    let mut folders: Vec<_> = kept
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_dir())
+        .collect();
+    folders.push(root.join("reports/example"));
+    let (mut judged, mut found) = (0, 0);
+    for folder in folders {
+        let path = folder.join("journal.jsonl");
+        let (lines, role) = printed(&fs::read_to_string(&path).unwrap());
+        fs::write(bench.path().join("lines.jsonl"), lines).unwrap();
+        let path = path.display().to_string();
+        let of_journal = result(&bench.run(&["audit", &path, "--format", "json"]));
+        let of_lines = result(&bench.run(&["audit", "lines.jsonl", "--format", "json"]));
+        let expected = by_monitor(&of_journal, None);
+        assert_eq!(by_monitor(&of_lines, Some(&role)), expected, "{path}");
+        judged += 1;
+        found += expected.len();
+    }
+    assert!(judged > 10 && found > 3, "{judged} journals, {found} findings");
 }
 
 #[test]

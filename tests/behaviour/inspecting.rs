@@ -135,6 +135,78 @@ fn hooks_are_listed_with_what_to_do() {
 }
 
 #[test]
+fn the_language_of_suites_is_listed_as_far_as_the_program_knows_it() {
+    let schema = fs::read_to_string(format!("{}/schemas/suite.schema.json", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let schema: Value = serde_json::from_str(&schema).unwrap();
+    let lines = run(&["list", "language", "--format", "json"]).code(0).stdout;
+    let all: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let has = |part: &str, of: &str, name: &str| {
+        let mut all = all.iter();
+        all.any(|one| one["part"] == part && one["of"] == of && one["name"] == name)
+    };
+    let mut keys = 0;
+    for (name, definition) in schema["$defs"].as_object().unwrap() {
+        let verb = name.strip_prefix("step-");
+        let (part, of) = match (verb, name.as_str()) {
+            (Some(verb), _) => ("Steps", verb),
+            (None, "test" | "state" | "monitor") => ("Files", name.as_str()),
+            (None, "pattern") => ("Patterns", ""),
+            _ => ("Parts", name.as_str()),
+        };
+        for key in definition["properties"]
+            .as_object()
+            .into_iter()
+            .flat_map(serde_json::Map::keys)
+        {
+            assert!(has(part, of, key), "{part}, {of}: {key} is missing");
+            keys += 1;
+        }
+    }
+    assert!(keys > 120, "{keys} keys");
+    for one in &all {
+        // A member of the harness's own topics is described by its kind.
+        let is_told = one["doc"].as_str().is_some_and(|doc| !doc.is_empty()) || one["part"] == "Topics";
+        assert!(
+            is_told || one["form"].as_str().is_some_and(|form| !form.is_empty()),
+            "{one}"
+        );
+    }
+    for (part, name) in [
+        ("Variables", "time.react"),
+        ("Variables", "vda.error.outdatedUpdate"),
+        ("Topics", "mqtt/connect: keepAlive"),
+        ("Named checks", "state/remaining-route"),
+        ("Hooks", "power-cycle"),
+        ("Commands for mock vehicles", "reset"),
+    ] {
+        assert!(
+            all.iter().any(|one| one["part"] == part && one["name"] == name),
+            "{part}: {name}"
+        );
+    }
+    let page = run(&["list", "language", "--page"]).code(0).stdout;
+    // A link leads to a heading of the page.
+    let headings: Vec<String> = page
+        .lines()
+        .filter(|line| line.starts_with('#'))
+        .map(|line| line.trim_start_matches('#').trim().to_lowercase().replace(' ', "-"))
+        .collect();
+    for link in page.split("](#").skip(1).filter_map(|rest| rest.split(')').next()) {
+        assert!(headings.iter().any(|heading| heading == link), "#{link} leads nowhere");
+    }
+    // Every row of a table has as many cells as its head.
+    let cells = |line: &str| line.replace("\\|", "").matches('|').count();
+    let mut head = 0;
+    for line in page.lines() {
+        match line.starts_with('|') {
+            true if head == 0 => head = cells(line),
+            true => assert_eq!(cells(line), head, "{line}"),
+            false => head = 0,
+        }
+    }
+}
+
+#[test]
 fn a_requirement_is_explained_with_what_decides_it() {
     insta::assert_snapshot!(run(&["explain", "ORD-REJ-03"]).code(0).stdout);
 }
@@ -148,6 +220,7 @@ fn everything_that_has_a_name_is_explained() {
         ("state/remaining-route", "STATE-12"),
         ("outdated-update-taken-over", "ORD-REJ-10"),
         ("power-cycle", "hook power-cycle"),
+        ("device.node-bound", "nodes only"),
     ] {
         run(&["explain", name]).code(0).prints(what);
     }

@@ -1,6 +1,9 @@
 //! `validate` for messages: many at once, each judged by itself, and every finding in its place.
 
 use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -112,4 +115,112 @@ fn standard_input_is_judged_and_a_recording_is_sent_to_the_audit() {
         "{}",
         ended.stdout
     );
+}
+
+/// The most memory that a process has had so far, in kilobytes; `None` when it is gone or nobody says.
+fn peak(process: u32) -> Option<u64> {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().trim_end_matches("kB").trim().parse().ok()
+}
+
+/// Writes as many messages of one kilobyte, as lines or as an array.
+fn write_many(path: &Path, count: usize, is_array: bool) {
+    let mut file = std::io::BufWriter::new(fs::File::create(path).unwrap());
+    // What cannot be told by its members is refused without being judged, which takes a moment of each.
+    let message = serde_json::json!({ "text": "x".repeat(1_000) }).to_string();
+    if is_array {
+        file.write_all(b"[").unwrap();
+    }
+    for at in 0..count {
+        let between = match (is_array, at) {
+            (_, 0) => "",
+            (true, _) => ",",
+            (false, _) => "\n",
+        };
+        write!(file, "{between}{message}").unwrap();
+    }
+    if is_array {
+        file.write_all(b"]").unwrap();
+    }
+}
+
+#[test]
+fn memory_does_not_grow_with_the_number_of_messages() {
+    let bench = Bench::new();
+    let mut peaks = Vec::new();
+    for (name, is_array) in [("many.json", true), ("many.jsonl", false)] {
+        for count in [100, 40_000] {
+            write_many(&bench.path().join(name), count, is_array);
+            let mut command = tool(bench.path(), &["validate", name, "--format", "json"]);
+            command.stdout(std::process::Stdio::null());
+            let mut child = command.spawn().unwrap();
+            let mut most = 0;
+            let status = loop {
+                most = most.max(peak(child.id()).unwrap_or_default());
+                match child.try_wait().unwrap() {
+                    Some(status) => break status,
+                    None => std::thread::sleep(Duration::from_millis(5)),
+                }
+            };
+            assert_eq!(status.code(), Some(2), "{name}");
+            peaks.push(most);
+        }
+    }
+    if peaks.contains(&0) {
+        eprintln!("skipped: nobody says how much memory a process has");
+        return;
+    }
+    let (few, many) = (peaks[0].max(peaks[2]), peaks[1].max(peaks[3]));
+    // The beginning of a file, of which up to 32 MiB are looked at, and some room.
+    assert!(
+        many < few + 100_000,
+        "{few} kB of a few messages, {many} kB of 40 MB of them"
+    );
+}
+
+#[test]
+fn one_message_that_is_too_large_is_refused_where_it_stands_and_the_others_are_judged() {
+    let bench = Bench::new();
+    let mut large = good();
+    large["information"] = vec![serde_json::json!({ "infoType": "x", "infoLevel": "INFO" }); 40_000].into();
+    let mut wrong = good();
+    wrong["operatingMode"] = "AUTO".into();
+    let deep = format!("{{\"nodeStates\":{}{}}}", "[".repeat(500), "]".repeat(500));
+    let all = [good().to_string(), large.to_string(), wrong.to_string(), deep];
+    fs::write(bench.path().join("lines.jsonl"), all.join("\n")).unwrap();
+    fs::write(bench.path().join("array.json"), format!("[{}]", all.join(",\n"))).unwrap();
+    for name in ["lines.jsonl", "array.json"] {
+        let ended = bench.run(&["validate", name, "--format", "json"]).code(2);
+        let found = findings(&ended.stdout);
+        let of = |line: u64| found.iter().filter(move |one| one["line"] == line);
+        assert_eq!(of(1).count(), 0, "{name}");
+        let refused = of(2).next().unwrap();
+        assert!(
+            refused["title"].as_str().unwrap().contains("1048576 are the most"),
+            "{refused}"
+        );
+        assert!(refused["hint"].is_string() && refused["message"] == 2, "{refused}");
+        assert!(of(3).any(|one| one["pointer"] == "/operatingMode"), "{name}");
+        assert!(
+            of(4).next().unwrap()["title"].as_str().unwrap().contains("not judged"),
+            "{name}"
+        );
+        let last: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+        assert_eq!(
+            (&last["messages"], &last["withViolations"]),
+            (&4.into(), &3.into()),
+            "{name}"
+        );
+    }
+    fs::write(bench.path().join("alone.json"), large.to_string()).unwrap();
+    bench
+        .run(&["validate", "alone.json"])
+        .code(2)
+        .prints("alone.json:1:1: FAIL not judged: the message has");
+    fs::write(bench.path().join("open.json"), format!("[{},\n{}", good(), good())).unwrap();
+    bench
+        .run(&["validate", "open.json"])
+        .code(2)
+        .prints("FAIL the array is not closed");
 }

@@ -2,6 +2,7 @@
 //! miss, and a partial one in which every string is hostile.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test says what it expected")]
 
+mod accessible;
 mod certificate;
 mod html;
 mod json;

@@ -244,8 +244,8 @@ struct PositionMoves {
     traffic: Traffic,
     /// Where orders say their nodes are: map, x and y.
     nodes: BTreeMap<String, (String, f64, f64)>,
-    /// The last node, and the pose when it was reached.
-    before: Option<(String, Pose)>,
+    /// The last node, and the pose when it was reached, if that was seen.
+    before: Option<(String, Option<Pose>)>,
     /// When something else than driving last set the position.
     displaced: Option<Moment>,
     stuck: u32,
@@ -278,6 +278,7 @@ impl Running for PositionMoves {
         self.traffic.note(entry);
         if is_displaced(entry, context) {
             self.before = None;
+            self.stuck = 0;
             self.displaced = Some(entry.at().moment);
         }
         if let Some(order) = to_vehicle("order", entry, context) {
@@ -299,10 +300,17 @@ impl Running for PositionMoves {
             self.before = None;
             return false;
         }
-        if self.before.as_ref().is_some_and(|(last, _)| *last == node) {
+        // Under way it is not any more where it reached its last node.
+        let rests = state.get("driving").and_then(Value::as_bool) == Some(false)
+            && elements(state, "nodeStates").next().is_none();
+        if let Some((_, was)) = self.before.as_mut().filter(|(last, _)| *last == node) {
+            if rests {
+                was.get_or_insert(pose);
+            }
             return false;
         }
-        let Some((last, was)) = self.before.replace((node.clone(), pose.clone())) else {
+        let reached = (self.before.is_some() || rests).then(|| pose.clone());
+        let Some((last, Some(was))) = self.before.replace((node.clone(), reached)) else {
             return false;
         };
         let (Some(from), Some(to)) = (self.nodes.get(&last), self.nodes.get(&node)) else {
@@ -381,7 +389,7 @@ mod tests {
         let nodes = [node("a", 0.0), node("b", 2.0), node("c", 4.0)];
         trace.sent("order", &json!({ "orderId": "o", "nodes": nodes }));
         for (id, x) in ["a", "b", "c"].into_iter().zip(positions) {
-            let mut state = at(*x, 0.0, true);
+            let mut state = at(*x, 0.0, id != "a");
             state["lastNodeId"] = json!(id);
             state["lastNodeSequenceId"] = json!(0);
             trace.wait(3.0).state(&state);
@@ -394,5 +402,23 @@ mod tests {
         assert!(moves(&[0.0, 2.0, 4.0]).is_empty());
         assert!(moves(&[0.0, 0.0, 4.0]).is_empty());
         assert_eq!(moves(&[0.0, 0.0, 0.0]), ["MAP-01"]);
+    }
+
+    #[test]
+    fn where_a_node_was_reached_is_not_known_of_a_vehicle_that_is_under_way_already() {
+        let mut trace = Trace::subscriber();
+        let node = |id: &str, x: f64| json!({ "nodeId": id, "nodePosition": { "x": x, "y": 0.0, "mapId": "m" } });
+        let nodes = [node("a", 0.0), node("b", 2.0)];
+        trace.sent("order", &json!({ "orderId": "o", "nodes": nodes }));
+        for _ in 0..3 {
+            trace.hook().wait(40.0);
+            for (id, ahead) in [("a", json!([{ "nodeId": "b", "sequenceId": 2 }])), ("b", json!([]))] {
+                let mut state = at(2.0, 0.0, false);
+                state["lastNodeId"] = json!(id);
+                state["nodeStates"] = ahead;
+                trace.wait(1.0).state(&state);
+            }
+        }
+        assert!(trace.judge("state/position-moves").summary().is_empty());
     }
 }

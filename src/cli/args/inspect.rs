@@ -13,7 +13,8 @@ Examples:
   vda5050-tck list tests --filter 'chapter(6.6) and not tag(moves)'
   vda5050-tck list coverage --role agv     which requirement is decided by what, or by nothing
   vda5050-tck list coverage --uncovered    what nothing decides
-  vda5050-tck list hooks                   what a profile can do for a test";
+  vda5050-tck list hooks                   what a profile can do for a test
+  vda5050-tck list language                the reference of the language of suites, as a page of Markdown";
 
 /// `list`.
 #[derive(Clone, Debug, Args)]
@@ -34,7 +35,8 @@ pub struct List {
     /// Of the coverage, only what nothing decides
     #[arg(long)]
     pub uncovered: bool,
-    /// The requirements as a page of Markdown, with what decides them and how the catalogue reads them
+    /// The requirements as a page of Markdown, with what decides them and how the catalogue reads them; the language of suites
+    /// is always a page
     #[arg(long)]
     pub page: bool,
     /// How it is written
@@ -64,19 +66,22 @@ pub enum Listing {
     Hooks,
     /// What a test can ask of the mock vehicles, when a master control is tested
     Vehicle,
+    /// Everything that a suite can say: keys, operators, variables, checks
+    Language,
 }
 
 const EXPLAIN_HELP: &str = "\
 Examples:
   vda5050-tck explain ORD-REJ-03
   vda5050-tck explain order-rejection/lower-update-id
-  vda5050-tck explain power-cycle";
+  vda5050-tck explain power-cycle
+  vda5050-tck explain device.node-bound";
 
 /// `explain`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = EXPLAIN_HELP)]
 pub struct Explain {
-    /// Id of a requirement, test or monitor, or name of a check, hook or fault
+    /// Id of a requirement, test or monitor, or name of a check, hook, fault or setting of the device
     pub id: String,
     /// For this protocol version; the newest one unless said
     #[arg(long, value_name = "VERSION")]

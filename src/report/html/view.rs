@@ -76,8 +76,8 @@ pub fn verdict_title(result: &RunResult) -> &'static str {
     match result.verdict {
         Some(Verdict::Pass | Verdict::Warning) if result.partial => "nothing broken until it ended",
         Some(Verdict::Fail) => "does not conform",
-        Some(Verdict::Pass) => "conforms in all it was tested for",
-        Some(Verdict::Warning) => "conforms with remarks in all it was tested for",
+        Some(Verdict::Pass) => "conforms",
+        Some(Verdict::Warning) => "conforms, with remarks",
         Some(Verdict::Inconclusive) => "undecided",
         Some(Verdict::Error) => "no statement",
         None => "nothing decided",

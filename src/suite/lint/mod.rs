@@ -4,6 +4,7 @@
 //! the test claims. A clause is held against those versions that have one of its requirements; a clause without
 //! requirements has to make sense in at least one.
 
+mod names;
 mod paths;
 mod pictures;
 mod scope;
@@ -12,6 +13,8 @@ mod vocabulary;
 
 use std::collections::BTreeSet;
 
+pub use names::{Variable, variables};
+pub use pictures::harness_topics;
 pub use vocabulary::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
 
 use self::paths::Topic;

@@ -87,6 +87,17 @@ pub(super) fn topics() -> impl Iterator<Item = &'static str> {
     PICTURES.iter().map(|(topic, _)| *topic)
 }
 
+/// Topic, path, kind and allowed words of everything that can be seen on the topics of the harness.
+pub fn harness_topics() -> impl Iterator<Item = (&'static str, &'static str, &'static str, &'static [&'static str])> {
+    PICTURES.iter().flat_map(|(topic, members)| {
+        members.iter().map(move |(path, kind)| {
+            let mut words = WORDS.iter();
+            let words = words.find(|(other, place, _)| other == topic && place == path);
+            (*topic, *path, *kind, words.map_or(&[][..], |(_, _, words)| *words))
+        })
+    })
+}
+
 fn members_of(topic: &str) -> Option<Members> {
     PICTURES
         .iter()

@@ -2,49 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use super::names::{TIMES, of_profile};
 use super::vocabulary::Vocabulary;
 use crate::course::is_station;
 use crate::diagnostic::{Diagnostic, Span, did_you_mean};
 use crate::pattern::{Term, TermKind};
-use crate::profile::{Place, SAMPLE_ACTIONS, SampleKind};
 use crate::suite::fields::Problems;
 use crate::suite::grammar::is_course_name;
 use crate::suite::model::{Step, Verb};
-
-/// The names of `time.`.
-const TIMES: [&str; 14] = [
-    "react",
-    "slow",
-    "event",
-    "drive",
-    "download",
-    "connect",
-    "reconnect",
-    "will",
-    "quiet",
-    "broker",
-    "statePeriod",
-    "settle",
-    "notice",
-    "look",
-];
-
-/// The names of `device.` that a profile may give.
-fn of_profile() -> Vec<String> {
-    let members = |sample: &SampleKind| {
-        let own = match sample.place {
-            Place::Anywhere => None,
-            Place::Shown => Some("shows"),
-            Place::Node => Some("node"),
-            Place::Edge => Some("edge"),
-        };
-        ["type", "parameters"].into_iter().chain(own)
-    };
-    let names = SAMPLE_ACTIONS
-        .iter()
-        .flat_map(|sample| members(sample).map(|member| format!("{}.{member}", sample.variable)));
-    names.collect()
-}
 
 /// Where names of a test come from.
 #[derive(Clone, PartialEq, Eq)]
@@ -178,9 +143,10 @@ impl<'a> Scope<'a> {
             (true, false) => unknown(hint),
             (false, _) => unknown("a monitor knows `time.`, `device.` and `vda.`".to_owned()),
         };
+        let times = TIMES.map(|(name, _)| name);
         match root {
-            "time" if TIMES.contains(&rest) => None,
-            "time" => unknown(did_you_mean(rest, TIMES)),
+            "time" if times.contains(&rest) => None,
+            "time" => unknown(did_you_mean(rest, times)),
             "device" => self.device(rest, packs, unknown),
             "vda" => self.word(name, rest, span, packs),
             "course" => only_in_tests(
