@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::broken::{Breaks, family};
 use crate::diagnostic::Source;
@@ -77,6 +78,9 @@ pub struct Stimulus {
     /// The breakages it stands for, one of which goes where `sends` says `${break.patch}`.
     #[serde(default)]
     pub breaks: Option<Breaks>,
+    /// Words of which it takes one each, where a text says `${each.…}`; it stands for every mixture of them.
+    #[serde(default)]
+    pub each: BTreeMap<String, Vec<String>>,
     /// What it breaks, when it is one of many breakages.
     #[serde(skip)]
     pub broken: Option<BrokenMember>,
@@ -158,27 +162,34 @@ impl Grammar {
         let file = assets
             .get(&path)
             .ok_or_else(|| GrammarError::Missing(role.word().to_owned()))?;
-        Self::read(&path, &file.text)
+        let mut grammar: Self = parsed(&path, &file.text)?;
+        for part in assets.under(&format!("suites/explore/{}/", role.word())) {
+            let stimuli: BTreeMap<String, Stimulus> = parsed(&part.path, &part.text)?;
+            for (name, stimulus) in stimuli {
+                if grammar.stimuli.insert(name.clone(), stimulus).is_some() {
+                    return Err(unreadable(
+                        &part.path,
+                        format!("the stimulus `{name}` is there already"),
+                    ));
+                }
+            }
+        }
+        grammar.checked(&path)
     }
 
-    /// Reads a grammar.
+    /// Reads a grammar that stands in one file.
     ///
     /// # Errors
     /// What is wrong with it.
     pub fn read(path: &str, text: &str) -> Result<Self, GrammarError> {
-        let unreadable = |reason: String| GrammarError::Unreadable {
-            path: path.to_owned(),
-            reason,
-        };
-        let tree = yaml::tree(&Source::new(path, text)).map_err(|all| {
-            let all: Vec<String> = all.iter().map(ToString::to_string).collect();
-            unreadable(all.join("; "))
-        })?;
-        let grammar: Self =
-            serde_json::from_value(yaml::value(&tree)).map_err(|error| unreadable(error.to_string()))?;
-        grammar
-            .complaint()
-            .map_or(Ok(grammar.clone()), |why| Err(unreadable(why)))
+        parsed::<Self>(path, text)?.checked(path)
+    }
+
+    fn checked(self, path: &str) -> Result<Self, GrammarError> {
+        match self.complaint() {
+            Some(why) => Err(unreadable(path, why)),
+            None => Ok(self),
+        }
     }
 
     /// The first thing that is named and is not there.
@@ -230,11 +241,36 @@ impl Grammar {
         &self.explore
     }
 
+    /// The same as a role.
+    #[must_use]
+    pub fn role(&self) -> Role {
+        if self.explore == Role::MasterControl.word() {
+            Role::MasterControl
+        } else {
+            Role::Agv
+        }
+    }
+
     /// The node at a place of the way.
     #[must_use]
     pub fn node(&self, place: usize) -> &str {
         let turn = 2 * (self.nodes.len() - 1);
         let at = place % turn;
         &self.nodes[if at < self.nodes.len() { at } else { turn - at }]
+    }
+}
+
+fn parsed<T: DeserializeOwned>(path: &str, text: &str) -> Result<T, GrammarError> {
+    let tree = yaml::tree(&Source::new(path, text)).map_err(|all| {
+        let all: Vec<String> = all.iter().map(ToString::to_string).collect();
+        unreadable(path, all.join("; "))
+    })?;
+    serde_json::from_value(yaml::value(&tree)).map_err(|error| unreadable(path, error.to_string()))
+}
+
+fn unreadable(path: &str, reason: String) -> GrammarError {
+    GrammarError::Unreadable {
+        path: path.to_owned(),
+        reason,
     }
 }

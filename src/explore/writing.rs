@@ -70,9 +70,9 @@ pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -
         needs.extend(stimulus.needs.iter().map(String::as_str));
         specs.extend(stimulus.spec.as_deref());
         let sent = filled(&stimulus.sends, grammar, &model, stimulus);
-        moves |= sent.lines().any(drives);
         let answer = answer(grammar, &model, stimulus);
         let heard = filled(&[stimulus.hears.as_str(), answer].concat(), grammar, &model, stimulus);
+        moves |= sent.lines().chain(heard.lines()).any(drives);
         let _ = writeln!(body, "  # {}. {}: {}", model.number, name, stimulus.title);
         indented(&sent, &mut body);
         indented(&heard, &mut body);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::{DeviceArgs, OutputArgs};
+use super::{DeviceArgs, OutputArgs, SuiteArgs};
 
 const EXPLORE_HELP: &str = "\
 Examples:
@@ -27,6 +27,9 @@ pub struct Explore {
     /// Where results go.
     #[command(flatten)]
     pub output: OutputArgs,
+    /// Which suites, and with them which grammar.
+    #[command(flatten)]
+    pub suites: SuiteArgs,
     /// Begin the random choice here; another number draws other conversations
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
@@ -70,7 +73,17 @@ pub struct Explore {
         conflicts_with = "profile"
     )]
     pub tolerance: Vec<String>,
-    /// Measure how many of its faults are found: every one, or one in NUMBER
-    #[arg(long, value_name = "NUMBER", help_heading = "Built-in device", num_args = 0..=1, default_missing_value = "1", requires = "in_virtual_time", conflicts_with = "fault")]
+    /// Which kind of reference AGV it is
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_enum,
+        default_value_t,
+        help_heading = "Built-in device",
+        conflicts_with = "profile"
+    )]
+    pub vehicle: super::vehicle::VehicleKind,
+    /// Measure how many of its faults are found: every one, or one in NUMBER; with --fault, of those only
+    #[arg(long, value_name = "NUMBER", help_heading = "Built-in device", num_args = 0..=1, default_missing_value = "1", requires = "in_virtual_time")]
     pub every_fault: Option<usize>,
 }

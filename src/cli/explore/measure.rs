@@ -1,20 +1,19 @@
 //! How many faults of a built-in device an exploration finds by itself.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use serde_json::json;
 
-use crate::cli::args::Format;
+use crate::cli::args::{Explore, Format};
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
 use crate::explore::{Chain, ConversationFile, Coverage, Exploration, findings};
 use crate::pack::{Pack, Role};
 use crate::reference::Fault;
 use crate::run::{Library, VirtualRun, run_silently};
-use crate::simulate::BuiltIn;
+use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl};
 use crate::suite::model::Test;
 
 /// What became of one fault.
@@ -26,21 +25,34 @@ struct Measured {
     named: bool,
 }
 
+/// So many conversations are carried out before it is looked whether the fault is found.
+const AT_ONCE: usize = 17;
+
 /// Explores the built-in device with every fault, or every so manyth, and says which of them are found.
 pub(super) fn every_fault(
-    role: Role,
+    mut library: Library,
     pack: &Arc<Pack>,
     exploration: &Exploration,
     every: usize,
-    format: Format,
+    arguments: &Explore,
 ) -> Result<Exit, Problem> {
-    let mut library = Library::load(None)?;
+    let device: BuiltIn = match exploration.grammar.role() {
+        Role::Agv => ReferenceAgv::of(arguments.vehicle.0, pack).into(),
+        Role::MasterControl => ReferenceMasterControl::new(pack).into(),
+    };
     let drawn = exploration.drawn(&exploration.grammar, &mut Coverage::default());
-    let places = drawn
-        .iter()
-        .map(|(_, file)| (file.place(exploration.grammar.side()), file.text.clone()));
-    let tests = library.add(&places.collect::<Vec<_>>())?;
-    let faults: Vec<&'static Fault> = BuiltIn::faults(role).iter().step_by(every).collect();
+    let mut rounds = Vec::new();
+    for part in drawn.chunks(AT_ONCE) {
+        let places = part
+            .iter()
+            .map(|(_, file)| (file.place(exploration.grammar.side()), file.text.clone()));
+        let mut tests = library.add(&places.collect::<Vec<_>>())?;
+        tests.sort_by_key(|test| part.iter().position(|(_, file)| file.id == test.id));
+        rounds.push((part, tests));
+    }
+    let meant = |fault: &&Fault| arguments.fault.is_empty() || arguments.fault.iter().any(|name| name == fault.name);
+    let faults = BuiltIn::faults(device.role()).iter().filter(meant);
+    let faults: Vec<&'static Fault> = faults.step_by(every).collect();
     let next = AtomicUsize::new(0);
     let all: Mutex<Vec<Result<Measured, Problem>>> = Mutex::new(Vec::new());
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -48,7 +60,7 @@ pub(super) fn every_fault(
         for _ in 0..threads {
             scope.spawn(|| {
                 while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let found = one(role, &library, pack, &tests, &drawn, fault);
+                    let found = one(&device, &library, pack, &rounds, fault);
                     all.lock()
                         .unwrap_or_else(std::sync::PoisonError::into_inner)
                         .push(found);
@@ -60,31 +72,39 @@ pub(super) fn every_fault(
     let mut all: Vec<Measured> = all.into_iter().collect::<Result<_, _>>()?;
     all.sort_by_key(|one| one.fault.name);
     let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
-    super::super::print(&shown(&all, stimuli, exploration.seed, format))?;
+    super::super::print(&shown(&all, stimuli, exploration.seed, arguments.output.format))?;
     Ok(Exit::Conforms)
 }
 
+/// Carries out the conversations until one of them shows a requirement that the fault is about.
 fn one(
-    role: Role,
+    device: &BuiltIn,
     library: &Library,
     pack: &Pack,
-    tests: &[Arc<Test>],
-    drawn: &[(Chain, ConversationFile)],
+    rounds: &[(&[(Chain, ConversationFile)], Vec<Arc<Test>>)],
     fault: &'static Fault,
 ) -> Result<Measured, Problem> {
-    let mut run = VirtualRun::of_role(role, library, pack);
-    run.faults = vec![fault.name.to_owned()];
-    run.tests = tests.to_vec();
-    run.complete = false;
-    run.draw = None;
-    let finished = run_silently(library, pack, run).map_err(|error| Problem::Environment(error.to_string()))?;
-    let found = findings(&finished.result, drawn);
-    let broken: BTreeSet<&str> = found.iter().map(|one| one.requirement.as_str()).collect();
-    Ok(Measured {
+    let mut measured = Measured {
         fault,
-        found: !broken.is_empty(),
-        named: fault.breaks.iter().any(|id| broken.contains(id)),
-    })
+        found: false,
+        named: false,
+    };
+    for (drawn, tests) in rounds {
+        let mut run = VirtualRun::of_role(device.role(), library, pack);
+        run.device = device.clone();
+        run.faults = vec![fault.name.to_owned()];
+        run.tests.clone_from(tests);
+        run.complete = false;
+        run.draw = None;
+        let finished = run_silently(library, pack, run).map_err(|error| Problem::Environment(error.to_string()))?;
+        let found = findings(&finished.result, drawn);
+        measured.found |= !found.is_empty();
+        measured.named |= found.iter().any(|one| fault.breaks.contains(&one.requirement.as_str()));
+        if measured.named {
+            break;
+        }
+    }
+    Ok(measured)
 }
 
 fn shown(all: &[Measured], stimuli: usize, seed: u64, format: Format) -> String {

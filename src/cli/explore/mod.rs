@@ -28,7 +28,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         &arguments.device.settings(),
         &surroundings,
     )?;
-    let library = Library::load(None)?;
+    let library = Library::load(arguments.suites.own())?;
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     check_faults(role, &arguments.fault)?;
@@ -48,7 +48,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         trials: arguments.shrink_budget,
     };
     if let Some(every) = arguments.every_fault {
-        return measure::every_fault(role, &pack, &exploration, every.max(1), arguments.output.format);
+        return measure::every_fault(library, &pack, &exploration, every.max(1), arguments);
     }
     let device = Device::of(arguments, &effective, &pack, &surroundings)?;
     let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?.within(arguments.budget);

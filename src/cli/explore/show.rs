@@ -35,7 +35,8 @@ pub(super) fn stimuli(grammar: &Grammar) -> String {
             let many = grammar.stimuli.keys().filter(|other| family(other) == family(name));
             let many = match many.count() {
                 1 => String::new(),
-                many => format!(" ({many} breakages)"),
+                many if stimulus.each.is_empty() => format!(" ({many} breakages)"),
+                many => format!(" ({many} mixtures)"),
             };
             let _ = writeln!(text, "  {:<24} {title}{many}", family(name));
         }

@@ -63,7 +63,7 @@ impl Device {
             });
         }
         let mut device: BuiltIn = match device.role {
-            Role::Agv => ReferenceAgv::new(pack).into(),
+            Role::Agv => ReferenceAgv::of(arguments.vehicle.0, pack).into(),
             Role::MasterControl => ReferenceMasterControl::with_vehicles(USUAL_FLEET, pack).into(),
         };
         tolerate(&mut device, &arguments.tolerance)?;
