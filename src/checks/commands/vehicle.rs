@@ -198,11 +198,14 @@ impl Vehicle {
         self.states.back()
     }
 
-    /// Whether something happened from outside a moment ago.
+    /// Whether something happened from outside that the master control may not have seen yet: a moment ago, or so that
+    /// only states of this moment show what it has come to.
     pub fn unsettled(&self, entry: &Entry, context: &CheckContext<'_>) -> bool {
-        let now = entry.at().moment;
-        self.outside
-            .is_some_and(|at| now.since(at) < super::sheet::grace(context))
+        let (now, grace) = (entry.at().moment, super::sheet::grace(context));
+        let first = self.states.front();
+        self.outside.is_some_and(|at| {
+            now.since(at) < grace || first.is_none_or(|first| first.at >= at && now.since(first.at) < grace)
+        })
     }
 
     /// The states a master control may go by, newest first: those that may still be under way, and the one before.

@@ -114,11 +114,11 @@ fn an_order_that_replaces_another_one_should_wait_for_the_cancellation() {
 
 #[test]
 fn an_order_from_another_place_is_found_and_a_moved_vehicle_is_given_time() {
-    let elsewhere = |moved: bool| {
+    let elsewhere = |shown_after: Option<f64>| {
         let mut trace = begun();
         trace.wait(10.0);
-        if moved {
-            trace.vehicle("place-on");
+        if let Some(seconds) = shown_after {
+            trace.vehicle("place-on").wait(seconds);
             trace.shows(&json!({ "lastNodeId": "n5", "agvPosition": { "x": 13.0 } }));
         }
         let mut order = order("o1", 0, 1, 2, 3);
@@ -126,8 +126,10 @@ fn an_order_from_another_place_is_found_and_a_moved_vehicle_is_given_time() {
         trace.commands("order", &order);
         trace.judge("commands/start").summary()
     };
-    assert_eq!(elsewhere(false), ["ORD-03"]);
-    assert_eq!(elsewhere(true), Vec::<String>::new());
+    assert_eq!(elsewhere(None), ["ORD-03"]);
+    assert_eq!(elsewhere(Some(0.0)), Vec::<String>::new());
+    // Nobody knows where it is before it says so.
+    assert_eq!(elsewhere(Some(20.0)), Vec::<String>::new());
 }
 
 #[test]

@@ -1,0 +1,156 @@
+//! No false accusation in conversations: with whatever liberty a good device is explored, nothing is found that the liberty
+//! does not excuse.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::fmt::Write as _;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use vda5050_tck::explore::{Chain, ConversationFile, Coverage, Exploration, Finding, Grammar, findings};
+use vda5050_tck::pack::Role;
+use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::simulate::BuiltIn;
+
+/// The allocator of the program: a run is a million small trees.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// What is found with a liberty and is right: liberty, requirement, and why.
+fn excused() -> Vec<(&'static str, &'static str)> {
+    let table = include_str!("imperfect/explore-excused.tsv");
+    let rows = table.lines().filter(|line| !line.starts_with('#'));
+    rows.map(|line| {
+        let columns: Vec<&str> = line.split('\t').collect();
+        assert!(columns.len() == 3 && columns[2].len() > 15, "no reason: {line}");
+        (columns[0], columns[1])
+    })
+    .collect()
+}
+
+/// A device with some liberties, and the seed of its conversations.
+struct Explored {
+    role: Role,
+    liberties: Vec<&'static str>,
+    seed: u64,
+}
+
+fn names(role: Role) -> Vec<&'static str> {
+    BuiltIn::tolerances(role).iter().map(|liberty| liberty.name).collect()
+}
+
+/// What conversations find.
+fn found(one: &Explored, conversations: usize) -> Vec<Finding> {
+    let mut library = Library::load(None).unwrap();
+    let pack = library.rules.packs.latest().clone();
+    let grammar = Grammar::load(&library.assets, one.role)
+        .unwrap()
+        .only(&pack, |_, _| true);
+    let exploration = Exploration {
+        grammar: grammar.clone(),
+        seed: one.seed,
+        conversations,
+        length: 12,
+        trials: 0,
+    };
+    let drawn: Vec<(Chain, ConversationFile)> = exploration.drawn(&grammar, &mut Coverage::default());
+    let places = drawn
+        .iter()
+        .map(|(_, file)| (file.place(grammar.side()), file.text.clone()));
+    let places: Vec<(String, String)> = places.collect();
+    let mut run = VirtualRun::of_role(one.role, &library, &pack);
+    run.tests = library.add(&places).unwrap_or_default();
+    assert_eq!(run.tests.len(), drawn.len(), "every conversation is a test");
+    run.draw = None;
+    run.complete = false;
+    for name in &one.liberties {
+        run.device.tolerate(name).unwrap();
+    }
+    let finished = run_silently(&library, &pack, run).unwrap();
+    findings(&finished.result, &drawn)
+}
+
+/// Explores with all of these; nothing may be found.
+fn nothing_is_found(all: &[Explored], conversations: usize) {
+    let excused = excused();
+    let next = AtomicUsize::new(0);
+    let accusations = Mutex::new(String::new());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let found = found(one, conversations);
+                    let known = |finding: &Finding| {
+                        let of = |(liberty, requirement): &(&str, &str)| {
+                            one.liberties.contains(liberty) && *requirement == finding.requirement
+                        };
+                        excused.iter().any(of)
+                    };
+                    for finding in found.iter().filter(|finding| !known(finding)) {
+                        let _ = writeln!(
+                            accusations.lock().unwrap(),
+                            "{} {} with {}, seed {}: {} by {:?}: {} ({})",
+                            finding.verdict.word(),
+                            one.role,
+                            one.liberties.join(" + "),
+                            one.seed,
+                            finding.requirement,
+                            finding.source,
+                            finding.message,
+                            finding.chain.stimuli().join(", "),
+                        );
+                    }
+                }
+            });
+        }
+    });
+    let accusations = accusations.into_inner().unwrap();
+    assert!(
+        accusations.is_empty(),
+        "a device is accused that does nothing wrong\n{accusations}"
+    );
+}
+
+/// A share of the liberties, each by itself; another commit draws others.
+#[test]
+fn conversations_with_a_liberty_accuse_nobody() {
+    const SHARE: usize = 24;
+    let seed = env!("CARGO_PKG_VERSION").bytes().map(u64::from).sum::<u64>();
+    let seed = std::env::var("QUALIFY_SHARE")
+        .ok()
+        .and_then(|seed| seed.parse().ok())
+        .unwrap_or(seed);
+    let share = |role| {
+        let from = usize::try_from(seed).unwrap() % SHARE;
+        let names = names(role).into_iter().skip(from).step_by(SHARE);
+        names.map(move |name| Explored {
+            role,
+            liberties: vec![name],
+            seed,
+        })
+    };
+    let all: Vec<Explored> = share(Role::Agv).chain(share(Role::MasterControl)).collect();
+    nothing_is_found(&all, 8);
+}
+
+/// Every liberty by itself, with as many seeds as `EXPLORE_SEEDS` says.
+#[test]
+#[ignore = "takes minutes"]
+fn conversations_with_every_liberty_accuse_nobody() {
+    let number = |name: &str, usual: u64| {
+        let said = std::env::var(name).ok().and_then(|number| number.parse().ok());
+        said.unwrap_or(usual)
+    };
+    let seeds = number("EXPLORE_SEEDS", 1);
+    let conversations = usize::try_from(number("EXPLORE_CONVERSATIONS", 42)).unwrap();
+    let each = [Role::Agv, Role::MasterControl].into_iter().flat_map(|role| {
+        let names = names(role).into_iter();
+        names.flat_map(move |name| {
+            (1..=seeds).map(move |seed| Explored {
+                role,
+                liberties: vec![name],
+                seed,
+            })
+        })
+    });
+    nothing_is_found(&each.collect::<Vec<_>>(), conversations);
+}
