@@ -201,6 +201,7 @@ impl<R: BufRead> Pieces<R> {
         })
     }
 
+    #[expect(clippy::unnecessary_wraps, reason = "it is returned where a piece may be missing")]
     fn broken(&mut self, why: &'static str) -> Option<Piece> {
         self.done = true;
         Some(Piece {

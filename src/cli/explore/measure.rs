@@ -16,6 +16,9 @@ use crate::run::{Library, VirtualRun, run_silently};
 use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl};
 use crate::suite::model::Test;
 
+/// Conversations that one device is told, and the tests they are.
+type Round<'a> = (&'a [(Chain, ConversationFile)], Vec<Arc<Test>>);
+
 /// What became of one fault.
 struct Measured {
     fault: &'static Fault,
@@ -81,7 +84,7 @@ fn one(
     device: &BuiltIn,
     library: &Library,
     pack: &Pack,
-    rounds: &[(&[(Chain, ConversationFile)], Vec<Arc<Test>>)],
+    rounds: &[Round<'_>],
     fault: &'static Fault,
 ) -> Result<Measured, Problem> {
     let mut measured = Measured {
