@@ -142,8 +142,8 @@ impl Bench {
 
     /// What the audit of its journal finds otherwise than the monitors of the run did; empty when nothing.
     fn audited(&self, result: &Value) -> String {
-        let journal = ["journal.jsonl", "journal.jsonl.gz"].into_iter();
-        let Some(journal) = journal.filter_map(|name| find(&self.out, name)).next() else {
+        let mut names = ["journal.jsonl", "journal.jsonl.gz"].into_iter();
+        let Some(journal) = names.find_map(|name| find(&self.out, name)) else {
             return format!("{}: there is no journal\n", self.name);
         };
         let audit = Command::new(env!("CARGO_BIN_EXE_vda5050-tck"))
@@ -152,7 +152,13 @@ impl Bench {
             .stdin(Stdio::null())
             .output()
             .unwrap();
-        let audited: Value = serde_json::from_slice(&audit.stdout).unwrap_or_default();
+        let audited: Value = match serde_json::from_slice(&audit.stdout) {
+            Ok(audited) => audited,
+            Err(error) => {
+                let words = String::from_utf8_lossy(&audit.stderr);
+                return format!("{}: the audit gave nothing: {error}: {words}\n", self.name);
+            }
+        };
         let (run, audited) = (of_run(result), of_audit(&audited));
         let mut report = String::new();
         for [monitor, requirement, verdict, count] in audited.symmetric_difference(&run) {

@@ -11,6 +11,8 @@
 
 mod foreign;
 mod reference;
+#[path = "../seed/mod.rs"]
+mod seed;
 mod share;
 
 /// The allocator of the program: a qualification is a million small trees.

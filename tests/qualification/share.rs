@@ -5,40 +5,26 @@
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::process::Command;
 
 use vda5050_tck::pack::Role;
 use vda5050_tck::reference::Fault;
 use vda5050_tck::run::Library;
 use vda5050_tck::simulate::BuiltIn;
 
+use crate::seed::{drawn_by, git};
+
 /// One in so many is tried.
 const SHARE: u64 = 8;
 
-fn git(arguments: &[&str]) -> Option<String> {
-    let folder = env!("CARGO_MANIFEST_DIR");
-    let output = Command::new("git")
-        .arg("-C")
-        .arg(folder)
-        .args(arguments)
-        .output()
-        .ok()?;
-    output
-        .status
-        .success()
-        .then(|| String::from_utf8_lossy(&output.stdout).into_owned())
-}
-
 /// The share of a side.
 pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
-    let seed = std::env::var("QUALIFY_SHARE").ok();
-    let seed = seed.or_else(|| git(&["rev-parse", "HEAD"])).unwrap_or_default();
+    let seed = drawn_by();
     let base = std::env::var("QUALIFY_BASE").unwrap_or_else(|_| "HEAD~1".to_owned());
     let change = git(&["diff", "--unified=0", &base, "--", "src", "suites"]).unwrap_or_default();
     let touched = touched(library, role, &change);
     let is_drawn = |fault: &Fault| {
         let mut hasher = DefaultHasher::new();
-        (seed.trim(), fault.name).hash(&mut hasher);
+        (seed.as_str(), fault.name).hash(&mut hasher);
         hasher.finish().is_multiple_of(SHARE)
     };
     let all = BuiltIn::faults(role).iter();
@@ -49,7 +35,7 @@ pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
     println!(
         "{role}: {} faults, seed {}, {} for the change",
         share.len(),
-        seed.trim(),
+        seed,
         touched.len()
     );
     share
