@@ -36,7 +36,8 @@ pub struct Bundle {
 }
 
 impl Bundle {
-    /// Makes `reports/<manufacturer>-<serial>/<utc>-<id>/`.
+    /// Makes `reports/<manufacturer>-<serial>/<utc>-<id>/`, or a numbered one beside it: no run writes into the folder of
+    /// another one that began in the same second.
     pub fn create(
         reports: &Path,
         manufacturer: &str,
@@ -46,11 +47,9 @@ impl Bundle {
     ) -> Result<Self, BundleError> {
         let device = safe(&format!("{manufacturer}-{serial_number}"));
         let begun = utc.strftime("%Y%m%dT%H%M%SZ").to_string();
-        let folder = reports.join(device).join(format!("{begun}-{}", safe(run)));
-        std::fs::create_dir_all(&folder).map_err(|reason| BundleError::Write {
-            path: folder.clone(),
-            reason,
-        })?;
+        let device = reports.join(device);
+        let folder = fresh(&device, &format!("{begun}-{}", safe(run)))
+            .map_err(|reason| BundleError::Write { path: device, reason })?;
         point_at_latest(reports, &folder);
         Ok(Self { folder })
     }
@@ -107,6 +106,22 @@ impl Bundle {
     }
 }
 
+/// Makes a folder that was not there.
+fn fresh(device: &Path, name: &str) -> std::io::Result<PathBuf> {
+    std::fs::create_dir_all(device)?;
+    let mut number = 1_u32;
+    loop {
+        let folder = match number {
+            1 => device.join(name),
+            _ => device.join(format!("{name}-{number}")),
+        };
+        match std::fs::create_dir(&folder) {
+            Err(reason) if reason.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            made => return made.map(|()| folder),
+        }
+    }
+}
+
 /// Lets `reports/latest` lead to this run. It is a help for people and scripts: where there are no links, there is none.
 fn point_at_latest(reports: &Path, folder: &Path) {
     let Ok(relative) = folder.strip_prefix(reports) else {
@@ -155,6 +170,17 @@ mod tests {
         std::fs::create_dir_all(&kept).expect("folder");
         Bundle::create(other.path(), "A", "1", jiff::Timestamp::UNIX_EPOCH, "r").expect("bundle");
         assert!(kept.is_dir());
+    }
+
+    #[test]
+    fn two_runs_that_begin_in_one_second_have_a_folder_each() {
+        let root = tempfile::tempdir().expect("folder");
+        let create = || Bundle::create(root.path(), "A", "1", jiff::Timestamp::UNIX_EPOCH, "r").expect("bundle");
+        let all = [create(), create(), create()];
+        for bundle in &all {
+            bundle.journal().expect("journal");
+        }
+        assert!(all[2].folder().ends_with("19700101T000000Z-r-3"));
     }
 
     #[test]
