@@ -149,7 +149,7 @@ impl<R: BufRead> Pieces<R> {
             let Some(byte) = self.peek()? else {
                 return Ok(match self.at {
                     At::End => None,
-                    _ => self.broken("the array is not closed"),
+                    _ => Some(self.broken("the array is not closed")),
                 });
             };
             match (self.at, byte) {
@@ -157,9 +157,9 @@ impl<R: BufRead> Pieces<R> {
                 (At::Begin, _) => self.at = At::First,
                 (At::First | At::Behind, b']') => self.at = At::End,
                 (At::Behind, b',') => self.at = At::Next,
-                (At::End, _) => return Ok(self.broken("something stands behind the array")),
-                (At::Behind, _) => return Ok(self.broken("a comma or the end of the array is missing")),
-                (At::Next, b']') => return Ok(self.broken("an element is missing behind a comma")),
+                (At::End, _) => return Ok(Some(self.broken("something stands behind the array"))),
+                (At::Behind, _) => return Ok(Some(self.broken("a comma or the end of the array is missing"))),
+                (At::Next, b']') => return Ok(Some(self.broken("an element is missing behind a comma"))),
                 (At::First | At::Next, _) => {
                     self.at = At::Behind;
                     return self.element().map(Some);
@@ -201,14 +201,13 @@ impl<R: BufRead> Pieces<R> {
         })
     }
 
-    #[expect(clippy::unnecessary_wraps, reason = "it is returned where a piece may be missing")]
-    fn broken(&mut self, why: &'static str) -> Option<Piece> {
+    fn broken(&mut self, why: &'static str) -> Piece {
         self.done = true;
-        Some(Piece {
+        Piece {
             line: self.line,
             column: self.column,
             content: Content::Broken(why),
-        })
+        }
     }
 
     fn peek(&mut self) -> io::Result<Option<u8>> {

@@ -48,7 +48,8 @@ pub struct Grammar {
     pub situations: BTreeMap<String, String>,
     /// Answers that stimuli share.
     pub answers: BTreeMap<String, String>,
-    /// The stimuli by name.
+    /// The stimuli by name; those of the files beside it among them.
+    #[serde(default)]
     pub stimuli: BTreeMap<String, Stimulus>,
     /// What brings the device back to rest.
     pub endings: Vec<Ending>,

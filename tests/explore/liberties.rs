@@ -1,26 +1,21 @@
 //! No false accusation in conversations: with whatever liberty a good device is explored, nothing is found that the liberty
 //! does not excuse.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-
-mod seed;
 
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use vda5050_tck::explore::{Chain, ConversationFile, Coverage, Exploration, Finding, Grammar, findings};
+use vda5050_tck::explore::{Coverage, Exploration, Finding};
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::Library;
 use vda5050_tck::simulate::BuiltIn;
 
-/// The allocator of the program: a run is a million small trees.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+use crate::{grammar, seed};
 
 /// What is found with a liberty and is right: liberty, requirement, and why.
 fn excused() -> Vec<(&'static str, &'static str)> {
-    let table = include_str!("imperfect/explore-excused.tsv");
+    let table = include_str!("excused.tsv");
     let rows = table.lines().filter(|line| !line.starts_with('#'));
     rows.map(|line| {
         let columns: Vec<&str> = line.split('\t').collect();
@@ -44,32 +39,19 @@ fn names(role: Role) -> Vec<&'static str> {
 /// What conversations find.
 fn found(one: &Explored, conversations: usize) -> Vec<Finding> {
     let mut library = Library::load(None).unwrap();
-    let pack = library.rules.packs.latest().clone();
-    let grammar = Grammar::load(&library.assets, one.role)
-        .unwrap()
-        .only(&pack, |_, _| true);
     let exploration = Exploration {
-        grammar: grammar.clone(),
+        grammar: grammar(&library, one.role),
         seed: one.seed,
         conversations,
         length: 12,
         trials: 0,
     };
-    let drawn: Vec<(Chain, ConversationFile)> = exploration.drawn(&grammar, &mut Coverage::default());
-    let places = drawn
-        .iter()
-        .map(|(_, file)| (file.place(grammar.side()), file.text.clone()));
-    let places: Vec<(String, String)> = places.collect();
-    let mut run = VirtualRun::of_role(one.role, &library, &pack);
-    run.tests = library.add(&places).unwrap_or_default();
-    assert_eq!(run.tests.len(), drawn.len(), "every conversation is a test");
-    run.draw = None;
-    run.complete = false;
-    for name in &one.liberties {
-        run.device.tolerate(name).unwrap();
-    }
-    let finished = run_silently(&library, &pack, run).unwrap();
-    findings(&finished.result, &drawn)
+    let drawn = exploration.drawn(&exploration.grammar, &mut Coverage::default());
+    crate::found(&mut library, one.role, &drawn, |run| {
+        for name in &one.liberties {
+            run.device.tolerate(name).unwrap();
+        }
+    })
 }
 
 /// What is found that no liberty excuses: a line for each.
