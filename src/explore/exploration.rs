@@ -116,6 +116,10 @@ impl Exploration {
         note(&format!("trying {} stimuli one by one", probes.len()));
         let files: Vec<ConversationFile> = probes.iter().map(|(_, file)| file.clone()).collect();
         let probed = stage.carry_out(&files, Purpose::Probe)?;
+        if probed.partial && !stage.interrupted() {
+            let tried = probed.tests.iter().filter(|test| test.journal.is_some()).count();
+            note(&format!("half of the time is up after {tried} of them"));
+        }
         let left_out = left_out(&probes, &probed);
         let unfit: BTreeSet<&str> = left_out.iter().map(|(name, _)| name.as_str()).collect();
         let mut grammar = self.grammar.clone();
@@ -229,7 +233,9 @@ fn learn(coverage: &mut Coverage, result: &RunResult) {
 fn left_out(probes: &[(Chain, ConversationFile)], result: &RunResult) -> Vec<(String, String)> {
     let unfit = probes.iter().filter_map(|(chain, file)| {
         let test = result.tests.iter().find(|test| test.id == file.id)?;
-        let never_began = test.journal.is_none().then(|| test.reason.clone().unwrap_or_default());
+        // Where the time was up, nobody knows why one did not begin.
+        let never_began = test.journal.is_none() && !result.partial;
+        let never_began = never_began.then(|| test.reason.clone().unwrap_or_default());
         let why = test.not_applicable.clone().or(never_began)?;
         Some((family(chain.stimuli().last()?).to_owned(), why))
     });

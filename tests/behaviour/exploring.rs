@@ -87,8 +87,10 @@ fn the_conversations_end_when_the_time_is_up_and_what_was_found_is_shrunk() {
     let explore = [
         "explore",
         "--virtual",
+        "--focus",
+        "outdated",
         "--conversations",
-        "400",
+        "1500",
         "--budget",
         "1s",
         "--format",
@@ -98,7 +100,7 @@ fn the_conversations_end_when_the_time_is_up_and_what_was_found_is_shrunk() {
     let ended = run_in(folder.path(), &[explore.as_slice(), &fault].concat()).code(1);
     let explored: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert!(
-        explored["conversations"].as_u64().unwrap() < 400,
+        explored["conversations"].as_u64().unwrap() < 1500,
         "{}",
         explored["conversations"]
     );

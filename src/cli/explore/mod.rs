@@ -4,6 +4,7 @@ mod measure;
 mod show;
 mod stage;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::args::Explore;
@@ -11,7 +12,7 @@ use super::device::{check_faults, pack_of};
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::diagnostic::Diagnostic;
-use crate::explore::{ConversationFile, Exploration, Grammar, Purpose, Stage as _};
+use crate::explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Stage as _};
 use crate::profile::{self, Surroundings};
 use crate::run::Library;
 use crate::verdict::Verdict;
@@ -76,19 +77,16 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     })
 }
 
-/// The same grammar, in which some stimuli are drawn more often.
+/// The same grammar with nothing but the stimuli that are named and those that lead to them, which are drawn less often.
 fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
+    if focus.is_empty() {
+        return Ok(grammar);
+    }
+    let mut named = BTreeSet::new();
     for pattern in focus {
-        let mut any = false;
-        for (_, stimulus) in grammar
-            .stimuli
-            .iter_mut()
-            .filter(|(name, _)| super::select::matches(pattern, name))
-        {
-            stimulus.weight = stimulus.weight.saturating_mul(FOCUS);
-            any = true;
-        }
-        if !any {
+        let names = grammar.stimuli.keys();
+        let matching: Vec<&String> = names.filter(|name| super::select::matches(pattern, name)).collect();
+        if matching.is_empty() {
             let names = grammar.stimuli.keys().map(String::as_str);
             let hint = match crate::diagnostic::closest(pattern, names) {
                 Some(close) => format!("did you mean `{close}`?"),
@@ -97,7 +95,16 @@ fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
             let title = format!("no stimulus matches `{pattern}`");
             return Err(Diagnostic::whole("unknown-stimulus", title).hint(hint).into());
         }
+        named.extend(matching.into_iter().cloned());
     }
+    let ways = named.iter().filter_map(|name| Chain::shortest_to(&grammar, name));
+    let leading: BTreeSet<String> = ways.flat_map(|way| way.stimuli().to_vec()).collect();
+    grammar.stimuli.retain(|name, stimulus| {
+        if named.contains(name) {
+            stimulus.weight = stimulus.weight.saturating_mul(FOCUS);
+        }
+        named.contains(name) || leading.contains(name)
+    });
     Ok(grammar)
 }
 

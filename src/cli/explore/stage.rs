@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -84,8 +84,8 @@ pub(super) struct OnStage {
     reports: PathBuf,
     runtime: Runtime,
     interrupt: watch::Receiver<bool>,
-    /// How long conversations that were drawn are carried out.
-    budget: Option<Duration>,
+    /// How long stimuli are tried and conversations carried out, and since when.
+    budget: Option<(Instant, Duration)>,
     desk: Desk,
     rounds: u32,
     kept: Option<PathBuf>,
@@ -116,9 +116,13 @@ impl OnStage {
         })
     }
 
-    /// The same, with a time after which no conversation that was drawn begins.
+    /// The same, with a time after which no conversation that was drawn begins. Stimuli are tried one by one for half of
+    /// this time at most.
     pub(super) fn within(self, budget: Option<Duration>) -> Self {
-        Self { budget, ..self }
+        Self {
+            budget: budget.map(|budget| (Instant::now(), budget)),
+            ..self
+        }
     }
 
     pub(super) fn catalogue(&self) -> &Catalogue {
@@ -158,14 +162,19 @@ impl OnStage {
 
     /// What ends a run: a person, or the end of its time.
     fn end(&self, purpose: Purpose) -> watch::Receiver<bool> {
-        let Some(budget) = self.budget.filter(|_| purpose == Purpose::Conversations) else {
+        let end = self.budget.and_then(|(begun, budget)| match purpose {
+            Purpose::Probe => Some(begun + budget / 2),
+            Purpose::Conversations => Some(begun + budget),
+            Purpose::Trial | Purpose::Evidence => None,
+        });
+        let Some(time_is_up) = end else {
             return self.interrupt.clone();
         };
         let mut person = self.interrupt.clone();
         let (ends, end) = watch::channel(false);
         self.runtime.spawn(async move {
             tokio::select! {
-                () = tokio::time::sleep(budget) => {}
+                () = tokio::time::sleep_until(time_is_up.into()) => {}
                 _ = person.wait_for(|interrupted| *interrupted) => {}
                 () = ends.closed() => {}
             }
