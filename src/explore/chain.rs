@@ -1,5 +1,7 @@
 //! A list of stimuli that a grammar allows, one after the other.
 
+use std::collections::{BTreeSet, VecDeque};
+
 use super::grammar::Grammar;
 use super::model::Model;
 use super::writing::{self, ConversationFile};
@@ -40,23 +42,22 @@ impl Chain {
     /// The shortest chain that ends with a stimulus; `None` when nothing leads to it.
     #[must_use]
     pub fn shortest_to(grammar: &Grammar, wanted: &str) -> Option<Self> {
-        let stimulus = grammar.stimuli.get(wanted)?;
-        let mut seen = std::collections::BTreeSet::new();
-        let mut open = std::collections::VecDeque::from([(Model::begin(grammar), Vec::new())]);
-        while let Some((model, names)) = open.pop_front() {
-            if model.allows(stimulus) {
-                return Some(Self([names, vec![wanted.to_owned()]].concat()));
-            }
-            if !seen.insert((model.situation.clone(), model.facts.clone())) {
+        way(grammar, Model::begin(grammar), |name| name == wanted).map(|(names, _)| Self(names))
+    }
+
+    /// These stimuli, those that lead to each of them, and those that lead from each of them to the next one.
+    #[must_use]
+    pub fn around(grammar: &Grammar, wanted: &BTreeSet<String>) -> BTreeSet<String> {
+        let mut all = wanted.clone();
+        for name in wanted {
+            let Some((there, after)) = way(grammar, Model::begin(grammar), |other| other == name) else {
                 continue;
-            }
-            for (name, next) in grammar.stimuli.iter().filter(|(_, next)| model.allows(next)) {
-                let mut after = model.clone();
-                after.hear(next, String::new());
-                open.push_back((after, [names.clone(), vec![name.clone()]].concat()));
-            }
+            };
+            all.extend(there);
+            let on = way(grammar, after, |other| wanted.contains(other));
+            all.extend(on.into_iter().flat_map(|(names, _)| names));
         }
-        None
+        all
     }
 
     /// The conversation as a test of this id.
@@ -64,4 +65,28 @@ impl Chain {
     pub fn file(&self, grammar: &Grammar, id: &str, why: &str) -> ConversationFile {
         writing::file(&self.0, grammar, id, why)
     }
+}
+
+/// The shortest way to a stimulus that is wanted, and what is known behind it.
+fn way(grammar: &Grammar, from: Model, is_wanted: impl Fn(&str) -> bool) -> Option<(Vec<String>, Model)> {
+    let mut seen = BTreeSet::new();
+    let mut open = VecDeque::from([(from, Vec::new())]);
+    while let Some((model, names)) = open.pop_front() {
+        if !seen.insert((model.situation.clone(), model.facts.clone())) {
+            continue;
+        }
+        let allowed = grammar.stimuli.iter().filter(|(_, next)| model.allows(next));
+        let steps = allowed.map(|(name, next)| {
+            let mut after = model.clone();
+            after.hear(next, String::new());
+            (name, ([names.as_slice(), &[name.clone()]].concat(), after))
+        });
+        for (name, (names, after)) in steps {
+            if is_wanted(name) {
+                return Some((names, after));
+            }
+            open.push_back((after, names));
+        }
+    }
+    None
 }

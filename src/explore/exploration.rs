@@ -131,14 +131,19 @@ impl Exploration {
         let (mut conversations, mut stimuli) = (0, 0);
         if !stage.interrupted() {
             let drawn = self.drawn(&grammar, &mut coverage);
-            stimuli = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
-            note(&format!("{} conversations of {stimuli} stimuli", drawn.len()));
+            let planned: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
+            note(&format!("{} conversations of {planned} stimuli", drawn.len()));
             let files: Vec<ConversationFile> = drawn.iter().map(|(_, file)| file.clone()).collect();
             let result = stage.carry_out(&files, Purpose::Conversations)?;
-            let carried_out = result.tests.iter().filter(|test| test.not_applicable.is_none());
-            let short: Vec<_> = carried_out.filter(|test| !test.came_to_its_end()).collect();
+            // Those whose time did not come were neither said nor left unfinished.
+            let begun = || result.tests.iter().filter(|test| test.journal.is_some());
+            conversations = begun().count();
+            let ids: BTreeSet<&str> = begun().map(|test| test.id.as_str()).collect();
+            let said = drawn.iter().filter(|(_, file)| ids.contains(file.id.as_str()));
+            stimuli = said.map(|(chain, _)| chain.stimuli().len()).sum();
+            let applicable = begun().filter(|test| test.not_applicable.is_none());
+            let short: Vec<_> = applicable.filter(|test| !test.came_to_its_end()).collect();
             undecided = (short.len(), short.first().and_then(|test| test.reason.clone()));
-            conversations = result.tests.iter().filter(|test| test.journal.is_some()).count();
             merge(&mut found, findings(&result, &drawn));
             learn(&mut coverage, &result);
         }
@@ -200,9 +205,7 @@ impl Exploration {
             let conversations = [(chain.clone(), file.clone())];
             let result = stage.carry_out(&[file], Purpose::Trial)?;
             let again = findings(&result, &conversations);
-            Ok(again
-                .iter()
-                .any(|one| one.requirement == finding.requirement && one.source == finding.source))
+            Ok(again.iter().any(|one| one.is_of(&finding)))
         };
         let chain = shrink(grammar, &finding.chain, self.trials, |chain| shows(chain, stage))?;
         let mut times = 0;
@@ -245,8 +248,7 @@ fn left_out(probes: &[(Chain, ConversationFile)], result: &RunResult) -> Vec<(St
 /// Adds findings to others. One that is there already keeps the shorter conversation.
 fn merge(all: &mut Vec<Finding>, more: Vec<Finding>) {
     for one in more {
-        let same = |own: &&mut Finding| own.requirement == one.requirement && own.source == one.source;
-        match all.iter_mut().find(same) {
+        match all.iter_mut().find(|own| own.is_of(&one)) {
             Some(own) => own.count += one.count,
             None => all.push(one),
         }

@@ -34,6 +34,14 @@ pub struct Finding {
     pub count: usize,
 }
 
+impl Finding {
+    /// Whether another one is of the same kind: the same requirement, seen by the same.
+    #[must_use]
+    pub fn is_of(&self, other: &Self) -> bool {
+        self.requirement == other.requirement && self.source == other.source
+    }
+}
+
 /// The findings of a run of these conversations, the worst first. Of each conversation the first failure counts, because
 /// what comes behind may follow from it; of each monitor every requirement.
 #[must_use]

@@ -68,6 +68,36 @@ fn the_same_seed_draws_the_same_conversations_and_they_are_tests_without_a_compl
         .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
 }
 
+/// Otherwise the next update would join the order where it does not end, and the vehicle be accused of refusing it.
+#[test]
+fn an_order_ends_where_the_grammar_says() {
+    let library = Library::load(None).expect("the built-in suites");
+    let route = regex::Regex::new(r"base: \[([^\]]*)\]").expect("a pattern");
+    let mut seen = 0;
+    for pack in library.rules.packs.all() {
+        for (name, stimulus) in grammar(&library, pack, Role::Agv).stimuli {
+            let then = &stimulus.then;
+            let taken = usize::from(then.order) + usize::try_from(then.update).expect("a few updates");
+            // A cancelled order is not updated any more.
+            if taken == 0 || then.situation.as_deref() == Some("cancelled") {
+                continue;
+            }
+            let steps = format!("{}{}", stimulus.sends, stimulus.hears);
+            let routes: Vec<usize> = route
+                .captures_iter(&steps)
+                .map(|found| found[1].split(',').count() - 1)
+                .collect();
+            let edges: usize = routes.iter().rev().take(taken).sum();
+            assert_eq!(
+                edges, then.forward,
+                "{name}: so many edges are released by the last orders"
+            );
+            seen += 1;
+        }
+    }
+    assert!(seen > 60, "{seen} stimuli");
+}
+
 #[test]
 fn what_was_not_tried_yet_is_drawn_first() {
     let library = Library::load(None).expect("the built-in suites");

@@ -143,17 +143,19 @@ fn conversations_with_a_liberty_accuse_nobody() {
     nothing_is_found(&all, 8);
 }
 
+/// A number that somebody has set for this run.
+fn said(name: &str, usual: u64) -> u64 {
+    let said = std::env::var(name).ok().and_then(|number| number.parse().ok());
+    said.unwrap_or(usual)
+}
+
 /// Every liberty by itself, with as many seeds as `EXPLORE_SEEDS` says and as many conversations as
 /// `EXPLORE_CONVERSATIONS` says. It is run by hand, after a change of checks or of `suites/explore`.
 #[test]
 #[ignore = "takes minutes; run by hand"]
 fn conversations_with_every_liberty_accuse_nobody() {
-    let number = |name: &str, usual: u64| {
-        let said = std::env::var(name).ok().and_then(|number| number.parse().ok());
-        said.unwrap_or(usual)
-    };
-    let seeds = number("EXPLORE_SEEDS", 1);
-    let conversations = usize::try_from(number("EXPLORE_CONVERSATIONS", 42)).unwrap();
+    let seeds = said("EXPLORE_SEEDS", 1);
+    let conversations = usize::try_from(said("EXPLORE_CONVERSATIONS", 42)).unwrap();
     let each = [Role::Agv, Role::MasterControl].into_iter().flat_map(|role| {
         let names = names(role).into_iter();
         names.flat_map(move |name| {
@@ -165,4 +167,29 @@ fn conversations_with_every_liberty_accuse_nobody() {
         })
     });
     nothing_is_found(&each.collect::<Vec<_>>(), conversations);
+}
+
+/// Three liberties at a time, drawn by the seed: as many seeds as `EXPLORE_SEEDS` says, with 500 stimuli each. It is run by
+/// hand, too.
+#[test]
+#[ignore = "takes minutes; run by hand"]
+fn conversations_with_three_liberties_accuse_nobody() {
+    const TOGETHER: usize = 3;
+    let all = [Role::Agv, Role::MasterControl].into_iter().flat_map(|role| {
+        (1..=said("EXPLORE_SEEDS", 200)).map(move |seed| {
+            let mut drawn = names(role);
+            drawn.sort_by_key(|name| {
+                let mut hasher = DefaultHasher::new();
+                (seed, name).hash(&mut hasher);
+                hasher.finish()
+            });
+            drawn.truncate(TOGETHER);
+            Explored {
+                role,
+                liberties: drawn,
+                seed,
+            }
+        })
+    });
+    nothing_is_found(&all.collect::<Vec<_>>(), 42);
 }

@@ -1,4 +1,4 @@
-//! How many faults of a built-in device an exploration finds by itself.
+//! How many faults of a built-in device an exploration finds by itself, beyond what it says of the device without a fault.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::cli::args::{Explore, Format};
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
-use crate::explore::{Chain, ConversationFile, Coverage, Exploration, findings};
+use crate::explore::{Chain, ConversationFile, Coverage, Exploration, Finding, findings};
 use crate::pack::{Pack, Role};
 use crate::reference::Fault;
 use crate::run::{Library, VirtualRun, run_silently};
@@ -56,6 +56,7 @@ pub(super) fn every_fault(
     let meant = |fault: &&Fault| arguments.fault.is_empty() || arguments.fault.iter().any(|name| name == fault.name);
     let faults = BuiltIn::faults(device.role()).iter().filter(meant);
     let faults: Vec<&'static Fault> = faults.step_by(every).collect();
+    let good = told(&device, &library, pack, &rounds, None, |_| false)?;
     let next = AtomicUsize::new(0);
     let all: Mutex<Vec<Result<Measured, Problem>>> = Mutex::new(Vec::new());
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -63,7 +64,7 @@ pub(super) fn every_fault(
         for _ in 0..threads {
             scope.spawn(|| {
                 while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let found = one(&device, &library, pack, &rounds, fault);
+                    let found = one(&device, &library, pack, &rounds, fault, &good);
                     all.lock()
                         .unwrap_or_else(std::sync::PoisonError::into_inner)
                         .push(found);
@@ -75,7 +76,7 @@ pub(super) fn every_fault(
     let mut all: Vec<Measured> = all.into_iter().collect::<Result<_, _>>()?;
     all.sort_by_key(|one| one.fault.name);
     let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
-    super::super::print(&shown(&all, stimuli, exploration.seed, arguments.output.format))?;
+    super::super::print(&shown(&all, &good, stimuli, exploration.seed, arguments.output.format))?;
     Ok(Exit::Conforms)
 }
 
@@ -86,31 +87,47 @@ fn one(
     pack: &Pack,
     rounds: &[Round<'_>],
     fault: &'static Fault,
+    good: &[Finding],
 ) -> Result<Measured, Problem> {
-    let mut measured = Measured {
+    let by_fault = |one: &Finding| !good.iter().any(|other| other.is_of(one));
+    let about = |one: &Finding| by_fault(one) && fault.breaks.contains(&one.requirement.as_str());
+    let found = told(device, library, pack, rounds, Some(fault), |found| {
+        found.iter().any(about)
+    })?;
+    Ok(Measured {
         fault,
-        found: false,
-        named: false,
-    };
+        found: found.iter().any(by_fault),
+        named: found.iter().any(about),
+    })
+}
+
+/// Carries out the conversations, as long as what is found is not enough.
+fn told(
+    device: &BuiltIn,
+    library: &Library,
+    pack: &Pack,
+    rounds: &[Round<'_>],
+    fault: Option<&'static Fault>,
+    is_enough: impl Fn(&[Finding]) -> bool,
+) -> Result<Vec<Finding>, Problem> {
+    let mut all = Vec::new();
     for (drawn, tests) in rounds {
         let mut run = VirtualRun::of_role(device.role(), library, pack);
         run.device = device.clone();
-        run.faults = vec![fault.name.to_owned()];
+        run.faults = fault.iter().map(|fault| fault.name.to_owned()).collect();
         run.tests.clone_from(tests);
         run.complete = false;
         run.draw = None;
         let finished = run_silently(library, pack, run).map_err(|error| Problem::Environment(error.to_string()))?;
-        let found = findings(&finished.result, drawn);
-        measured.found |= !found.is_empty();
-        measured.named |= found.iter().any(|one| fault.breaks.contains(&one.requirement.as_str()));
-        if measured.named {
+        all.extend(findings(&finished.result, drawn));
+        if is_enough(&all) {
             break;
         }
     }
-    Ok(measured)
+    Ok(all)
 }
 
-fn shown(all: &[Measured], stimuli: usize, seed: u64, format: Format) -> String {
+fn shown(all: &[Measured], good: &[Finding], stimuli: usize, seed: u64, format: Format) -> String {
     let found = all.iter().filter(|one| one.found).count();
     let named = all.iter().filter(|one| one.named).count();
     if format == Format::Json {
@@ -124,11 +141,20 @@ fn shown(all: &[Measured], stimuli: usize, seed: u64, format: Format) -> String 
             "faults": all.len(),
             "found": found,
             "named": named,
+            "accusations": good.iter().map(|one| json!({ "requirement": one.requirement, "message": one.message })).collect::<Vec<_>>(),
             "each": faults.collect::<Vec<_>>(),
         });
         return format!("{value}\n");
     }
     let mut text = String::new();
+    for one in good {
+        let stimuli = one.chain.stimuli().join(", ");
+        let _ = writeln!(
+            text,
+            "found without a fault: {}  {}\n  {stimuli}",
+            one.requirement, one.message
+        );
+    }
     for one in all.iter().filter(|one| !one.found) {
         let _ = writeln!(text, "not found: {}  {}", one.fault.name, one.fault.wrong);
     }

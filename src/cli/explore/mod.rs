@@ -77,7 +77,8 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     })
 }
 
-/// The same grammar with nothing but the stimuli that are named and those that lead to them, which are drawn less often.
+/// The same grammar with nothing but the stimuli that are named, and those that lead to them and from one to the next, which
+/// are drawn less often.
 fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
     if focus.is_empty() {
         return Ok(grammar);
@@ -97,13 +98,12 @@ fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
         }
         named.extend(matching.into_iter().cloned());
     }
-    let ways = named.iter().filter_map(|name| Chain::shortest_to(&grammar, name));
-    let leading: BTreeSet<String> = ways.flat_map(|way| way.stimuli().to_vec()).collect();
+    let kept = Chain::around(&grammar, &named);
     grammar.stimuli.retain(|name, stimulus| {
         if named.contains(name) {
             stimulus.weight = stimulus.weight.saturating_mul(FOCUS);
         }
-        named.contains(name) || leading.contains(name)
+        kept.contains(name)
     });
     Ok(grammar)
 }
