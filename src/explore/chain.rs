@@ -79,7 +79,7 @@ fn way(grammar: &Grammar, from: Model, is_wanted: impl Fn(&str) -> bool) -> Opti
         let steps = allowed.map(|(name, next)| {
             let mut after = model.clone();
             after.hear(next, String::new());
-            (name, ([names.as_slice(), &[name.clone()]].concat(), after))
+            (name, ([names.as_slice(), std::slice::from_ref(name)].concat(), after))
         });
         for (name, (names, after)) in steps {
             if is_wanted(name) {
