@@ -28,7 +28,7 @@ with open(sys.argv[1], encoding="utf-8") as recording:
             message = json.loads(record["payload"])
             version = "2.0" if str(message.get("version")).startswith("2.0") else "2.1"
             valid = SCHEMAS[version, record["topic"].rpartition("/")[2]].is_valid(message)
-        except ValueError:
+        except (ValueError, AttributeError):
             valid = False
         invalid += not valid
 seconds = time.monotonic() - begun

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::sheet::grace;
 use super::vehicle::{Outside, Vehicle};
-use super::{Command, ELEMENTS, Each, Found, in_sequence, parameter, place_of, said, short};
+use super::{Command, ELEMENTS, Each, Found, content, in_sequence, parameter, place_of, said, short};
 use crate::checks::orders::number;
 use crate::checks::traffic::{Traffic, elements, quote, show, text};
 use crate::checks::{Check, CheckContext, CheckFinding, Running};
@@ -19,7 +19,7 @@ pub(in crate::checks) const ENABLED: Check = Check {
     decides: &["MAP-09"],
     doc: "The nodes of an order are on maps that the states of the vehicle list as ENABLED, that an enableMap which has \
           FINISHED has enabled, or that an order enables on its way; of an update it is a warning. Judged only for a vehicle \
-          that lists maps.",
+          that lists maps, and not of the last order that is sent again as it was.",
     arguments: &[],
     start: |_| Box::new(Enabled::default()),
 };
@@ -123,6 +123,8 @@ struct Enabled {
     asked: BTreeMap<String, String>,
     /// Maps that are enabled on the way, or were by an action that has ended well.
     usable: BTreeSet<String>,
+    /// What the last order said: whoever sends it again because no state shows it uses no map that was not used before.
+    sent: Option<u64>,
 }
 
 impl Running for Enabled {
@@ -164,6 +166,10 @@ impl Running for Enabled {
             }
         }
         let Some(order) = command.order() else { return false };
+        let before = self.sent.replace(content(order));
+        if before == self.sent {
+            return false;
+        }
         let (now, grace) = (entry.at().moment, grace(context));
         let newest = self.reported.iter().rev();
         let fresh = newest.clone().take_while(|(said, _)| now.since(*said) < grace).count();

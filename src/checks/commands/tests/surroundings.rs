@@ -32,6 +32,27 @@ fn orders_that_come_too_fast_are_found() {
 }
 
 #[test]
+fn a_map_that_is_disabled_is_used_by_no_new_order() {
+    let maps = |status: &str| json!({ "maps": [{ "mapId": "hall", "mapVersion": "1", "mapStatus": status }] });
+    let (first, second) = (order("o1", 0, 0, 2, 4), order("o2", 0, 0, 2, 4));
+    let ordered = |then: &Value| {
+        let mut trace = begun();
+        trace.shows(&maps("ENABLED")).wait(10.0);
+        trace.commands("order", &first).wait(10.0);
+        trace.shows(&maps("DISABLED")).wait(10.0);
+        trace.shows(&maps("DISABLED")).wait(10.0);
+        trace.commands("order", then);
+        trace.judge("commands/map-enabled").summary()
+    };
+    assert_eq!(ordered(&second), ["MAP-09"]);
+    assert_eq!(
+        ordered(&first),
+        Vec::<String>::new(),
+        "no state has shown it: it comes again"
+    );
+}
+
+#[test]
 fn a_map_that_was_refused_is_deleted_first() {
     let map = json!([
         { "key": "mapId", "value": "hall" }, { "key": "mapVersion", "value": "1" },
