@@ -6,6 +6,7 @@ pub(crate) mod dial;
 pub mod endpoint;
 mod heard;
 pub(crate) mod inbox;
+pub mod kin;
 pub(crate) mod listen;
 pub mod own;
 pub(crate) mod stream;

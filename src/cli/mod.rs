@@ -6,6 +6,7 @@ mod browser;
 mod certify;
 mod device;
 mod discover;
+mod ending;
 mod events;
 pub mod exit;
 mod explained;
@@ -51,6 +52,10 @@ use problem::Problem;
 /// The program.
 #[must_use]
 pub fn main() -> ExitCode {
+    // A run calls this program in this way to keep hold of the device that it starts.
+    if let Some(code) = crate::run::supervisor::called(std::env::args_os()) {
+        return code;
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

@@ -12,6 +12,7 @@ mod packet;
 mod payload;
 pub mod place;
 mod plan;
+mod program;
 mod waiver;
 
 use std::borrow::Cow;

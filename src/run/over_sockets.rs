@@ -7,12 +7,13 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use super::device::{Surroundings as Onlookers, Tell};
 use super::hooks::Means;
 use super::library::Library;
 use super::operators::{Commands, hooks_of};
 use super::person::Person;
 use super::plan::{How, RunPlan};
-use super::session::{Finished, Progress, run};
+use super::session::{Finished, Patience, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
 use super::site::{Topics, bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
@@ -22,7 +23,7 @@ use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::engine::{Composer, Engine, EngineError, Operator, RecordError, Recorder};
 use crate::journal::Journal;
-use crate::journal::event::{Event, Occurrence};
+use crate::journal::event::{Event, Occurrence, Source as Seen};
 use crate::journal::file::JournalWriter;
 use crate::judge::RunJudge;
 use crate::link::mqtt::{BenchInfo, BenchOptions, MqttBench, MqttLink};
@@ -47,6 +48,19 @@ pub struct SocketRun {
     pub earlier: Option<Journal>,
     /// Where a device prints that the harness starts itself.
     pub device_log: Option<PathBuf>,
+    /// Who keeps hold of such a device, and who is told at once what becomes of it.
+    pub hold: Hold,
+    /// Turns true when nobody waits any more for the run to end in good order.
+    pub quit: Option<tokio::sync::watch::Receiver<bool>>,
+}
+
+/// What a device needs that the harness starts itself.
+#[derive(Clone, Default)]
+pub struct Hold {
+    /// The program that can be called as a [`super::supervisor`].
+    pub supervisor: Option<PathBuf>,
+    /// Who looks on.
+    pub tell: Option<Tell>,
 }
 
 /// Where the device comes from.
@@ -115,6 +129,8 @@ impl SocketRun {
             maps: Ok(()),
             earlier: None,
             device_log: None,
+            hold: Hold::default(),
+            quit: None,
         }
     }
 
@@ -158,6 +174,8 @@ impl SocketRun {
             maps,
             earlier: None,
             device_log: None,
+            hold: Hold::default(),
+            quit: None,
         })
     }
 
@@ -245,6 +263,7 @@ impl SocketRun {
             vantage,
             clock,
             earlier: self.earlier,
+            quit: self.quit,
         };
         match self.source {
             Source::BuiltIn { device, faults } => {
@@ -266,7 +285,15 @@ impl SocketRun {
                     authority: profile.bench.tls_ca.clone(),
                     secrets,
                 };
-                let operator = hooks_of(&profile, &info, self.device_log, folder, (person, means))?;
+                let onlookers = Onlookers {
+                    reporter: Some(link.reporter()),
+                    kin: link.kin(),
+                    tell: self.hold.tell,
+                    secrets: means.secrets.clone(),
+                    supervisor: self.hold.supervisor,
+                };
+                let log = (self.device_log, onlookers);
+                let operator = hooks_of(&profile, &info, log, folder, (person, means)).await?;
                 progress.expects_device(&info);
                 stage.run(link, &info, operator, progress, saved).await
             }
@@ -297,6 +324,7 @@ struct Stage<'a> {
     vantage: Vantage,
     clock: WallClock,
     earlier: Option<Journal>,
+    quit: Option<tokio::sync::watch::Receiver<bool>>,
 }
 
 impl Stage<'_> {
@@ -325,14 +353,27 @@ impl Stage<'_> {
             None => WithFleet::alone(operator),
             Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter()),
         };
+        // It is recorded when it comes, whatever the harness is doing then.
+        let (mut interrupted, reporter) = (self.interrupt.clone(), link.reporter());
+        let recorded = tokio::spawn(async move {
+            if interrupted.wait_for(|interrupted| *interrupted).await.is_ok() {
+                reporter.report(Seen::Operator, None, Event::Interrupted).await;
+            }
+        });
+        let patience = Patience {
+            interrupt: self.interrupt.clone(),
+            quit: self.quit,
+        };
         let mut engine = Engine::new(link, operator, recorder, composer, self.interrupt);
-        let end = run(&mut engine, setup, progress, saved).await;
+        let end = run(&mut engine, setup, progress, saved, patience.ends()).await;
+        recorded.abort();
         let Engine {
             link,
             recorder,
-            operator,
+            mut operator,
             ..
         } = engine;
+        operator.end().await;
         operator.stop().await;
         link.stop().await;
         Ok(Finished {

@@ -10,7 +10,8 @@ use tokio::sync::watch;
 use crate::cli::args::Explore;
 use crate::cli::device::tolerate;
 use crate::cli::problem::Problem;
-use crate::cli::run::{person, stop};
+use crate::cli::ending::stop;
+use crate::cli::run::{hold, person};
 use crate::clock::WallClock;
 use crate::explore::{ConversationFile, Explored, Purpose, Stage};
 use crate::journal::file::JournalWriter;
@@ -241,6 +242,7 @@ impl OnStage {
         interrupt: watch::Receiver<bool>,
     ) -> Result<Finished, Problem> {
         run.request = request;
+        run.hold = hold(&self.desk);
         let (library, pack) = (&self.library, &self.pack);
         let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
         let run = run.carry_out(library, pack, writer, interrupt, &mut nobody, &mut nowhere);

@@ -22,7 +22,14 @@ impl Tap {
             .collect();
         Self {
             journal: Journal::new(),
-            company: Company::of(Role::Agv, &topics, packs.latest()).unwrap(),
+            company: Company::of(
+                Role::Agv,
+                &RunHeader {
+                    topics,
+                    ..RunHeader::default()
+                },
+                packs.latest(),
+            ),
             seconds: 0,
         }
     }
