@@ -26,7 +26,7 @@ use crate::journal::event::{Direction, Event, Occurrence, Origin, Packet, Payloa
 use crate::pack::{Pack, Role};
 use client::{Client, Look, Stranger, Who};
 use influence::{AFTER_COMMAND, AFTER_FORGERY, AFTER_TAKEOVER, Excuse, Influence};
-use rivals::{Rivals, host};
+use rivals::Rivals;
 
 /// How many client ids are kept in mind, and how many strangers are named.
 const KEPT: usize = 256;
@@ -254,7 +254,7 @@ impl Company {
         let before = self
             .device_beside(connection)
             .find(|client| client.id == id && self.is_known(client))
-            .map(|client| (client.peer.clone(), client.is_own()));
+            .map(|client| client.peer.clone());
         let taken = before.is_some() && self.is_vehicle;
         let is_excused = self.excuse.holds(now);
         let carries_will = will.is_some_and(|will| self.own.contains(&will.topic));
@@ -293,9 +293,8 @@ impl Company {
             let why = format!("a client at {peer} took the client id of the device, {id:?}, which was thrown out");
             self.influence.lasts(now + AFTER_TAKEOVER, why);
         }
-        if let (Some((former, _)), Who::Device, false, false, true) = (&before, who, is_own, is_excused, taken) {
-            let certain = host(former) != host(&peer);
-            let why = self.rivals.connects(id, (former, &peer), entry.seq(), certain);
+        if let (Some(former), Who::Device, false, false, true) = (&before, who, is_own, is_excused, taken) {
+            let why = self.rivals.connects(id, (former, &peer), entry.seq(), now);
             self.influence.lasts(now + AFTER_TAKEOVER, why);
         }
         if let Some((_, published)) = self.device.get(id).filter(|_| who == Who::Device) {
@@ -405,8 +404,8 @@ impl Company {
                 return self.forges(connection, topic, payload, retain, entry);
             }
             if topic != self.connection {
-                if is_new && !self.excuse.holds(now) {
-                    self.rivals.publish(&why, entry.seq());
+                if !self.excuse.holds(now) {
+                    self.rivals.publish(topic, connection, &why, entry.seq());
                 }
                 self.influence.lasts(now + AFTER_TAKEOVER, why);
             }

@@ -2,30 +2,36 @@
 //! they are more than a connection that was opened anew.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
+use crate::clock::Moment;
 use crate::journal::event::Origin;
 
 /// How many are named.
 const NAMED: usize = 8;
-/// So often the client id of a device may be taken that still seems connected before it is more than one device that comes
-/// back over a bad link.
-const MORE_THAN_ONE: u64 = 2;
+/// Who takes the client id of a connection that still seems open may be the device that comes back over a bad link. When that
+/// is done again so soon, somebody who was thrown out has come back: there are two.
+const SO_SOON: Duration = Duration::from_secs(60);
 
-/// Two connections under one client id.
+/// Connections under one client id.
 #[derive(Debug)]
 struct Double {
     first: u64,
     times: u64,
     peers: (String, String),
-    /// They are known to be of two machines.
-    certain: bool,
+    /// When it was taken last.
+    last: Moment,
+    /// It was taken back and forth.
+    is_duel: bool,
 }
 
 /// See the module.
 #[derive(Debug, Default)]
 pub(super) struct Rivals {
     doubles: BTreeMap<String, Double>,
-    /// Clients that publish on the same topic, and since when.
+    /// The connection that has published last on a topic on which another one does so, too.
+    spoke: BTreeMap<String, u64>,
+    /// Clients that publish on the same topic in turn, and since when.
     publish: BTreeMap<String, u64>,
     /// Machines of which nobody knows which of their programs has a connection.
     elsewhere: BTreeSet<String>,
@@ -46,23 +52,28 @@ impl Rivals {
     }
 
     /// A client connects under an id under which the device is connected, and looks like it. Gives what may follow from it.
-    pub(super) fn connects(&mut self, id: &str, (former, peer): (&str, &str), seq: u64, certain: bool) -> String {
+    pub(super) fn connects(&mut self, id: &str, (former, peer): (&str, &str), seq: u64, now: Moment) -> String {
         if self.doubles.len() < NAMED || self.doubles.contains_key(id) {
             let double = self.doubles.entry(id.to_owned()).or_insert_with(|| Double {
                 first: seq,
                 times: 0,
                 peers: (former.to_owned(), peer.to_owned()),
-                certain: false,
+                last: now,
+                is_duel: false,
             });
+            double.is_duel |= double.times > 0 && now.since(double.last) <= SO_SOON;
             double.times += 1;
-            double.certain |= certain;
+            double.last = now;
         }
         format!("a client at {peer} connected as {id:?} while the connection of {former} under that id was open (#{seq})")
     }
 
-    /// Two clients publish on one topic.
-    pub(super) fn publish(&mut self, why: &str, seq: u64) {
-        if self.publish.len() < NAMED {
+    /// A client publishes on a topic on which another one that is connected has published. One that only takes the place of
+    /// the other is no rival.
+    pub(super) fn publish(&mut self, topic: &str, connection: u64, why: &str, seq: u64) {
+        let before = self.spoke.insert(topic.to_owned(), connection);
+        let in_turn = before.is_some_and(|before| before != connection);
+        if in_turn && self.publish.len() < NAMED {
             self.publish.entry(why.to_owned()).or_insert(seq);
         }
     }
@@ -82,7 +93,7 @@ impl Rivals {
             if let Some(letter) = what.get_mut(..1) {
                 letter.make_ascii_uppercase();
             }
-            format!("{what} (first at #{first}). Which of them is the device is not known, and what that may have caused is undecided.")
+            format!("{what}, in turn (first at #{first}). Which of them is the device is not known, and what that may have caused is undecided.")
         });
         let elsewhere = (!self.elsewhere.is_empty()).then(|| {
             let machines: Vec<&str> = self.elsewhere.iter().map(String::as_str).collect();
@@ -105,13 +116,13 @@ impl Rivals {
     /// Why it is not certain who was judged.
     pub(super) fn mixed(&self) -> Option<String> {
         let mut doubles = self.doubles.iter();
-        let double = doubles.find(|(_, double)| double.certain || double.times >= MORE_THAN_ONE);
+        let double = doubles.find(|(_, double)| double.is_duel);
         let double = double.map(|(id, _)| format!("more than one client is connected as {id:?}"));
         double.or_else(|| self.publish.keys().next().cloned())
     }
 }
 
 /// The host of an address with its port.
-pub(super) fn host(address: &str) -> &str {
+fn host(address: &str) -> &str {
     address.rsplit_once(':').map_or(address, |(host, _)| host)
 }
