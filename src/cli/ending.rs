@@ -5,8 +5,8 @@ use tokio::sync::watch;
 use super::exit::Exit;
 use super::problem::Problem;
 use super::signals::Signals;
-use crate::run::ENDS_WITHIN;
 use crate::ui::{Desk, put_terminal_back};
+use tck_run::ENDS_WITHIN;
 
 /// Two wishes about the end of a run, and the desk where they are answered.
 pub(super) struct Ending {

@@ -41,19 +41,19 @@ use std::sync::Arc;
 
 use clap::Parser as _;
 
-use crate::diagnostic::Diagnostic;
-use crate::pack::{Pack, Packs};
-use crate::report::text::Color;
-use crate::run::Library;
 use args::{Cli, Command, Format};
 use list::print;
 use problem::Problem;
+use tck_base::diagnostic::Diagnostic;
+use tck_judge::Library;
+use tck_pack::{Pack, Packs};
+use tck_report::text::Color;
 
 /// The program.
 #[must_use]
 pub fn main() -> ExitCode {
     // A run calls this program in this way to keep hold of the device that it starts.
-    if let Some(code) = crate::run::supervisor::called(std::env::args_os()) {
+    if let Some(code) = tck_run::supervisor::called(std::env::args_os()) {
         return code;
     }
     let cli = match Cli::try_parse() {
