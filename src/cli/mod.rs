@@ -6,6 +6,7 @@ mod browser;
 mod certify;
 mod device;
 mod discover;
+mod ending;
 mod events;
 pub mod exit;
 mod explained;
@@ -51,6 +52,10 @@ use tck_report::text::Color;
 /// The program.
 #[must_use]
 pub fn main() -> ExitCode {
+    // A run calls this program in this way to keep hold of the device that it starts.
+    if let Some(code) = tck_run::supervisor::called(std::env::args_os()) {
+        return code;
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

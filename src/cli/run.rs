@@ -14,12 +14,12 @@ use resume::Earlier;
 
 use super::args;
 use super::device::{check_faults, pack_of, tolerate};
+use super::ending::Ending;
 use super::events::{About, Followed};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::screen::{Screen, Show};
-use super::signals::Signals;
-use crate::ui::{Desk, put_terminal_back};
+use crate::ui::Desk;
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::Vantage;
@@ -32,7 +32,8 @@ use tck_pack::{Pack, Role};
 use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
-    Bundle, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually, write_result,
+    Bundle, Hold, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
+    write_result,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
@@ -50,6 +51,8 @@ struct Job {
     earlier: Option<Earlier>,
     /// How many mock AGVs are asked for when a master control is tested.
     vehicles: Option<usize>,
+    /// Turns true when nobody waits any more for the run to end in good order.
+    quit: Option<watch::Receiver<bool>>,
 }
 
 /// `run`.
@@ -146,6 +149,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         certifies: arguments.certifies,
         vehicles: arguments.vehicles.map(|count| count as usize),
         earlier,
+        quit: None,
     };
     if arguments.selection.plan {
         return job.plan(arguments, built_in, &surroundings);
@@ -161,9 +165,10 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let mut desk = job.desk.clone();
     let outcome = runtime.block_on(async {
-        let stop = stop()?;
-        let interrupt = stop.subscribe();
-        job.desk = Desk::new(stop);
+        let ending = Ending::listen()?;
+        let interrupt = ending.interrupt.clone();
+        job.desk = ending.desk.clone();
+        job.quit = Some(ending.quit);
         desk = job.desk.clone();
         if arguments.in_virtual_time {
             job.virtually(arguments, interrupt).await
@@ -179,27 +184,14 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     outcome
 }
 
-/// A signal once ends the run in good order, twice at once.
-pub(super) fn interrupts() -> Result<watch::Receiver<bool>, Problem> {
-    Ok(stop()?.subscribe())
-}
-
-/// The same, and what else ends the run in good order.
-pub(super) fn stop() -> Result<watch::Sender<bool>, Problem> {
-    let (sender, mut stopped) = watch::channel(false);
-    let mut signals = Signals::listen()?;
-    let stop = sender.clone();
-    tokio::spawn(async move {
-        tokio::select! {
-            () = signals.next() => {}
-            _ = stopped.wait_for(|stopped| *stopped) => {}
-        }
-        stop.send_replace(true);
-        signals.next().await;
-        put_terminal_back();
-        std::process::exit(i32::from(Exit::Interrupted.code()));
-    });
-    Ok(sender)
+/// Who keeps hold of a device that a run starts, and where it is said at once what becomes of it.
+pub(super) fn hold(desk: &Desk) -> Hold {
+    let desk = desk.clone();
+    Hold {
+        // Where this program cannot be found, the process group of the device has to do.
+        supervisor: std::env::current_exe().ok(),
+        tell: Some(Arc::new(move |text| desk.say(text))),
+    }
 }
 
 /// The desk, where somebody sits there who can be asked.
@@ -347,6 +339,8 @@ impl Job {
         let bundle = self.bundle(&run.device.subject, run.options.clock.origin_stamp().utc)?;
         let writer = self.journal(&bundle)?;
         run.device_log = Some(bundle.folder().join("device.log"));
+        run.hold = hold(&self.desk);
+        run.quit.clone_from(&self.quit);
         let mut terminal = self.screen(&run.device.subject, &bundle)?;
         let mut saved = saving(&bundle);
         let finished = run.carry_out(

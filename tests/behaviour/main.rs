@@ -31,6 +31,7 @@ mod resuming;
 mod scripted;
 mod selecting;
 mod simulating;
+mod started;
 mod tool;
 mod transcripts;
 mod validating;

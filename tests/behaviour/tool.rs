@@ -176,6 +176,11 @@ impl Running {
         assert!(sent.success());
     }
 
+    /// The number of the process.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Ends it without a warning, as when the power is cut.
     pub fn kill(&mut self) {
         self.child.kill().unwrap();

@@ -14,6 +14,7 @@ mod packet;
 mod payload;
 pub mod place;
 mod plan;
+mod program;
 mod serving;
 mod vantage;
 mod waiver;

@@ -40,6 +40,7 @@ impl Grounds {
             bindings: Arc::clone(&bindings),
             waivers: Vec::new(),
             interference: None,
+            is_interrupted: false,
         };
         // What a master control sends names the vehicle it is for.
         let mut of_vehicles = header

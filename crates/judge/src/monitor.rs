@@ -232,7 +232,7 @@ impl MonitorJudge {
                 continue;
             }
             let (verdict, message) = match &ground.interference {
-                Some(why) if verdict == Verdict::Fail => (
+                Some(why) if verdict == Verdict::Fail || ground.is_interrupted => (
                     Verdict::Inconclusive,
                     format!("cannot be told, since {why}; {}", finding.message),
                 ),

@@ -44,8 +44,10 @@ pub struct Ground {
     pub bindings: Arc<Map<String, Value>>,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
-    /// Why what is found at present may stem from somebody else on the tap.
+    /// Why what is found at present may stem from somebody else: one on the tap, or who has interrupted the run.
     pub interference: Option<Arc<str>>,
+    /// Whether the run was interrupted. Then nothing is held against the device any more, not even as a remark.
+    pub is_interrupted: bool,
 }
 
 /// What is only preferred by a ruling of the catalogue: broken is a warning.
@@ -84,6 +86,8 @@ pub struct TestJudge {
     departure: Departure,
     /// Why what is found may stem from somebody else.
     interference: Option<Arc<str>>,
+    /// The run was interrupted then, and why that says nothing about the device.
+    interrupted: Option<(u64, Arc<str>)>,
     hidden: Vec<Hidden>,
     /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
     /// decided before.
@@ -137,6 +141,7 @@ impl TestJudge {
             },
             departure: Departure::default(),
             interference: ground.interference.clone(),
+            interrupted: None,
             hidden: Vec::new(),
             open: Vec::new(),
             ended: false,
@@ -426,8 +431,21 @@ impl TestJudge {
         self.interference.get_or_insert_with(|| Arc::clone(why));
     }
 
+    /// The run was interrupted: what is found from now on is not held against the device. What was found before stands.
+    pub(super) fn interrupted(&mut self, seq: u64, why: &Arc<str>) {
+        self.interrupted.get_or_insert_with(|| (seq, Arc::clone(why)));
+    }
+
     /// What somebody else may have caused is not held against the device.
     fn allow_for_others(&mut self) {
+        if let Some((since, why)) = &self.interrupted {
+            for open in self.open.iter_mut().filter(|open| open.ended > *since) {
+                if matches!(open.clause.holds, Holds::No | Holds::Late | Holds::Softly) {
+                    open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+                    open.clause.holds = Holds::Unseen(why.to_string());
+                }
+            }
+        }
         let Some(why) = &self.interference else { return };
         for open in &mut self.open {
             if matches!(open.clause.holds, Holds::No | Holds::Late) {

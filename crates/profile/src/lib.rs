@@ -33,7 +33,7 @@ use serde_json::{Map, Value, json};
 pub use claim::Claim;
 pub use effective::Effective;
 pub use hook_action::{Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
-pub use hooks::{HOOKS, HookInfo, find as find_hook};
+pub use hooks::{HOOKS, HookInfo, ends_the_device, find as find_hook};
 pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
     Statement,

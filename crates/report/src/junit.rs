@@ -19,7 +19,7 @@ use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult
 use askama::filters::Escaper as _;
 
 use super::clean;
-use super::findings::{Finding, findings};
+use super::findings::{Finding, PROGRAM, findings};
 use super::html::Escape;
 use super::repeated;
 use super::sources::Sources;
@@ -58,7 +58,7 @@ pub struct Flavour<'a> {
 pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
     let how = flavour.inconclusive;
     let mut report = ReportBuilder::new();
-    report.add_testsuite(suite(result, "run", vec![run_case(result)]));
+    report.add_testsuite(suite(result, "run", run_cases(result)));
     let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
     for test in &result.tests {
         let group = test.id.split_once('/').map_or("tests", |(group, _)| group);
@@ -82,6 +82,39 @@ pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitE
     written(&report, result, flavour)
 }
 
+/// What is about the run itself: whether it came to its end, whether its program did so by itself, and who was judged.
+fn run_cases(result: &RunResult) -> Vec<TestCase> {
+    let mut all = vec![run_case(result)];
+    if let Some(program) = &result.program {
+        let story = program.story().unwrap_or_default();
+        let verdict = program.verdict().or(Some(Verdict::Pass));
+        let words = program.first().map_or("", |end| end.words.as_str());
+        all.push(
+            Case {
+                name: "the program that was started ran until it was ended",
+                class: "run",
+                seconds: 0.0,
+                outcome: outcome(verdict, PROGRAM, &story, words, Inconclusive::Error),
+                out: None,
+            }
+            .build(),
+        );
+    }
+    if let Some(why) = &result.mixed {
+        all.push(
+            Case {
+                name: "nobody else was taken for the device",
+                class: "run",
+                seconds: 0.0,
+                outcome: outcome(Some(Verdict::Inconclusive), "", why, "", Inconclusive::Error),
+                out: None,
+            }
+            .build(),
+        );
+    }
+    all
+}
+
 /// The result as JUnit XML: a case for each requirement, and a suite for each group of requirements.
 ///
 /// # Errors
@@ -89,7 +122,7 @@ pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitE
 pub fn by_requirement(result: &RunResult, sources: &Sources, flavour: Flavour<'_>) -> Result<String, JunitError> {
     let found = findings(result, sources);
     let mut report = ReportBuilder::new();
-    report.add_testsuite(suite(result, "run", vec![run_case(result)]));
+    report.add_testsuite(suite(result, "run", run_cases(result)));
     let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
     for requirement in &result.requirements {
         let group = requirement.id.rsplit_once('-').map_or("other", |(group, _)| group);

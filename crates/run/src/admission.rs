@@ -22,8 +22,15 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     pub(super) async fn admit(&mut self) -> Result<Result<(), String>, EngineError> {
         let vantage = self.setup.capabilities.vantage;
         let patience = self.time("connect");
-        let there = |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
-        if !self.wait_for(patience, there).await? {
+        // A program that has ended connects no more.
+        let there = |recorder: &Recorder| {
+            recorder.judge().program_is_down().is_some() || Presence::of(recorder.judge(), vantage).is_there()
+        };
+        let came = self.wait_for(patience, there).await?;
+        if let Some(why) = self.program_is_down() {
+            return Ok(Err(why));
+        }
+        if !came {
             return Ok(Err(format!("no device connected within {}", show_duration(patience))));
         }
         if let Err(why) = self.after_start().await? {
@@ -38,10 +45,16 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             let states = recorder.judge().timeline().of("state");
             states.iter().any(|entry| !is_stale(entry))
         };
-        let speaks =
-            |recorder: &Recorder| has_state(recorder) || (!is_virtual && somebody_else(recorder.judge()).is_some());
+        let speaks = |recorder: &Recorder| {
+            let judge = recorder.judge();
+            let is_over = judge.program_is_down().is_some() || (!is_virtual && somebody_else(judge).is_some());
+            is_over || has_state(recorder)
+        };
         let patience = self.time("statePeriod");
         self.wait_for(patience, speaks).await?;
+        if let Some(why) = self.program_is_down() {
+            return Ok(Err(why));
+        }
         if !has_state(&self.engine.recorder) {
             let why = format!(
                 "the device connected (see #{begun}) but sent no state within {} on {}",
@@ -56,6 +69,11 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         self.home.before.clone_from(&self.home.first);
         self.read_over(self.engine.link.now().moment).await?;
         Ok(Ok(()))
+    }
+
+    /// How the program that the run has started has ended by itself, as long as it was not started again.
+    pub(super) fn program_is_down(&self) -> Option<String> {
+        self.engine.recorder.judge().program_is_down().map(str::to_owned)
     }
 
     /// Who speaks instead of the device of the profile. A built-in device in virtual time is wrong on purpose.

@@ -190,7 +190,7 @@ pub async fn run_virtually(
     let first = Occurrence::harness(link.now(), Event::RunBegun { header });
     let recorder = Recorder::begin(&library.rules, writer, request.earlier, first)?;
     let mut engine = Engine::new(link, operator, recorder, composer, interrupt);
-    let end = run(&mut engine, setup, progress, saved).await;
+    let end = run(&mut engine, setup, progress, saved, std::future::pending()).await;
     let recorder = engine.recorder;
     Ok(Finished {
         result: recorder.judge().result(),
