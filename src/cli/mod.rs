@@ -12,10 +12,12 @@ mod explained;
 mod explore;
 mod expression;
 mod follow;
+mod gate;
 mod language;
 mod list;
 mod log;
 mod messages;
+mod outputs;
 mod papers;
 mod pieces;
 mod pipeline;
@@ -45,6 +47,7 @@ use crate::pack::{Pack, Packs};
 use crate::report::text::Color;
 use crate::run::Library;
 use args::{Cli, Command, Format};
+use exit::Exit;
 use list::print;
 use problem::Problem;
 
@@ -60,27 +63,14 @@ pub fn main() -> ExitCode {
             } else {
                 let _ = error.print();
             }
+            if error.use_stderr() {
+                let words: Vec<String> = std::env::args().collect();
+                outputs::Owed::by_words(&words).settle(&mistyped(&error));
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let logs = log::begin(cli.log_file.as_deref(), cli.command.verbose());
-    let outcome = logs.and_then(|()| match &cli.command {
-        Command::Run(arguments) => run::run_command(arguments),
-        Command::Certify(arguments) => certify::certify(arguments),
-        Command::List(arguments) => list::list(arguments),
-        Command::Explain(arguments) => list::explain(arguments),
-        Command::Audit(arguments) => audit::audit(arguments),
-        Command::Watch(arguments) => watch::watch(arguments),
-        Command::Explore(arguments) => explore::explore(arguments),
-        Command::Validate(arguments) => validate::validate(arguments),
-        Command::Simulate(arguments) => simulate::simulate(arguments),
-        Command::Report(arguments) => report::report(arguments),
-        Command::Qualify(arguments) => qualify::qualify(arguments),
-        Command::Discover(arguments) => discover::discover(arguments),
-        Command::Init(arguments) => discover::init(arguments),
-        Command::Completions(arguments) => shell::completions(arguments),
-        Command::Man(arguments) => shell::man(arguments),
-    });
+    let outcome = outputs::Owed::by(&cli.command).around(|outputs| dispatch(&cli, outputs));
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();
         match cli.command.format() {
@@ -90,6 +80,28 @@ pub fn main() -> ExitCode {
         problem.exit()
     });
     ExitCode::from(exit.code())
+}
+
+/// Calls the command.
+fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> {
+    log::begin(cli.log_file.as_deref(), cli.command.verbose())?;
+    match &cli.command {
+        Command::Run(arguments) => run::run_command(arguments, outputs),
+        Command::Certify(arguments) => certify::certify(arguments, outputs),
+        Command::List(arguments) => list::list(arguments),
+        Command::Explain(arguments) => list::explain(arguments),
+        Command::Audit(arguments) => audit::audit(arguments),
+        Command::Watch(arguments) => watch::watch(arguments),
+        Command::Explore(arguments) => explore::explore(arguments),
+        Command::Validate(arguments) => validate::validate(arguments),
+        Command::Simulate(arguments) => simulate::simulate(arguments),
+        Command::Report(arguments) => report::report(arguments, outputs),
+        Command::Qualify(arguments) => qualify::qualify(arguments),
+        Command::Discover(arguments) => discover::discover(arguments),
+        Command::Init(arguments) => discover::init(arguments),
+        Command::Completions(arguments) => shell::completions(arguments),
+        Command::Man(arguments) => shell::man(arguments),
+    }
 }
 
 /// Whether a command line that cannot be read asks for JSON.

@@ -11,7 +11,7 @@ use crate::diagnostic::{self, Diagnostic};
 use crate::pack::Pack;
 use crate::report::json;
 use crate::report::sources::Sources;
-use crate::run::{LATEST, Library, sources};
+use crate::run::{Library, newest, sources};
 use crate::suite::model::Test;
 use crate::verdict::Verdict;
 
@@ -49,7 +49,7 @@ pub(super) fn selected(
         }
     }
     if wanted.last_failed {
-        let failed = failed_before(&reports.join(LATEST))?;
+        let failed = failed_before(&newest(reports))?;
         tests.retain(|test| failed.contains(test.id.as_str()));
         if tests.is_empty() {
             let title =

@@ -29,6 +29,8 @@ pub struct Assets {
     files: Vec<AssetFile>,
     sha256: String,
     modified: bool,
+    /// The paths of the files that somebody has given.
+    own: Vec<String>,
 }
 
 impl Assets {
@@ -44,13 +46,15 @@ impl Assets {
     /// Everything under `suites/` replaced by the files of `dir`, which is laid out like `suites/`.
     ///
     /// # Errors
-    /// `dir` cannot be read, holds a file that is not UTF-8 or longer than 1 MiB, or is nested too deeply.
+    /// `dir` cannot be read, holds no suite, or a file that is not UTF-8 or longer than 1 MiB, or is nested too deeply.
     pub fn with_suites(dir: &Path) -> io::Result<Self> {
         let embedded = Self::embedded();
         let mut files = Vec::new();
         files_below(dir, "suites", 0, &mut files)?;
+        let own = paths(&files, dir)?;
         files.extend(embedded.under("schemas/").cloned());
         let mut assets = Self::new(files);
+        assets.own = own;
         assets.modified = assets.sha256 != embedded.sha256;
         Ok(assets)
     }
@@ -63,6 +67,7 @@ impl Assets {
         let embedded = Self::embedded();
         let mut own = Vec::new();
         files_below(dir, "suites", 0, &mut own)?;
+        let paths = paths(&own, dir)?;
         let mut files = embedded.files.clone();
         for file in own {
             match embedded.get(&file.path) {
@@ -75,6 +80,7 @@ impl Assets {
             }
         }
         let mut assets = Self::new(files);
+        assets.own = paths;
         assets.modified = assets.sha256 != embedded.sha256;
         Ok(assets)
     }
@@ -102,6 +108,7 @@ impl Assets {
             files,
             sha256,
             modified: false,
+            own: Vec::new(),
         }
     }
 
@@ -117,6 +124,12 @@ impl Assets {
         self.files.get(at)
     }
 
+    /// The paths of the files that somebody has given, built in or not.
+    #[must_use]
+    pub fn own(&self) -> &[String] {
+        &self.own
+    }
+
     /// SHA-256 over all paths and texts, in hexadecimal.
     #[must_use]
     pub fn sha256(&self) -> &str {
@@ -128,6 +141,20 @@ impl Assets {
     pub fn modified(&self) -> bool {
         self.modified
     }
+}
+
+/// Folders below `suites/` whose files test or judge something, and are not only used by others.
+const DECIDING: [&str; 4] = ["suites/agv/", "suites/master-control/", "suites/monitors/", "suites/explore/"];
+
+/// The paths of files of a folder that has to hold a suite: one that holds none was not checked out, or is another one.
+fn paths(files: &[AssetFile], dir: &Path) -> io::Result<Vec<String>> {
+    let decides = |file: &AssetFile| DECIDING.iter().any(|folder| file.path.starts_with(folder));
+    if files.iter().any(decides) {
+        return Ok(files.iter().map(|file| file.path.clone()).collect());
+    }
+    let folders = DECIDING.map(|folder| folder.trim_start_matches("suites/")).join(", ");
+    let message = format!("{} holds no test, monitor or stimulus; they stand in {folders}", dir.display());
+    Err(io::Error::new(io::ErrorKind::NotFound, message))
 }
 
 fn embedded_files(root: &str, dir: &Dir<'static>, files: &mut Vec<AssetFile>) {

@@ -4,12 +4,11 @@
 
 use askama::Template;
 
-use super::compare::{Trend, compare};
+use super::compare::{Standing, Trend, compare};
 use super::html::view::{self, Badge};
 use super::sources::Sources;
 use super::statement;
 use crate::result::{RequirementResult, RunResult};
-use crate::verdict::Verdict;
 
 /// One run: a column.
 struct Column {
@@ -87,9 +86,9 @@ pub fn render(runs: &[RunResult], names: &[String], sources: &Sources) -> Result
 fn columns(runs: &[RunResult], names: &[String]) -> Vec<Column> {
     let all = runs.iter().enumerate().map(|(at, run)| {
         let changes = at.checked_sub(1).map(|before| compare(&runs[before], run).requirements);
-        let count = |wanted: Trend| {
+        let count = |wanted: &[Trend]| {
             let changes = changes.iter().flatten();
-            changes.filter(|change| change.trend() == wanted).count()
+            changes.filter(|change| wanted.contains(&change.trend)).count()
         };
         let counts = statement::requirements(run);
         let applicable = counts.total() - statement::gaps(run).not_applicable;
@@ -103,8 +102,8 @@ fn columns(runs: &[RunResult], names: &[String]) -> Vec<Column> {
             started: view::started(&run.started),
             badge: Badge::of(run.verdict),
             decided: format!("{} of {applicable}", counts.decided()),
-            better: count(Trend::Better),
-            worse: count(Trend::Worse),
+            better: count(&[Trend::Better]),
+            worse: count(&[Trend::Worse, Trend::Lost]),
         }
     });
     all.collect()
@@ -115,16 +114,15 @@ fn row(id: &str, runs: &[RunResult], sources: &Sources) -> Row {
         .iter()
         .map(|run| run.requirements.iter().find(|requirement| requirement.id == id))
         .collect();
-    let verdicts: Vec<Option<Verdict>> = found.iter().map(|one| one.and_then(|one| one.verdict)).collect();
+    let standings: Vec<Standing> = found.iter().map(|one| Standing::of_requirement(*one)).collect();
     let cells: Vec<Cell> = found
         .iter()
         .enumerate()
         .map(|(at, requirement)| Cell {
             badge: requirement.map_or(ABSENT, Badge::of_requirement),
-            trend: match at.checked_sub(1).map(|before| (verdicts[before], verdicts[at])) {
-                Some((Some(before), Some(after))) if after > before => "worse",
-                Some((Some(before), Some(after))) if after < before => "better",
-                Some((None, Some(Verdict::Fail))) => "worse",
+            trend: match at.checked_sub(1).map(|before| Trend::of(standings[before], standings[at])) {
+                Some(trend) if trend.is_bad() => "worse",
+                Some(Trend::Better) => "better",
                 _ => "",
             },
         })

@@ -36,6 +36,10 @@ impl Library {
     pub fn load(own: Option<Own<'_>>) -> Result<Self, Vec<Diagnostic>> {
         let unreadable = |folder: &Path, error: std::io::Error| {
             let title = format!("the suites in {} cannot be read: {error}", folder.display());
+            if error.kind() == std::io::ErrorKind::NotFound && folder.is_dir() {
+                let hint = "is everything checked out? `vda5050-tck init --suites DIR` writes a folder that is laid out right";
+                return vec![Diagnostic::whole("no-suites", error.to_string()).hint(hint)];
+            }
             let hint = match error.kind() {
                 std::io::ErrorKind::AlreadyExists => {
                     "give the file another name, or use the folder alone, without the built-in suites, by --replace-suites"
@@ -62,6 +66,31 @@ impl Library {
                 sha256,
             },
         })
+    }
+
+    /// How many suites of somebody's own there are, such as `own suites: 3 tests, 1 monitor`; nothing without any.
+    #[must_use]
+    pub fn own(&self) -> Option<String> {
+        let own = self.assets.own();
+        if own.is_empty() {
+            return None;
+        }
+        let tests = self.rules.suites.tests.iter();
+        let tests = tests.filter(|test| own.contains(&test.source.name)).count();
+        let files = |folder: &str| own.iter().filter(|path| path.starts_with(folder)).count();
+        let all = [
+            (tests, "test"),
+            (files("suites/monitors/"), "monitor"),
+            (files("suites/explore/"), "file of stimuli"),
+            (files("suites/requirements/"), "file of requirements"),
+        ];
+        let all = all.into_iter().filter(|(count, _)| *count > 0);
+        let all = all.map(|(count, what)| match (count, what.split_once(' ')) {
+            (1, _) => format!("1 {what}"),
+            (_, None) => format!("{count} {what}s"),
+            (_, Some((first, rest))) => format!("{count} {first}s {rest}"),
+        });
+        Some(format!("own suites: {}", all.collect::<Vec<String>>().join(", ")))
     }
 
     /// The tests of a role for a protocol version that decide at least one requirement of it, by id.

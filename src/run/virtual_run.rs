@@ -62,6 +62,8 @@ pub struct VirtualRun {
     pub certifies: bool,
     /// Effective settings, for the record.
     pub settings: Vec<Setting>,
+    /// What restricts the statement because of what was asked for, one sentence each.
+    pub limits: Vec<String>,
 }
 
 impl VirtualRun {
@@ -95,6 +97,7 @@ impl VirtualRun {
             earlier: None,
             certifies: false,
             settings: Vec::new(),
+            limits: Vec::new(),
         }
     }
 }
@@ -183,6 +186,7 @@ pub async fn run_virtually(
         fail_fast: request.fail_fast,
         repeat: request.repeat,
         certifies: request.certifies,
+        limits: request.limits,
     };
     let (header, setup) = tested.on(bench, asked, library, pack);
     let header = Box::new(header);

@@ -42,7 +42,7 @@ fn flaky() -> RunResult {
         verdict: Some(verdict),
         seconds: 1.0,
         reason: None,
-        journal: None,
+        journal: Some((1, 2)),
     });
     let failed = result.tests.iter_mut().find(|test| test.verdict == Some(Verdict::Fail));
     failed.expect("a test that failed").repetitions = repetitions.collect();

@@ -1,0 +1,81 @@
+//! Whether `run` is about the built-in device. Nobody may take its verdict for that of a device of his own: it is said in the
+//! first line, and has to be asked for where a pipeline runs or a profile lies beside it.
+
+use crate::cli::args;
+use crate::cli::problem::Problem;
+use crate::diagnostic::Diagnostic;
+use crate::pack::Role;
+use crate::profile::{Effective, Setting, Surroundings};
+use crate::report::issues::USUAL_PROFILE;
+use crate::simulate::Vehicle;
+
+/// Set by build servers.
+const CI: &str = "CI";
+
+/// Whether the built-in device is tested; if so, it is said.
+///
+/// # Errors
+/// When it has to be asked for, or what was asked for is for it and another device is tested.
+pub(super) fn is_tested(
+    arguments: &args::Run,
+    effective: &Effective,
+    surroundings: &Surroundings,
+) -> Result<bool, Problem> {
+    let device = &effective.profile.device;
+    let is_foreign =
+        arguments.device.profile.is_some() || device.manufacturer.is_some() || device.serial_number.is_some();
+    let is_altered =
+        !arguments.fault.is_empty() || !arguments.tolerance.is_empty() || arguments.vehicle.0 != Vehicle::default();
+    // In virtual time there is no other device than the built-in one.
+    if is_foreign && !arguments.in_virtual_time {
+        if is_altered || arguments.reference {
+            let title = "`--reference`, `--fault`, `--tolerance` and `--vehicle` are for the built-in device, and another \
+                         device is tested here";
+            return Err(Diagnostic::whole("usage", title).into());
+        }
+        return Ok(false);
+    }
+    // What only the built-in device has, names it.
+    let is_named = arguments.reference || arguments.in_virtual_time || is_altered;
+    if let Some(why) = doubt(surroundings).filter(|_| !is_named) {
+        let title = format!("no profile is named, so that the built-in reference device would be tested, and {why}");
+        let hint = "name your device with `--profile device.toml`, or the built-in one with `--reference`";
+        return Err(Diagnostic::whole("no-device", title).hint(hint).into());
+    }
+    eprintln!(
+        "testing the built-in reference {}, and no device of yours (--profile names one)",
+        match device.role {
+            Role::Agv => "AGV",
+            Role::MasterControl => "master control",
+        }
+    );
+    Ok(true)
+}
+
+/// Why somebody may have meant another device.
+fn doubt(surroundings: &Surroundings) -> Option<String> {
+    let value = surroundings.environment.get(CI).map(|value| value.trim().to_lowercase());
+    if value.is_some_and(|value| !matches!(value.as_str(), "" | "0" | "false" | "no")) {
+        return Some("this is a pipeline (`CI` is set)".to_owned());
+    }
+    let profile = surroundings.directory.join(USUAL_PROFILE);
+    profile.is_file().then(|| format!("a {USUAL_PROFILE} is beside it"))
+}
+
+/// What makes the built-in device another one, for the record.
+pub(super) fn settings(arguments: &args::Run) -> Vec<Setting> {
+    let kind = arguments.vehicle.0.named().0;
+    let vehicle = (arguments.vehicle.0 != Vehicle::default()).then(|| kind.to_owned());
+    let all = [
+        ("built-in.fault", arguments.fault.join(", ")),
+        ("built-in.tolerance", arguments.tolerance.join(", ")),
+        ("built-in.vehicle", vehicle.unwrap_or_default()),
+    ];
+    let all = all.into_iter().filter(|(_, value)| !value.is_empty());
+    all.map(|(name, value)| Setting {
+        name: name.to_owned(),
+        value,
+        origin: "flag".to_owned(),
+    })
+    .collect()
+}
