@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use resume::{About, Earlier};
+use resume::{Earlier, Subject};
 
 use super::args::{self, Shard};
 use super::device::{check_faults, pack_of, tolerate};
@@ -22,7 +22,7 @@ use super::outputs::Outputs;
 use super::problem::Problem;
 use super::screen::{Screen, Show};
 use super::signals::Signals;
-use crate::bench::Vantage;
+use crate::bench::{LinkError, Vantage};
 use crate::clock::WallClock;
 use crate::diagnostic::Diagnostic;
 use crate::journal::file::JournalWriter;
@@ -277,7 +277,7 @@ impl Job {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
         let settings = reference::settings(arguments);
-        self.is_resumable(&About {
+        self.is_resumable(&Subject {
             subject: device.subject(),
             vantage: Vantage::Tap.word(),
             settings: &settings,
@@ -381,7 +381,7 @@ impl Job {
             } else {
                 Vantage::Subscriber
             };
-            let about = About {
+            let about = Subject {
                 subject: &run.device.subject,
                 vantage: vantage.word(),
                 settings: &run.device.settings,
@@ -418,12 +418,11 @@ impl Job {
 
     /// Why a run could not begin, at the place of the profile that it comes from.
     fn could_not_begin(&self, error: RunError) -> Problem {
-        let bench = &self.effective.profile.bench;
         let setting = match &error {
             RunError::Profile(_) | RunError::Unknown(_) => None,
             RunError::Device(_) => Some("device.command"),
-            RunError::Bench(_) if bench.broker.is_some() => Some("bench.broker"),
-            RunError::Bench(_) => Some("bench.listen"),
+            RunError::Bench(LinkError::Listen { .. }) => Some("bench.listen"),
+            RunError::Bench(_) => Some("bench.broker"),
             RunError::Record(_) | RunError::Engine(_) => None,
         };
         match (error, setting) {
@@ -447,7 +446,7 @@ impl Job {
     }
 
     /// Whether the run before this one, if there is one, was about the same.
-    fn is_resumable(&self, about: &About<'_>) -> Result<(), Problem> {
+    fn is_resumable(&self, about: &Subject<'_>) -> Result<(), Problem> {
         let Some(earlier) = &self.earlier else { return Ok(()) };
         earlier.is_about(about, &self.pack, &self.library)?;
         let (kept, left) = (earlier.kept, self.request.tests.len());

@@ -14,7 +14,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 pub fn tool(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vda5050-tck"));
     for (name, _) in std::env::vars()
-        .filter(|(name, _)| name.starts_with("VDA5050_TCK_") || name.starts_with("GITHUB_") || name == "NO_COLOR")
+        .filter(|(name, _)| name.starts_with("VDA5050_TCK_") || name.starts_with("GITHUB_") || ["CI", "NO_COLOR"].contains(&name.as_str()))
     {
         command.env_remove(name);
     }
