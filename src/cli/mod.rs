@@ -25,6 +25,7 @@ mod plan;
 mod problem;
 mod qualify;
 mod recordings;
+mod reference;
 mod report;
 mod run;
 mod screen;

@@ -1,7 +1,6 @@
 //! `run`: test a device, write the evidence, say the verdict.
 
 mod conclude;
-mod reference;
 mod resume;
 
 use std::collections::BTreeMap;
@@ -20,6 +19,7 @@ use super::events::{About, Followed};
 use super::exit::Exit;
 use super::outputs::Outputs;
 use super::problem::Problem;
+use super::reference::{self, Asked};
 use super::screen::{Screen, Show};
 use super::signals::Signals;
 use crate::bench::{LinkError, Vantage};
@@ -63,7 +63,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         &[arguments.device.settings(), arguments.said.clone()].concat(),
         &surroundings,
     )?;
-    let built_in = reference::is_tested(arguments, &effective, &surroundings)?;
+    let built_in = reference::is_tested(&Asked::of_run(arguments), &effective, &surroundings)?;
     let library = Library::load(arguments.suites.own())?;
     if let Some(own) = library.own() {
         eprintln!("{own}");
@@ -276,7 +276,7 @@ impl Job {
     ) -> Result<Exit, Problem> {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
-        let settings = reference::settings(arguments);
+        let settings = reference::settings(&Asked::of_run(arguments));
         self.is_resumable(&Subject {
             subject: device.subject(),
             vantage: Vantage::Tap.word(),
@@ -350,7 +350,7 @@ impl Job {
             };
         }
         run.device.settings.clone_from(&self.effective.settings);
-        run.device.settings.extend(reference::settings(arguments));
+        run.device.settings.extend(reference::settings(&Asked::of_run(arguments)));
         self.over_sockets(run, interrupt, outputs).await
     }
 

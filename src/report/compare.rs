@@ -336,3 +336,55 @@ impl Comparison {
         text
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Everything that something can stand like.
+    fn standings() -> Vec<Standing> {
+        let open = [Standing::Absent, Standing::NotApplicable, Standing::Undecided];
+        let decided = Verdict::ALL.into_iter().map(Standing::Decided);
+        open.into_iter().chain(decided).collect()
+    }
+
+    #[test]
+    fn what_decides_less_is_never_better_and_what_passed_is_lost() {
+        let passes = |standing| {
+            matches!(
+                standing,
+                Standing::Decided(Verdict::Pass | Verdict::Warning)
+            )
+        };
+        let fail = Standing::Decided(Verdict::Fail);
+        for before in standings() {
+            for after in standings().into_iter().filter(|after| *after != before) {
+                let trend = Trend::of(before, after);
+                let shown = format!("{} -> {}: {}", before.word(), after.word(), trend.word());
+                assert!(trend != Trend::Better || after.is_decided(), "{shown}");
+                assert_eq!(trend == Trend::Lost, passes(before) && !after.is_decided(), "{shown}");
+                assert_eq!(trend == Trend::Unclear, before == fail && !after.is_decided(), "{shown}");
+                assert!(after != fail || trend == Trend::Worse, "{shown}");
+                // Nothing is good news both ways.
+                let back = Trend::of(after, before);
+                assert!(trend != Trend::Better || back != Trend::Better, "{shown}");
+            }
+        }
+    }
+
+    #[test]
+    fn of_several_cases_the_worst_stands_for_the_table() {
+        let all = standings();
+        for one in &all {
+            assert_eq!(one.join(*one), *one);
+            for other in &all {
+                assert_eq!(one.join(*other), other.join(*one));
+            }
+        }
+        let (pass, fail) = (Standing::Decided(Verdict::Pass), Standing::Decided(Verdict::Fail));
+        assert_eq!(pass.join(fail), fail);
+        assert_eq!(pass.join(Standing::NotApplicable), pass);
+        assert_eq!(table("a/b[c]"), Some("a/b"));
+        assert_eq!(table("a/b"), None);
+    }
+}
