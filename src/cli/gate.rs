@@ -5,12 +5,12 @@
 //! gives a run its exit.
 
 use super::exit::Exit;
-use crate::profile::KnownFailure;
-use crate::report::known::{Measured, measure};
-use crate::report::statement;
-use crate::result::RunResult;
-use crate::run::End;
-use crate::verdict::Verdict;
+use tck_base::verdict::Verdict;
+use tck_profile::KnownFailure;
+use tck_report::known::{Measured, measure};
+use tck_report::statement;
+use tck_result::RunResult;
+use tck_run::End;
 
 /// What came of a run.
 pub(super) struct Gate<'a> {
@@ -56,7 +56,7 @@ impl Gate<'_> {
 }
 
 /// Whether a test was decided, as often as it was to be run, or does not apply.
-fn is_settled(test: &crate::result::TestResult) -> bool {
+fn is_settled(test: &tck_result::TestResult) -> bool {
     match statement::test_verdict(test) {
         None => true,
         Some(Verdict::Pass | Verdict::Warning | Verdict::Fail) => test.left_out() == 0,

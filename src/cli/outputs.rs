@@ -10,12 +10,13 @@ use super::args::{self, Command, InconclusiveArg, RenderedTo, Rendering};
 use super::exit::Exit;
 use super::pipeline;
 use super::problem::Problem;
-use crate::report::junit::{self, Flavour, JunitError};
-use crate::report::no_result::{NoResult, Obstacle};
-use crate::report::sources::Sources;
-use crate::report::{issues, markdown};
-use crate::result::RunResult;
-use crate::run::{forget_latest, tool, write_whole};
+use tck_journal::tool;
+use tck_report::junit::{self, Flavour, JunitError};
+use tck_report::no_result::{NoResult, Obstacle};
+use tck_report::sources::Sources;
+use tck_report::{issues, markdown};
+use tck_result::RunResult;
+use tck_run::{forget_latest, write_whole};
 
 /// What a command owes to a pipeline.
 #[derive(Clone, Debug, Default)]
@@ -57,8 +58,13 @@ impl Owed {
     pub(super) fn by_words(words: &[String]) -> Self {
         let values = |name: &str| {
             let joined = format!("{name}=");
-            let beside = words.windows(2).filter(|pair| pair[0] == name).map(|pair| pair[1].clone());
-            let inside = words.iter().filter_map(|word| word.strip_prefix(&joined).map(str::to_owned));
+            let beside = words
+                .windows(2)
+                .filter(|pair| pair[0] == name)
+                .map(|pair| pair[1].clone());
+            let inside = words
+                .iter()
+                .filter_map(|word| word.strip_prefix(&joined).map(str::to_owned));
             beside.chain(inside).collect::<Vec<String>>()
         };
         let tests = words.iter().skip(1).any(|word| word == "run" || word == "certify");
@@ -69,17 +75,17 @@ impl Owed {
         };
         let profile = values("--profile").pop().or_else(|| by_variable("VDA5050_TCK_PROFILE"));
         Self {
-            files: values("--as").iter().filter_map(|text| args::to_file(text).ok()).collect(),
+            files: values("--as")
+                .iter()
+                .filter_map(|text| args::to_file(text).ok())
+                .collect(),
             reports: tests.then(folder),
             profile: profile.filter(|_| tests).map(PathBuf::from),
         }
     }
 
     /// Does the command, and writes what it owes.
-    pub(super) fn around(
-        &self,
-        command: impl FnOnce(&Outputs<'_>) -> Result<Exit, Problem>,
-    ) -> Result<Exit, Problem> {
+    pub(super) fn around(&self, command: impl FnOnce(&Outputs<'_>) -> Result<Exit, Problem>) -> Result<Exit, Problem> {
         let unfinished = NoResult {
             tool: tool(),
             exit: Exit::Broken.code(),

@@ -6,18 +6,19 @@ use super::args::Report;
 use super::exit::Exit;
 use super::outputs::{Outputs, Shown};
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::journal::file::{self, Recording};
-use crate::judge;
-use crate::report::attestation::Attestation;
-use crate::report::certificate::{self, CertificateError};
-use crate::report::{json, manifest};
-use crate::result::RunResult;
-use crate::run::{Library, sources};
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::file::{self, Recording};
+use tck_judge as judge;
+use tck_judge::Library;
+use tck_report::attestation::Attestation;
+use tck_report::certificate::{self, CertificateError};
+use tck_report::{json, manifest};
+use tck_result::RunResult;
+use tck_run::sources;
 
 /// Prints the certificate of a run as HTML.
 pub fn certificate(folder: &Path) -> Result<Exit, Problem> {
-    let library = Library::load(None)?;
+    let library = crate::assets::library(None)?;
     let (result, root) = intact(folder, &library)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
@@ -43,12 +44,7 @@ pub fn attestation(folder: &Path, library: &Library) -> Result<Exit, Problem> {
 }
 
 /// Prints a run for a pipeline, or writes it into files.
-pub fn rendered(
-    folder: &Path,
-    library: &Library,
-    arguments: &Report,
-    outputs: &Outputs<'_>,
-) -> Result<Exit, Problem> {
+pub fn rendered(folder: &Path, library: &Library, arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     let (result, root) = intact(folder, library)?;
     let pack = super::pack(library, Some(&result.protocol))?;
     let shown = Shown {

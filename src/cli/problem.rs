@@ -2,11 +2,11 @@
 
 use serde_json::{Value, json};
 
-use crate::diagnostic::{Diagnostic, Span};
-use crate::report::no_result::{NoResult, Obstacle};
-use crate::run::tool;
+use tck_base::diagnostic::{Diagnostic, Span};
 
 use super::exit::Exit;
+use tck_journal::tool;
+use tck_report::no_result::{NoResult, Obstacle};
 
 /// What went wrong, by who can put it right.
 #[derive(Debug)]
@@ -36,9 +36,7 @@ impl Problem {
     #[must_use]
     pub fn to_json(&self) -> String {
         let (kind, problems) = match self {
-            Self::Usage(all) => {
-                ("usage", all.iter().map(shown).collect())
-            }
+            Self::Usage(all) => ("usage", all.iter().map(shown).collect()),
             Self::NothingToDo(why) => ("nothing-to-do", vec![json!({ "title": why })]),
             Self::Environment(why) => ("environment", vec![json!({ "title": why })]),
             Self::Bench(one) => ("environment", vec![shown(one)]),

@@ -3,11 +3,11 @@
 
 use crate::cli::args;
 use crate::cli::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::pack::Role;
-use crate::profile::{Effective, Setting, Surroundings};
-use crate::report::issues::USUAL_PROFILE;
-use crate::simulate::Vehicle;
+use tck_base::diagnostic::Diagnostic;
+use tck_pack::Role;
+use tck_profile::{Effective, Setting, Surroundings};
+use tck_report::issues::USUAL_PROFILE;
+use tck_simulate::Vehicle;
 
 /// Set by build servers.
 const CI: &str = "CI";
@@ -98,7 +98,10 @@ pub(super) fn is_tested(
 
 /// Why somebody may have meant another device.
 fn doubt(surroundings: &Surroundings) -> Option<String> {
-    let value = surroundings.environment.get(CI).map(|value| value.trim().to_lowercase());
+    let value = surroundings
+        .environment
+        .get(CI)
+        .map(|value| value.trim().to_lowercase());
     if value.is_some_and(|value| !matches!(value.as_str(), "" | "0" | "false" | "no")) {
         return Some("this is a pipeline (`CI` is set)".to_owned());
     }

@@ -8,12 +8,12 @@ use super::args::{Format, Report};
 use super::exit::Exit;
 use super::outputs::Outputs;
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::journal::file::{self, NAME, PACKED, Recording};
-use crate::judge;
-use crate::report::{compare, json as result_file, manifest, overview, side_by_side};
-use crate::result::RunResult;
-use crate::run::{Bundle, Library, sources, write_all};
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::file::{self, NAME, PACKED, Recording};
+use tck_judge as judge;
+use tck_report::{compare, json as result_file, manifest, overview, side_by_side};
+use tck_result::RunResult;
+use tck_run::{Bundle, sources, write_all};
 
 /// `report`.
 pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
@@ -29,7 +29,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if arguments.certificate {
         return super::papers::certificate(folder);
     }
-    let mut library = Library::load(arguments.suites.own())?;
+    let mut library = crate::assets::library(arguments.suites.own())?;
     library.add(&own_tests(folder)?)?;
     if !arguments.renderings.is_empty() {
         return super::papers::rendered(folder, &library, arguments, outputs);
@@ -200,7 +200,7 @@ fn compare_runs(arguments: &Report, folders: &[PathBuf]) -> Result<Exit, Problem
     let steps = runs.windows(2).map(|pair| compare::compare(&pair[0], &pair[1]));
     let steps: Vec<compare::Comparison> = steps.collect();
     if arguments.page {
-        let library = Library::load(arguments.suites.own())?;
+        let library = crate::assets::library(arguments.suites.own())?;
         let pack = super::pack(&library, runs.last().map(|run| run.protocol.as_str()))?;
         let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
         let page = side_by_side::render(&runs, &names, &quoted);

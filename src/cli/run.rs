@@ -22,22 +22,24 @@ use super::problem::Problem;
 use super::reference::{self, Asked};
 use super::screen::{Screen, Show};
 use super::signals::Signals;
-use crate::bench::{LinkError, Vantage};
-use crate::clock::WallClock;
-use crate::diagnostic::Diagnostic;
-use crate::journal::file::JournalWriter;
-use crate::judge::RunJudge;
-use crate::link::mqtt::BrokerChoice;
-use crate::pack::Participant;
-use crate::pack::{Pack, Role};
-use crate::profile::{self, Effective, Surroundings};
-use crate::report::statement::many;
-use crate::run::{
-    Bundle, LATEST, Library, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
+use crate::ui::{Desk, put_terminal_back};
+use tck_base::clock::WallClock;
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::Vantage;
+use tck_journal::file::JournalWriter;
+use tck_judge::Library;
+use tck_judge::RunJudge;
+use tck_net::bench::LinkError;
+use tck_net::link::mqtt::BrokerChoice;
+use tck_pack::Participant;
+use tck_pack::{Pack, Role};
+use tck_profile::{self as profile, Effective, Surroundings};
+use tck_report::statement::many;
+use tck_run::{
+    Bundle, LATEST, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
     write_result,
 };
-use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
-use crate::ui::{Desk, put_terminal_back};
+use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
 /// What `run` and `certify` have in common.
 struct Job {
@@ -64,7 +66,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         &surroundings,
     )?;
     let built_in = reference::is_tested(&Asked::of_run(arguments), &effective, &surroundings)?;
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     if let Some(own) = library.own() {
         eprintln!("{own}");
     }
@@ -109,7 +111,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         None if arguments.shard.is_some() || arguments.certificate => Some(1),
         None => Some(u64::from(random.as_fields().0)),
     };
-    if role == Role::MasterControl && arguments.vehicle.0 != crate::simulate::Vehicle::default() {
+    if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
     }
@@ -153,7 +155,9 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     if arguments.selection.plan {
         if !arguments.pipeline.renderings.is_empty() {
             let title = "a plan runs nothing, so there is nothing that `--as` could write";
-            return Err(Diagnostic::whole("usage", title).hint("leave one of the two out").into());
+            return Err(Diagnostic::whole("usage", title)
+                .hint("leave one of the two out")
+                .into());
         }
         return job.plan(arguments, built_in, &surroundings);
     }
@@ -350,7 +354,9 @@ impl Job {
             };
         }
         run.device.settings.clone_from(&self.effective.settings);
-        run.device.settings.extend(reference::settings(&Asked::of_run(arguments)));
+        run.device
+            .settings
+            .extend(reference::settings(&Asked::of_run(arguments)));
         self.over_sockets(run, interrupt, outputs).await
     }
 

@@ -53,11 +53,17 @@ fn a_repetition_that_was_not_done_leaves_the_test_undecided() {
     let repetitions = result["tests"][0]["repetitions"].as_array().unwrap();
     assert_eq!(repetitions.len(), 3, "{result}");
     let done = repetitions.iter().filter(|one| !one["journal"].is_null()).count();
-    assert!(done < 3, "the floor is long enough for all of them: this test needs a shorter one");
+    assert!(
+        done < 3,
+        "the floor is long enough for all of them: this test needs a shorter one"
+    );
     ended.code(3).prints(&format!("run {done} of 3 times"));
     assert_eq!(result["tests"][0]["verdict"], "inconclusive");
     let junit = fs::read_to_string(bench.bundle().join("junit.xml")).unwrap();
-    assert!(junit.contains(&format!("run {done} of 3 times")) && junit.contains("<error"), "{junit}");
+    assert!(
+        junit.contains(&format!("run {done} of 3 times")) && junit.contains("<error"),
+        "{junit}"
+    );
     bench.is_whole();
 }
 
@@ -76,21 +82,34 @@ fn a_run_that_decides_less_never_compares_as_green() {
     reported(&bench, "two", &[QUICK, REFUSAL], 0);
     reported(&bench, "one", &[QUICK], 0);
     compare("two", "two").code(0).prints("no verdict changed");
-    compare("two", "one").code(1).prints("  lost    pass -> absent").prints(REFUSAL);
+    compare("two", "one")
+        .code(1)
+        .prints("  lost    pass -> absent")
+        .prints(REFUSAL);
     compare("one", "two").code(0).prints("  other   absent -> pass");
     // What could not be tried is lost, and a failure that could not be tried is not mended.
     reported(&bench, "good", &[DRIVES, QUICK], 0);
-    reported(&bench, "bad", &[DRIVES, QUICK, "--fault", "outdated-update-taken-over"], 1);
+    reported(
+        &bench,
+        "bad",
+        &[DRIVES, QUICK, "--fault", "outdated-update-taken-over"],
+        1,
+    );
     reported(&bench, "still", &[DRIVES, QUICK, "--no-motion"], 3);
     compare("good", "bad").code(1).prints("  worse   pass -> fail");
-    compare("good", "still").code(1).prints("  lost    pass -> inconclusive");
+    compare("good", "still")
+        .code(1)
+        .prints("  lost    pass -> inconclusive");
     compare("bad", "still").prints("  unclear fail -> inconclusive");
     compare("still", "still").code(3).says("partial or undecided");
     compare("bad", "good").code(0).prints("  better  fail -> pass");
     // What was mended in between does not count, and what was not mended does.
     bench.run(&["report", "--compare", "good", "bad", "good"]).code(0);
     bench.run(&["report", "--compare", "good", "bad", "bad"]).code(1);
-    let json = bench.run(&["report", "--compare", "good", "bad", "--format", "json"]).code(1).stdout;
+    let json = bench
+        .run(&["report", "--compare", "good", "bad", "--format", "json"])
+        .code(1)
+        .stdout;
     assert!(json.contains(r#""trend": "worse""#), "{json}");
     // Part of a run.
     let journal = fs::read_to_string(bench.path().join("two/journal.jsonl")).unwrap();
@@ -106,7 +125,17 @@ fn a_run_that_decides_less_never_compares_as_green() {
 fn which_cases_were_drawn_makes_no_run_better_or_worse() {
     let bench = Bench::new();
     for seed in ["1", "2"] {
-        reported(&bench, seed, &["order-rejection/malformed", "order-rejection/unreadable", "--seed", seed], 0);
+        reported(
+            &bench,
+            seed,
+            &[
+                "order-rejection/malformed",
+                "order-rejection/unreadable",
+                "--seed",
+                seed,
+            ],
+            0,
+        );
     }
     let ended = bench.run(&["report", "--compare", "1", "2"]).code(0);
     assert!(!ended.stdout.contains("absent"), "{}", ended.stdout);
@@ -129,7 +158,9 @@ fn junit_is_red_when_no_selected_test_was_decided_however_the_undecided_are_show
 #[test]
 fn part_of_the_tests_says_which_part() {
     let bench = Bench::new();
-    bench.run(&["run", "--virtual", QUICK, REFUSAL, "--shard", "1/2"]).code(0);
+    bench
+        .run(&["run", "--virtual", QUICK, REFUSAL, "--shard", "1/2"])
+        .code(0);
     let limits = bench.result()["limits"].to_string();
     assert!(limits.contains("Only part 1 of 2 of the tests was run"), "{limits}");
 }
@@ -142,7 +173,10 @@ fn the_built_in_device_is_named_in_the_first_line_and_has_to_be_asked_for_where_
     let run = bench.run(&["run", "--virtual", QUICK, "--quiet"]).code(0);
     assert!(first_line(&run.stderr).starts_with(named), "{}", run.stderr);
     let master_control = ["run", "--virtual", "--role", "master-control", "--no-such-test"];
-    bench.run(&master_control[..4]).code(0).says("built-in reference master control");
+    bench
+        .run(&master_control[..4])
+        .code(0)
+        .says("built-in reference master control");
     let in_pipeline = |value: &str, arguments: &[&str]| {
         let mut command = tool(bench.path(), &[&["run", QUICK], arguments].concat());
         Running::start(command.env("CI", value)).end()
@@ -197,20 +231,29 @@ fn a_run_that_is_gone_on_with_is_about_the_same_profile_firmware_program_and_fil
     resume(&with("", "4.3"), &[])
         .code(2)
         .says("the setting certificate.firmware-version was `4.2`, and is `4.3` now");
-    resume(&with("node-bound = true", "4.2"), &[]).code(2).says("device.node-bound");
-    resume(&profile.with(&[("quiet", "300 ms")]), &[]).code(2).says("the setting time.quiet was");
+    resume(&with("node-bound = true", "4.2"), &[])
+        .code(2)
+        .says("device.node-bound");
+    resume(&profile.with(&[("quiet", "300 ms")]), &[])
+        .code(2)
+        .says("the setting time.quiet was");
     let hook = "[hooks.power-cycle]\nrun = [\"true\"]\n";
     let mut other = with("", "4.2");
     other.more += hook;
     resume(&other, &[]).code(2).says("hooks.power-cycle");
     let mut commented = with("", "4.2");
     commented.more += "# another floor\n";
-    resume(&commented, &[]).code(2).says("the profile device.toml is not the file that it was");
+    resume(&commented, &[])
+        .code(2)
+        .says("the profile device.toml is not the file that it was");
     fs::write(bench.path().join("vehicle.sh"), "sleep 61\n").unwrap();
     resume(&with("", "4.2"), &[])
         .code(2)
         .says("the program vehicle.sh is not the file that it was");
-    assert!(bundles(&bench.path().join("reports")).is_empty(), "a refusal leaves a bundle");
+    assert!(
+        bundles(&bench.path().join("reports")).is_empty(),
+        "a refusal leaves a bundle"
+    );
 }
 
 #[test]

@@ -36,7 +36,10 @@ fn are_red(folder: &Path, why: &str) {
         let text = read(name);
         let junit = roxmltree::Document::parse(&text).unwrap();
         let case = junit.descendants().find(|node| node.has_tag_name("testcase")).unwrap();
-        assert_eq!(case.attribute("name"), Some("the run is complete and decided something"));
+        assert_eq!(
+            case.attribute("name"),
+            Some("the run is complete and decided something")
+        );
         assert!(case.children().any(|node| node.has_tag_name("error")), "{text}");
     }
     read("summary.md");
@@ -77,7 +80,10 @@ fn what_is_asked_for_by_flag_is_written_in_every_case() {
         green();
         run(arguments).code(code);
         are_red(bench.path(), why);
-        assert!(!bench.path().join("reports/latest").exists(), "{arguments:?}: latest leads to the run before");
+        assert!(
+            !bench.path().join("reports/latest").exists(),
+            "{arguments:?}: latest leads to the run before"
+        );
     }
     green();
     assert!(bench.path().join("reports/latest/report.html").exists());
@@ -114,7 +120,10 @@ fn a_file_that_cannot_be_written_is_5_before_anything_is_tried_and_a_plan_writes
         .run(&["run", "--virtual", QUICK, "--plan", "--as", "junit=junit.xml"])
         .code(2)
         .says("a plan runs nothing");
-    bench.run(&["run", "--virtual", QUICK, "--as", "junit"]).code(2).says("junit=FILE");
+    bench
+        .run(&["run", "--virtual", QUICK, "--as", "junit"])
+        .code(2)
+        .says("junit=FILE");
     bench
         .run(&["run", "--virtual", QUICK, "--as", "jnit=x.xml"])
         .code(2)
@@ -127,16 +136,35 @@ fn failures_stand_in_the_files_that_were_asked_for() {
     let fault = ["run", "--virtual", REFUSAL, "--fault", "validation-error-fatal"];
     bench.run(&[&fault[..], &asked()].concat()).code(1);
     let read = |name: &str| fs::read_to_string(bench.path().join("out").join(name)).unwrap();
-    for name in ["junit.xml", "requirements.xml", "summary.md", "quality.json", "findings.sarif"] {
+    for name in [
+        "junit.xml",
+        "requirements.xml",
+        "summary.md",
+        "quality.json",
+        "findings.sarif",
+    ] {
         assert!(read(name).contains("ORD-REJ-02"), "{name}");
     }
     let printed = bench.run(&["report", "--as", "junit", "reports/latest"]).code(0).stdout;
     assert_eq!(read("junit.xml"), printed);
-    bench.run(&["report", "reports/latest", "--as", "junit=again.xml", "--as", "sarif=again.sarif"]).code(0);
+    bench
+        .run(&[
+            "report",
+            "reports/latest",
+            "--as",
+            "junit=again.xml",
+            "--as",
+            "sarif=again.sarif",
+        ])
+        .code(0);
     assert_eq!(fs::read_to_string(bench.path().join("again.xml")).unwrap(), printed);
     // The file of an earlier call does not outlive one that comes to nothing.
     bench.run(&["report", "nowhere", "--as", "junit=again.xml"]).code(2);
-    assert!(fs::read_to_string(bench.path().join("again.xml")).unwrap().contains("<error"));
+    assert!(
+        fs::read_to_string(bench.path().join("again.xml"))
+            .unwrap()
+            .contains("<error")
+    );
 }
 
 #[test]
@@ -154,7 +182,10 @@ fn a_start_that_failed_leaves_no_bundle_and_the_failures_before_it_are_still_kno
         .says_one_error("no-such-program");
     assert_eq!(bundles(&bench.path().join("reports")), before);
     bench.run(&["report", "--as", "junit", "reports/latest"]).code(2);
-    bench.run(&[&fault[..], &["--last-failed"]].concat()).code(1).prints(REFUSAL);
+    bench
+        .run(&[&fault[..], &["--last-failed"]].concat())
+        .code(1)
+        .prints(REFUSAL);
 }
 
 #[test]
@@ -180,7 +211,8 @@ fn papers_and_renderings_know_own_suites() {
     let bench = Bench::new();
     own_test(bench.path());
     bench.run(&["run", "--virtual", "--suites", "own", "acme/*"]).code(0);
-    let report = |arguments: &[&str]| bench.run(&[&["report", "reports/latest", "--suites", "own"], arguments].concat());
+    let report =
+        |arguments: &[&str]| bench.run(&[&["report", "reports/latest", "--suites", "own"], arguments].concat());
     report(&["--as", "junit"]).code(0).prints("acme/mine");
     report(&["--as", "sarif"]).code(0);
     report(&["--attestation"]).code(0).prints("in-toto");
@@ -196,7 +228,12 @@ fn what_goes_wrong_before_a_run_is_an_annotation_with_file_and_line() {
     let on_github = |arguments: &[&str]| -> Ended {
         let mut command = tool(bench.path(), arguments);
         let summary = bench.path().join("summary.md");
-        Running::start(command.env("GITHUB_ACTIONS", "true").env("GITHUB_STEP_SUMMARY", summary)).end()
+        Running::start(
+            command
+                .env("GITHUB_ACTIONS", "true")
+                .env("GITHUB_STEP_SUMMARY", summary),
+        )
+        .end()
     };
     fs::write(bench.path().join("device.toml"), "[device]\nmanufacterer = \"ACME\"\n").unwrap();
     on_github(&["run", "--profile", "device.toml"])
@@ -210,7 +247,12 @@ fn what_goes_wrong_before_a_run_is_an_annotation_with_file_and_line() {
     on_github(&["run", "--profile", "device.toml", QUICK])
         .code(5)
         .says(&format!("::error file=device.toml,line={line},title=vda5050-tck::"));
-    on_github(&["run", "--nonsense"]).code(2).says("::error title=vda5050-tck::");
+    on_github(&["run", "--nonsense"])
+        .code(2)
+        .says("::error title=vda5050-tck::");
     let page = fs::read_to_string(bench.path().join("summary.md")).unwrap();
-    assert!(page.matches("## NO RESULT").count() == 3 && page.contains("no-such-program"), "{page}");
+    assert!(
+        page.matches("## NO RESULT").count() == 3 && page.contains("no-such-program"),
+        "{page}"
+    );
 }

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::rendering::{self, RenderedTo};
 use super::{Format, InconclusiveArg, SuiteArgs};
-use crate::pack::Role;
+use tck_pack::Role;
 
 const LIST_HELP: &str = "\
 Examples:

@@ -45,7 +45,9 @@ pub(super) fn to_file_or_stdout(text: &str) -> Result<RenderedTo, String> {
         None => (text, None),
     };
     let rendering = Rendering::from_str(kind, false).map_err(|_| {
-        let all = Rendering::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+        let all = Rendering::value_variants()
+            .iter()
+            .filter_map(ValueEnum::to_possible_value);
         let all: Vec<String> = all.map(|value| value.get_name().to_owned()).collect();
         format!("there is no `{kind}`; there are {}", all.join(", "))
     })?;

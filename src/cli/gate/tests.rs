@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::bench::LinkError;
-use crate::diagnostic::{Source, Span};
-use crate::report::junit::{self, Flavour, Inconclusive};
-use crate::result::{Decision, DeviceIdentity, MonitorFinding, MonitorResult, Repetition, RequirementResult, TestResult};
+use tck_base::diagnostic::{Source, Span};
+use tck_net::bench::LinkError;
+use tck_report::junit::{self, Flavour, Inconclusive};
+use tck_result::{Decision, DeviceIdentity, MonitorFinding, MonitorResult, Repetition, RequirementResult, TestResult};
 
 /// A run that is being put together.
 struct Case {
@@ -27,11 +27,15 @@ const ENDS: [Way<End>; 8] = [
     ("to its end", true, || End::Completed),
     ("no device came", false, || End::NoDevice("nobody".to_owned())),
     ("another device spoke", false, || End::Stranger("another".to_owned())),
-    ("the device is not what it was before the interruption", false, || End::Changed("other".to_owned())),
+    ("the device is not what it was before the interruption", false, || {
+        End::Changed("other".to_owned())
+    }),
     ("the device went away", false, || End::Lost("gone".to_owned())),
     ("interrupted", false, || End::Interrupted),
     ("too much came", false, || End::Flooded("flood".to_owned())),
-    ("the harness broke", false, || End::Broken(LinkError::Setup("no".to_owned()).into())),
+    ("the harness broke", false, || {
+        End::Broken(LinkError::Setup("no".to_owned()).into())
+    }),
 ];
 
 /// What can come of a test that was selected.
@@ -40,16 +44,24 @@ const TESTS: [Way<TestResult>; 12] = [
     ("passed with a remark", true, || of(Some(Verdict::Warning), "ORD-01")),
     ("failed by something known", true, || of(Some(Verdict::Fail), KNOWN)),
     ("failed", false, || of(Some(Verdict::Fail), "ORD-01")),
-    ("could not be decided", false, || of(Some(Verdict::Inconclusive), "ORD-01")),
+    ("could not be decided", false, || {
+        of(Some(Verdict::Inconclusive), "ORD-01")
+    }),
     ("broke", false, || of(Some(Verdict::Error), "ORD-01")),
     ("decided nothing", false, || of(None, "ORD-01")),
     ("was not carried out", false, || TestResult {
         journal: None,
         ..of(Some(Verdict::Inconclusive), "ORD-01")
     }),
-    ("was repeated as often as asked", true, || repeated(Verdict::Pass, "ORD-01", 3)),
-    ("was repeated less often than asked", false, || repeated(Verdict::Inconclusive, "ORD-01", 1)),
-    ("failed by something known, and was repeated less often", false, || repeated(Verdict::Fail, KNOWN, 1)),
+    ("was repeated as often as asked", true, || {
+        repeated(Verdict::Pass, "ORD-01", 3)
+    }),
+    ("was repeated less often than asked", false, || {
+        repeated(Verdict::Inconclusive, "ORD-01", 1)
+    }),
+    ("failed by something known, and was repeated less often", false, || {
+        repeated(Verdict::Fail, KNOWN, 1)
+    }),
     ("does not apply", true, || TestResult {
         not_applicable: Some("the factsheet says no".to_owned()),
         journal: None,
@@ -61,14 +73,20 @@ const TESTS: [Way<TestResult>; 12] = [
 /// What can be around the tests.
 const AROUND: [(&str, bool, fn(&mut Case)); 7] = [
     ("nothing", true, |_| {}),
-    ("monitors passed", true, |case| case.result.monitors.push(monitor(Verdict::Pass, "HDR-01"))),
+    ("monitors passed", true, |case| {
+        case.result.monitors.push(monitor(Verdict::Pass, "HDR-01"))
+    }),
     ("a monitor failed by something known", true, |case| {
         case.result.monitors.push(monitor(Verdict::Fail, KNOWN));
     }),
-    ("a monitor failed", false, |case| case.result.monitors.push(monitor(Verdict::Fail, "HDR-01"))),
+    ("a monitor failed", false, |case| {
+        case.result.monitors.push(monitor(Verdict::Fail, "HDR-01"))
+    }),
     ("the report could not be written", false, |case| case.written = false),
     ("the run ended early", false, |case| case.result.partial = true),
-    ("what is known has expired", false, |case| "2000-01-01".clone_into(&mut case.known[0].until)),
+    ("what is known has expired", false, |case| {
+        "2000-01-01".clone_into(&mut case.known[0].until)
+    }),
 ];
 
 /// The requirement whose failure is known.
@@ -176,21 +194,25 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
     let monitors = result.monitors.iter().map(|monitor| monitor.verdict);
     result.verdict = tests.chain(monitors).flatten().reduce(Verdict::join);
     for test in &result.tests {
-        result.requirements.extend(test.decisions.iter().map(|decision| RequirementResult {
-            id: decision.requirement.clone(),
-            verdict: Some(decision.verdict()),
-            decided_by: vec![test.id.clone()],
+        result
+            .requirements
+            .extend(test.decisions.iter().map(|decision| RequirementResult {
+                id: decision.requirement.clone(),
+                verdict: Some(decision.verdict()),
+                decided_by: vec![test.id.clone()],
+                verdicts: Vec::new(),
+                not_decided: None,
+            }));
+    }
+    result
+        .requirements
+        .extend(result.monitors.iter().map(|monitor| RequirementResult {
+            id: "HDR-01".to_owned(),
+            verdict: monitor.verdict,
+            decided_by: vec![monitor.id.clone()],
             verdicts: Vec::new(),
             not_decided: None,
         }));
-    }
-    result.requirements.extend(result.monitors.iter().map(|monitor| RequirementResult {
-        id: "HDR-01".to_owned(),
-        verdict: monitor.verdict,
-        decided_by: vec![monitor.id.clone()],
-        verdicts: Vec::new(),
-        not_decided: None,
-    }));
     case
 }
 
@@ -199,7 +221,9 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
 fn every_combination(mut holds: impl FnMut(&str, bool, &Case)) {
     let none: Vec<&Way<TestResult>> = Vec::new();
     let alone = TESTS.iter().map(|one| vec![one]);
-    let pairs = TESTS.iter().flat_map(|one| TESTS.iter().map(move |other| vec![one, other]));
+    let pairs = TESTS
+        .iter()
+        .flat_map(|one| TESTS.iter().map(move |other| vec![one, other]));
     let selections: Vec<Vec<&Way<TestResult>>> = std::iter::once(none).chain(alone).chain(pairs).collect();
     for (ended, end_allows, end) in ENDS {
         for selection in &selections {
@@ -233,7 +257,10 @@ fn the_gate_lets_through_only_what_was_carried_out_and_decided() {
         assert!(!allowed || exit == Exit::Conforms || expired, "{name}: {exit:?}");
         let strict = Gate { known: &[], ..gate };
         let fails = case.result.verdict == Some(Verdict::Fail);
-        assert!(!fails || strict.exit() != Exit::Conforms, "{name}: a failure was borne without a list");
+        assert!(
+            !fails || strict.exit() != Exit::Conforms,
+            "{name}: a failure was borne without a list"
+        );
         green += usize::from(exit == Exit::Conforms);
         all += 1;
     });
@@ -255,10 +282,18 @@ fn junit_is_green_only_where_tests_were_decided_however_the_undecided_are_shown(
             let red = xml.contains("<failure") || xml.contains("<error");
             let tests = &case.result.tests;
             let decided = tests.iter().filter_map(|test| test.verdict);
-            let decided = decided.filter(|verdict| matches!(verdict, Verdict::Pass | Verdict::Warning)).count();
-            assert!(red || decided > 0 && !case.result.partial, "{name}, {inconclusive:?}: {xml}");
+            let decided = decided
+                .filter(|verdict| matches!(verdict, Verdict::Pass | Verdict::Warning))
+                .count();
+            assert!(
+                red || decided > 0 && !case.result.partial,
+                "{name}, {inconclusive:?}: {xml}"
+            );
             if inconclusive == Inconclusive::Error {
-                assert!(red || allowed || case.known[0].until.starts_with("2000"), "{name}: {xml}");
+                assert!(
+                    red || allowed || case.known[0].until.starts_with("2000"),
+                    "{name}: {xml}"
+                );
             }
         }
     });

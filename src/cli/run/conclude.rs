@@ -7,14 +7,15 @@ use crate::cli::exit::Exit;
 use crate::cli::gate::Gate;
 use crate::cli::outputs::{Outputs, Shown};
 use crate::cli::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::engine::Recorder;
-use crate::report::sources::Sources;
-use crate::report::text::Color;
-use crate::report::{overview, text};
-use crate::result::RunResult;
-use crate::run::{Bundle, End, Finished, sources, write_all};
-use crate::verdict::Verdict;
+
+use tck_base::diagnostic::Diagnostic;
+use tck_base::verdict::Verdict;
+use tck_engine::Recorder;
+use tck_report::sources::Sources;
+use tck_report::text::Color;
+use tck_report::{overview, text};
+use tck_result::RunResult;
+use tck_run::{Bundle, End, Finished, sources, write_all};
 
 impl Job {
     /// Writes the bundle and says the verdict.
@@ -67,7 +68,7 @@ impl Job {
             _ if self.output.speaks_events() => {}
             args::Format::Json => {
                 let text =
-                    crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
+                    tck_report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
                 crate::cli::print(&text)?;
             }
             args::Format::Text => {
@@ -98,7 +99,11 @@ impl Job {
         let gate = Gate {
             end: &end,
             result: &result,
-            known: if self.certifies { &[] } else { &self.effective.profile.known },
+            known: if self.certifies {
+                &[]
+            } else {
+                &self.effective.profile.known
+            },
             written: unwritten.is_none(),
         };
         self.tell_known(&gate)?;
@@ -122,7 +127,10 @@ impl Job {
 
     /// Says which failures the profile bears, where a run came to its end.
     fn tell_known(&self, gate: &Gate<'_>) -> Result<(), Problem> {
-        let Some(measured) = gate.measured().filter(|_| matches!(gate.end, End::Completed) && gate.written) else {
+        let Some(measured) = gate
+            .measured()
+            .filter(|_| matches!(gate.end, End::Completed) && gate.written)
+        else {
             return Ok(());
         };
         match self.output.format {
@@ -141,7 +149,9 @@ fn why_not(end: &End, result: &RunResult, exit: Exit, shown: &str) -> Option<Pro
     match end {
         End::Completed if exit == Exit::NothingToDo => {
             let why = result.tests.iter().find_map(|test| test.not_applicable.as_deref())?;
-            Some(Problem::NothingToDo(format!("no selected test applies to the device: {why}")))
+            Some(Problem::NothingToDo(format!(
+                "no selected test applies to the device: {why}"
+            )))
         }
         End::Completed | End::Interrupted => None,
         End::Stranger(why) => {
@@ -149,7 +159,11 @@ fn why_not(end: &End, result: &RunResult, exit: Exit, shown: &str) -> Option<Pro
                         profile";
             Some(Diagnostic::whole("another-device", why.as_str()).hint(hint).into())
         }
-        End::Changed(why) => Some(Diagnostic::whole("resume", why.as_str()).hint(super::resume::ONE_THING).into()),
+        End::Changed(why) => Some(
+            Diagnostic::whole("resume", why.as_str())
+                .hint(super::resume::ONE_THING)
+                .into(),
+        ),
         End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Some(broken_off(why)),
         End::Broken(error) => Some(broken_off(&error.to_string())),
     }

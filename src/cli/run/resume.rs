@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::cli::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::journal::Journal;
-use crate::journal::event::{Event, RunHeader, Setting};
-use crate::journal::file::{self, Recording};
-use crate::judge;
-use crate::pack::{Pack, Participant};
-use crate::run::Library;
-use crate::suite::model::Test;
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::Journal;
+use tck_journal::event::{Event, RunHeader, Setting};
+use tck_journal::file::{self, Recording};
+use tck_judge as judge;
+use tck_judge::Library;
+use tck_pack::{Pack, Participant};
+use tck_suite::model::Test;
 
 /// A run that broke off.
 #[derive(Debug)]
@@ -130,7 +130,11 @@ impl Earlier {
 
     /// What nobody can say of a device that the harness does not start, and of which no version is named.
     pub(super) fn limit(now: &Subject<'_>) -> Option<String> {
-        let says = |name: &str| now.settings.iter().any(|setting| setting.name == name && !setting.value.is_empty());
+        let says = |name: &str| {
+            now.settings
+                .iter()
+                .any(|setting| setting.name == name && !setting.value.is_empty())
+        };
         let is_known = says("device.command") || says("certificate.firmware-version");
         let is_foreign = says("device.serial-number");
         (is_foreign && !is_known).then(|| {
