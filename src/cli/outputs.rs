@@ -96,7 +96,17 @@ impl Owed {
                 ..Obstacle::default()
             }],
         };
-        self.write_no_result(&unfinished)?;
+        let before = Self {
+            // What is no file, such as a pipe, gets what came out and nothing before it.
+            files: self
+                .files
+                .iter()
+                .filter(|wanted| !wanted.is_stream())
+                .cloned()
+                .collect(),
+            ..Self::default()
+        };
+        before.write_no_result(&unfinished)?;
         let outputs = Outputs {
             files: &self.files,
             settled: Cell::new(false),
@@ -131,8 +141,8 @@ impl Owed {
             let text = match wanted.rendering {
                 Rendering::Junit | Rendering::JunitRequirements => nothing.junit(),
                 Rendering::Markdown => Ok(nothing.markdown()),
-                Rendering::CodeQuality => Ok(nothing.code_quality()),
-                Rendering::Sarif => Ok(nothing.sarif()),
+                Rendering::CodeQuality => Ok(issues::code_quality_of(nothing)),
+                Rendering::Sarif => Ok(issues::sarif_of(nothing)),
             };
             write(wanted, text).map_err(Problem::Environment)?;
         }

@@ -4,7 +4,6 @@
 use std::fmt::Write as _;
 
 use super::clean::{block, line};
-use super::issues;
 use super::junit::{self, JunitError, Plain, RUN_CASE, RUN_SUITE};
 use super::markdown::escaped;
 use tck_base::verdict::Verdict;
@@ -50,18 +49,6 @@ impl NoResult {
             // The first line becomes the message of the case.
             text: format!("{}\n\n{}", titles.join("; "), texts.join("\n\n")),
         }])
-    }
-
-    /// Code quality of GitLab: an entry for each problem.
-    #[must_use]
-    pub fn code_quality(&self) -> String {
-        issues::code_quality_of(self)
-    }
-
-    /// SARIF 2.1.0: a result for each problem, and an execution without success.
-    #[must_use]
-    pub fn sarif(&self) -> String {
-        issues::sarif_of(self)
     }
 
     /// Markdown for a summary page.

@@ -122,7 +122,7 @@ fn remove(link: &Path) {
 #[cfg(unix)]
 mod tests {
     use super::*;
-    use tck_run::Bundle;
+    use crate::Bundle;
 
     fn bundle(reports: &Path, run: &str) -> Bundle {
         Bundle::create(reports, "A", "1", jiff::Timestamp::UNIX_EPOCH, run).expect("bundle")

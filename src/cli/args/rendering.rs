@@ -28,10 +28,22 @@ pub struct RenderedTo {
     pub file: Option<PathBuf>,
 }
 
+impl RenderedTo {
+    /// Whether what is named as its file is something else, such as a pipe.
+    #[must_use]
+    pub fn is_stream(&self) -> bool {
+        let facts = self.file.as_ref().and_then(|file| std::fs::metadata(file).ok());
+        facts.is_some_and(|facts| !facts.is_file() && !facts.is_dir())
+    }
+}
+
 /// `KIND=FILE`.
 pub(in crate::cli) fn to_file(text: &str) -> Result<RenderedTo, String> {
     let wanted = to_file_or_stdout(text)?;
     match wanted.file {
+        Some(file) if file.as_os_str() == "-" => {
+            Err("standard output belongs to the run; `report --as` prints there".to_owned())
+        }
         Some(_) => Ok(wanted),
         None => Err(format!("a kind and a file are written like `{text}=FILE`")),
     }
