@@ -52,7 +52,28 @@ pub fn library(own: Option<Own<'_>>) -> Result<Library, Vec<Diagnostic>> {
             .with_suites(folder)
             .map_err(|error| unreadable(folder, error))?,
     };
+    if let Some(Own::Added(folder) | Own::Alone(folder)) = own {
+        holds_suites(&assets, folder)?;
+    }
     Library::load(assets, tck_checks::REGISTRY)
+}
+
+/// Folders below `suites/` whose files test or judge something, and are not only used by others.
+const DECIDING: [&str; 4] = ["agv/", "master-control/", "monitors/", "explore/"];
+
+/// A folder of suites that holds none was not checked out, or is another one.
+fn holds_suites(assets: &Assets, folder: &Path) -> Result<(), Vec<Diagnostic>> {
+    let mut inside = assets.own().iter().filter_map(|path| path.strip_prefix("suites/"));
+    if inside.any(|path| DECIDING.iter().any(|folder| path.starts_with(folder))) {
+        return Ok(());
+    }
+    let title = format!(
+        "{} holds no test, monitor or stimulus: they stand in {}",
+        folder.display(),
+        DECIDING.join(", ")
+    );
+    let hint = "is everything checked out? `vda5050-tck init --suites DIR` writes a folder that is laid out right";
+    Err(vec![Diagnostic::whole("no-suites", title).hint(hint)])
 }
 
 fn embedded_files(root: &str, dir: &Dir<'static>, files: &mut Vec<AssetFile>) {

@@ -28,6 +28,8 @@ pub struct Assets {
     checked: BTreeSet<String>,
     sha256: String,
     modified: bool,
+    /// The paths of the files that somebody has given.
+    own: Vec<String>,
 }
 
 impl Assets {
@@ -64,8 +66,10 @@ impl Assets {
     pub fn with_suites(&self, dir: &Path) -> io::Result<Self> {
         let mut files = Vec::new();
         files_below(dir, "suites", 0, &mut files)?;
+        let own = paths(&files);
         files.extend(self.under("schemas/").cloned());
         let mut assets = Self::new(files);
+        assets.own = own;
         assets.modified = assets.sha256 != self.sha256;
         let same = |path: &&String| assets.get(path) == self.get(path);
         assets.checked = self.checked.iter().filter(same).cloned().collect();
@@ -79,6 +83,7 @@ impl Assets {
     pub fn with_added(&self, dir: &Path) -> io::Result<Self> {
         let mut own = Vec::new();
         files_below(dir, "suites", 0, &mut own)?;
+        let paths = paths(&own);
         let mut files = self.files.clone();
         for file in own {
             match self.get(&file.path) {
@@ -91,6 +96,7 @@ impl Assets {
             }
         }
         let mut assets = Self::new(files);
+        assets.own = paths;
         assets.modified = assets.sha256 != self.sha256;
         let same = |path: &&String| assets.get(path) == self.get(path);
         assets.checked = self.checked.iter().filter(same).cloned().collect();
@@ -129,6 +135,7 @@ impl Assets {
             checked: BTreeSet::new(),
             sha256,
             modified: false,
+            own: Vec::new(),
         }
     }
 
@@ -144,6 +151,12 @@ impl Assets {
         self.files.get(at)
     }
 
+    /// The paths of the files that somebody has given, built in or not.
+    #[must_use]
+    pub fn own(&self) -> &[String] {
+        &self.own
+    }
+
     /// SHA-256 over all paths and texts, in hexadecimal.
     #[must_use]
     pub fn sha256(&self) -> &str {
@@ -155,6 +168,10 @@ impl Assets {
     pub fn modified(&self) -> bool {
         self.modified
     }
+}
+
+fn paths(files: &[AssetFile]) -> Vec<String> {
+    files.iter().map(|file| file.path.clone()).collect()
 }
 
 fn hidden(path: &str) -> bool {
