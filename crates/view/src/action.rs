@@ -10,7 +10,7 @@ view! {
         /// What is to be done.
         action_type: Text = "actionType",
         /// For people.
-        action_description: Text = "actionDescription",
+        action_description: Text = "actionDescription" apart,
         /// `NONE`, `SOFT` or `HARD`; also `SINGLE` from 3.0 on.
         blocking_type: Text = "blockingType",
         /// What it needs to know.

@@ -38,8 +38,9 @@
 //! # Comparing
 //!
 //! Every object has a [`Print`], a fingerprint of its whole content, members nobody knows included, whatever
-//! their order: `now.print == before.print` asks whether an error, an action or a node is the one of before. A message has
-//! a second one, `content`, that leaves out `headerId` and `timestamp`.
+//! their order: `now.print == before.print` asks whether an error, an action or a node is the one of before. `essence` leaves out
+//! descriptions for people, and of a state what changes all the time; `content` of a message leaves out `headerId` and
+//! `timestamp`.
 //!
 //! # Bounds
 //!
@@ -85,7 +86,7 @@ pub use header::Header;
 pub use instant_actions::InstantActionsView;
 pub use json::{Json, Kind};
 pub use list::List;
-pub use member::Member;
+pub use member::{Member, Presence};
 pub use message::{MessageView, OtherView};
 pub use names::{Field, Names, NamesError, Object};
 pub use number::Number;

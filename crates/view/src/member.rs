@@ -18,7 +18,39 @@ pub enum Member<T> {
     There(T),
 }
 
+/// How a member is there, whatever its type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Presence {
+    /// The object has no such member, or the version of the protocol has none.
+    Absent,
+    /// The member is `null`.
+    Null,
+    /// The member is of another type than it should be.
+    Other,
+    /// The member is there and can be read.
+    There,
+}
+
+impl Presence {
+    /// Whether something is there that is not `null`, of whatever type.
+    #[must_use]
+    pub const fn is_something(self) -> bool {
+        matches!(self, Self::Other | Self::There)
+    }
+}
+
 impl<T> Member<T> {
+    /// How the member is there.
+    #[must_use]
+    pub const fn presence(&self) -> Presence {
+        match self {
+            Self::Absent => Presence::Absent,
+            Self::Null => Presence::Null,
+            Self::Other(_) => Presence::Other,
+            Self::There(_) => Presence::There,
+        }
+    }
+
     /// The value where the member is there.
     #[must_use]
     pub const fn there(&self) -> Option<&T> {

@@ -152,6 +152,12 @@ impl MessageView {
         each!(self, view => view.content)
     }
 
+    /// The fingerprint without the header, and of a state without what changes all the time.
+    #[must_use]
+    pub fn essence(&self) -> Print {
+        each!(self, view => view.essence)
+    }
+
     /// Whether it is a JSON object. A view of anything else has no members.
     #[must_use]
     pub fn is_object(&self) -> bool {

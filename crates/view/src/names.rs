@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Deserialize, Deserializer};
+use serde_json::Value;
 
 pub use object::Object;
 pub(crate) use object::{Entry, Shape};
@@ -221,6 +222,24 @@ impl Names {
     #[must_use]
     pub fn lacks(&self, field: Field) -> bool {
         self.name(field).is_none()
+    }
+
+    /// What stands in a message at the end of a path of fields: to show it as evidence, or to look for what only a device
+    /// knows the name of.
+    #[must_use]
+    pub fn raw<'v>(&self, message: &'v Value, path: &[Field]) -> Option<&'v Value> {
+        path.iter()
+            .try_fold(message, |here, field| match self.name(*field)?.split_once('/') {
+                None => here.get(self.name(*field)?),
+                Some((outer, inner)) => here.get(outer)?.get(inner),
+            })
+    }
+
+    /// The elements of a list of a message as they stand there, to show them as evidence; none where it is no list.
+    #[must_use]
+    pub fn raw_elements<'v>(&self, object: &'v Value, list: Field) -> &'v [Value] {
+        let found = self.raw(object, &[list]).and_then(Value::as_array);
+        found.map_or(&[], Vec::as_slice)
     }
 
     pub(crate) fn table(&self, object: Object) -> &Table {

@@ -10,7 +10,7 @@ view! {
         /// Which update of it.
         order_update_id: Number = "orderUpdateId",
         /// For people.
-        order_description: Text = later "orderDescription",
+        order_description: Text = later "orderDescription" apart,
         /// Zones the vehicle has to heed.
         zone_set_id: Text = "zoneSetId",
         /// Nodes to pass.
@@ -28,7 +28,7 @@ view! {
         /// Its place in the order, even.
         sequence_id: Number = "sequenceId",
         /// For people.
-        node_description: Text = "nodeDescription",
+        node_description: Text = "nodeDescription" apart,
         /// Whether it belongs to the base.
         released: bool = "released",
         /// Where it is.
@@ -46,7 +46,7 @@ view! {
         /// Its place in the order, odd.
         sequence_id: Number = "sequenceId",
         /// For people.
-        edge_description: Text = "edgeDescription",
+        edge_description: Text = "edgeDescription" apart,
         /// Whether it belongs to the base.
         released: bool = "released",
         /// Where it begins.

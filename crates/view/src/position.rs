@@ -20,7 +20,7 @@ view! {
         /// The map that x and y are of.
         map_id: Text = "mapId",
         /// For people.
-        map_description: Text = "mapDescription",
+        map_description: Text = "mapDescription" apart,
     }
 }
 
@@ -40,7 +40,7 @@ view! {
         /// The map that x and y are of.
         map_id: Text = "mapId",
         /// For people.
-        map_description: Text = "mapDescription",
+        map_description: Text = "mapDescription" apart,
     }
 }
 
@@ -127,9 +127,18 @@ impl Position {
     /// nobody is accused by it. That the member is missing is a finding of its own (STATE-MSG-05).
     #[must_use]
     pub fn pose(&self) -> Option<Pose> {
-        if !self.initialized.is(true) {
-            return None;
-        }
+        self.initialized.is(true).then(|| self.pose_as_written()).flatten()
+    }
+
+    /// The pose of a vehicle that does not say that it does not know its position: an absent `positionInitialized` is enough.
+    ///
+    /// Some checks took it so before there was one meaning; [`Position::pose`] is the one that counts.
+    #[must_use]
+    pub fn pose_unless_denied(&self) -> Option<Pose> {
+        (!self.initialized.is(false)).then(|| self.pose_as_written()).flatten()
+    }
+
+    fn pose_as_written(&self) -> Option<Pose> {
         Some(Pose {
             x: coordinate(&self.x)?,
             y: coordinate(&self.y)?,

@@ -13,6 +13,14 @@ impl Print {
     pub const fn bits(self) -> u64 {
         self.0
     }
+
+    /// The fingerprint of a value that has no view. That of an object with a view is the same where the version has the
+    /// usual names for its members.
+    #[must_use]
+    pub fn of_value(value: &serde_json::Value) -> Self {
+        // A tree has no syntax that could be wrong.
+        crate::read::skip(value).unwrap_or_default()
+    }
 }
 
 /// Mixes two numbers.
@@ -83,6 +91,16 @@ impl Members {
     /// Adds a member by the fingerprint of its name.
     pub(crate) const fn add(&mut self, name: u64, value: Print) {
         self.0 = self.0.wrapping_add(fold(name ^ K1, value.0 ^ K2));
+    }
+
+    /// These members and others.
+    pub(crate) const fn with(self, others: Self) -> Self {
+        Self(self.0.wrapping_add(others.0))
+    }
+
+    /// These members without some of them.
+    pub(crate) const fn without(self, some: Self) -> Self {
+        Self(self.0.wrapping_sub(some.0))
     }
 
     pub(crate) const fn done(self) -> Print {

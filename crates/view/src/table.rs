@@ -1,14 +1,15 @@
 //! The one table behind views, names and fields.
 
 /// Defines the view of an object: what its members are called in Rust and in 2.x, and what each should be. A member that only
-/// later versions have is marked `later`; whole objects that are new are not, since what holds them is.
+/// later versions have is marked `later`; whole objects that are new are not, since what holds them is. A member that is marked
+/// `apart` behind its name is for people, or changes all the time: it does not count for `essence`.
 ///
 /// With `message` in front it is the view of a topic: it has a header, too.
 macro_rules! view {
     (
         $(#[$doc:meta])*
         message $name:ident as $object:literal {
-            $( $(#[$about:meta])* $field:ident: $type:ty = $($later:ident)? $wire:literal ),* $(,)?
+            $( $(#[$about:meta])* $field:ident: $type:ty = $($later:ident)? $wire:literal $($apart:ident)? ),* $(,)?
         }
     ) => {
         $(#[$doc])*
@@ -21,10 +22,12 @@ macro_rules! view {
             pub print: $crate::Print,
             /// The fingerprint of all but headerId and timestamp: the same for a message that is sent again.
             pub content: $crate::Print,
+            /// The fingerprint without the header and without what changes all the time: position, velocity, battery.
+            pub essence: $crate::Print,
             pub(crate) odd: Option<Box<$crate::Json>>,
         }
 
-        view! { @shape $name $object { $( $(#[$about])* $field: $type = $($later)? $wire ),* } {
+        view! { @shape $name $object { $( $(#[$about])* $field: $type = $($later)? $wire $($apart)? ),* } {
             fn header_mut(&mut self) -> Option<&mut $crate::Header> {
                 Some(&mut self.header)
             }
@@ -37,7 +40,7 @@ macro_rules! view {
     (
         $(#[$doc:meta])*
         $name:ident as $object:literal {
-            $( $(#[$about:meta])* $field:ident: $type:ty = $($later:ident)? $wire:literal ),* $(,)?
+            $( $(#[$about:meta])* $field:ident: $type:ty = $($later:ident)? $wire:literal $($apart:ident)? ),* $(,)?
         }
     ) => {
         $(#[$doc])*
@@ -46,14 +49,16 @@ macro_rules! view {
             $( $(#[$about])* pub $field: $crate::Member<$type>, )*
             /// The fingerprint of all of it.
             pub print: $crate::Print,
+            /// The fingerprint without descriptions for people.
+            pub essence: $crate::Print,
             pub(crate) odd: Option<Box<$crate::Json>>,
         }
 
-        view! { @shape $name $object { $( $(#[$about])* $field: $type = $($later)? $wire ),* } {} }
+        view! { @shape $name $object { $( $(#[$about])* $field: $type = $($later)? $wire $($apart)? ),* } {} }
     };
     (
         @shape $name:ident $object:literal {
-            $( $(#[$about:meta])* $field:ident: $type:ty = $($later:ident)? $wire:literal ),*
+            $( $(#[$about:meta])* $field:ident: $type:ty = $($later:ident)? $wire:literal $($apart:ident)? ),*
         } { $($further:tt)* }
     ) => {
         #[allow(non_upper_case_globals, reason = "a field goes by the name it has in the struct")]
@@ -65,8 +70,25 @@ macro_rules! view {
 
             pub(crate) const SHAPE: &'static $crate::names::Shape = &$crate::names::Shape {
                 name: $object,
-                members: &[$( $crate::names::Entry { wire: $wire, later: view!(@later $($later)?) } ),*],
+                members: &[$( $crate::names::Entry {
+                    wire: $wire,
+                    later: view!(@has $($later)?),
+                    apart: view!(@has $($apart)?),
+                } ),*],
             };
+
+            /// How a member is there; absent when it is one of another object.
+            #[must_use]
+            pub fn presence(&self, field: $crate::Field) -> $crate::Presence {
+                $(
+                    if field == Self::$field {
+                        return self.$field.presence();
+                    }
+                )*
+                // A view without members needs none.
+                let _ = field;
+                $crate::Presence::Absent
+            }
 
             /// Whether it is a JSON object at all. Anything else has no members.
             #[must_use]
@@ -102,14 +124,15 @@ macro_rules! view {
                 }
             }
 
-            fn seal(&mut self, print: $crate::Print, odd: Option<Box<$crate::Json>>) {
+            fn seal(&mut self, print: $crate::Print, essence: $crate::Print, odd: Option<Box<$crate::Json>>) {
                 self.print = print;
+                self.essence = essence;
                 self.odd = odd;
             }
 
             $($further)*
         }
     };
-    (@later) => { false };
-    (@later later) => { true };
+    (@has) => { false };
+    (@has $mark:ident) => { true };
 }

@@ -41,13 +41,13 @@ impl Topic {
     /// The kind of a topic by its last level.
     #[must_use]
     pub fn of_name(name: &str) -> Self {
-        let named = |topic: &Self| topic.name() == name;
+        let named = |topic: &Self| topic.as_str() == name;
         Self::KNOWN.into_iter().find(named).unwrap_or(Self::Other)
     }
 
     /// The last level of the topic; empty for [`Topic::Other`].
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub const fn as_str(self) -> &'static str {
         match self {
             Self::Order => "order",
             Self::InstantActions => "instantActions",
@@ -82,6 +82,6 @@ impl Topic {
 
 impl fmt::Display for Topic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(self.as_str())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-#[expect(clippy::wildcard_imports, reason = "each view is an object")]
+#[allow(clippy::wildcard_imports, reason = "each view is an object")]
 use crate::*;
 
 /// A kind of object: its name in the table `[members]`, and its members.
@@ -19,6 +19,8 @@ pub struct Entry {
     pub(crate) wire: &'static str,
     /// Whether 2.x does not have it.
     pub(crate) later: bool,
+    /// Whether it does not count for the essence of the object.
+    pub(crate) apart: bool,
 }
 
 macro_rules! objects {

@@ -1,6 +1,6 @@
 //! From the name of a member to its place in a view, without hashing all of the name.
 
-use super::Shape;
+use super::{Entry, Shape};
 use crate::print;
 
 /// Places in the index; a power of two, at least twice as many as an object has members.
@@ -9,11 +9,20 @@ const PLACES: usize = 128;
 /// The names of the members of one object.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// By field: the name, and the fingerprint of the usual name.
-    fields: Box<[(Option<Box<str>>, u64)]>,
+    fields: Box<[Naming]>,
     keys: Box<[Key]>,
     /// Which key may stand at a place, counted from 1.
     places: Box<[u8; PLACES]>,
+}
+
+/// What is known of a field.
+#[derive(Clone, Debug)]
+struct Naming {
+    name: Option<Box<str>>,
+    /// The fingerprint of its usual name.
+    usual: u64,
+    /// Whether it does not count for the essence of the object.
+    apart: bool,
 }
 
 /// A name that occurs in an object.
@@ -74,22 +83,27 @@ impl Table {
             }
             places[at] = number;
         }
-        let usual = shape.members.iter().map(|entry| print::of_bytes(entry.wire.as_bytes()));
-        let names = names.iter().map(|name| name.map(Box::from));
+        let naming = |(name, entry): (Option<&str>, &Entry)| Naming {
+            name: name.map(Box::from),
+            usual: print::of_bytes(entry.wire.as_bytes()),
+            apart: entry.apart,
+        };
         Self {
-            fields: names.zip(usual).collect(),
+            fields: names.iter().copied().zip(shape.members).map(naming).collect(),
             keys: keys.into(),
             places,
         }
     }
 
     pub(super) fn name(&self, field: u8) -> Option<&str> {
-        self.fields.get(usize::from(field))?.0.as_deref()
+        self.fields.get(usize::from(field))?.name.as_deref()
     }
 
-    /// The fingerprint of the usual name of a field.
-    pub(crate) fn usual(&self, field: u8) -> u64 {
-        self.fields.get(usize::from(field)).map_or(0, |(_, usual)| *usual)
+    /// The fingerprint of the usual name of a field, and whether it does not count for the essence of the object.
+    pub(crate) fn usual(&self, field: u8) -> (u64, bool) {
+        self.fields
+            .get(usize::from(field))
+            .map_or((0, false), |naming| (naming.usual, naming.apart))
     }
 
     pub(crate) fn find(&self, name: &str) -> Option<Found<'_>> {
@@ -137,7 +151,5 @@ fn place(name: &str) -> usize {
         | byte(length / 2) << 16
         | byte(length.wrapping_sub(1)) << 24
         | (length as u64) << 32;
-    #[expect(clippy::cast_possible_truncation, reason = "seven bits")]
-    let place = (some.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 57) as usize;
-    place
+    (some.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 57) as usize
 }

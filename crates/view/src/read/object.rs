@@ -24,8 +24,8 @@ pub(crate) trait View: Default {
         value: D,
     ) -> Result<Print, D::Error>;
 
-    /// Takes down the fingerprint, and what stands there where it is no object.
-    fn seal(&mut self, print: Print, odd: Option<Box<Json>>);
+    /// Takes down the fingerprints, and what stands there where it is no object.
+    fn seal(&mut self, print: Print, essence: Print, odd: Option<Box<Json>>);
 
     /// The header, where it is a message.
     fn header_mut(&mut self) -> Option<&mut Header> {
@@ -55,7 +55,7 @@ pub(super) struct Whole<'a, 'n, V> {
 impl<V: View> Whole<'_, '_, V> {
     fn odd(self, (json, print): (Json, Print)) -> Print {
         self.view.set_content(print);
-        self.view.seal(print, Some(Box::new(json)));
+        self.view.seal(print, print, Some(Box::new(json)));
         print
     }
 
@@ -124,7 +124,8 @@ pub(super) fn fill<'de, V: View, A: MapAccess<'de>>(
 ) -> Result<Print, A::Error> {
     let table = reader.names.table(V::OBJECT);
     let header = view.header_mut().map(|_| reader.names.table(Object::Header));
-    let (mut members, mut content, mut of_header) = (Members::default(), Members::default(), Members::default());
+    let (mut members, mut apart) = (Members::default(), Members::default());
+    let (mut of_header, mut changing) = (Members::default(), Members::default());
     let meaning = |name: &str| match table.find(name) {
         Some(Found::Member(field)) => Meaning::Member(field),
         Some(Found::Inside(moved)) => Meaning::Inside(print::of_bytes(name.as_bytes()), moved),
@@ -134,36 +135,38 @@ pub(super) fn fill<'de, V: View, A: MapAccess<'de>>(
         },
     };
     while let Some(meaning) = object.next_key_seed(Name(meaning, PhantomData))? {
-        let (name, value) = match meaning {
+        match meaning {
             Meaning::Member(index) => {
                 let value = object.next_value_seed(Into { view, index, reader })?;
-                (table.usual(index), value)
+                let (name, is_apart) = table.usual(index);
+                members.add(name, value);
+                if is_apart {
+                    apart.add(name, value);
+                }
             }
-            Meaning::Inside(name, moved) => (name, object.next_value_seed(Inside { view, moved, reader })?),
-            Meaning::Unknown(name) => (name, object.next_value_seed(Skip)?),
+            Meaning::Inside(name, moved) => members.add(name, object.next_value_seed(Inside { view, moved, reader })?),
+            Meaning::Unknown(name) => members.add(name, object.next_value_seed(Skip)?),
             Meaning::Header(index) => {
-                let name = header.map_or(0, |header| header.usual(index));
                 let value = match view.header_mut() {
                     Some(view) => object.next_value_seed(Into { view, index, reader })?,
                     None => object.next_value_seed(Skip)?,
                 };
+                let (name, _) = header.map_or((0, false), |header| header.usual(index));
                 of_header.add(name, value);
-                members.add(name, value);
-                if !Header::changes(index) {
-                    content.add(name, value);
+                if Header::changes(index) {
+                    changing.add(name, value);
                 }
-                continue;
             }
-        };
-        members.add(name, value);
-        content.add(name, value);
+        }
     }
+    let rest = members;
     if let Some(header) = view.header_mut() {
-        header.seal(of_header.done(), None);
-        view.set_content(content.done());
+        header.seal(of_header.done(), of_header.done(), None);
+        members = members.with(of_header);
+        view.set_content(members.without(changing).done());
     }
     let print = members.done();
-    view.seal(print, None);
+    view.seal(print, rest.without(apart).done(), None);
     Ok(print)
 }
 

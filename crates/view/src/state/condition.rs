@@ -82,7 +82,7 @@ view! {
         /// Which version of it.
         map_version: Text = "mapVersion",
         /// For people.
-        map_description: Text = "mapDescription",
+        map_description: Text = "mapDescription" apart,
         /// `ENABLED` or `DISABLED`.
         map_status: Text = "mapStatus",
     }

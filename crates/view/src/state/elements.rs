@@ -10,7 +10,7 @@ view! {
         /// Its place in the order.
         sequence_id: Number = "sequenceId",
         /// For people.
-        node_description: Text = "nodeDescription",
+        node_description: Text = "nodeDescription" apart,
         /// Whether it belongs to the base.
         released: bool = "released",
         /// Where it is.
@@ -26,7 +26,7 @@ view! {
         /// Its place in the order.
         sequence_id: Number = "sequenceId",
         /// For people.
-        edge_description: Text = "edgeDescription",
+        edge_description: Text = "edgeDescription" apart,
         /// Whether it belongs to the base.
         released: bool = "released",
         /// The curve that is followed.
@@ -42,7 +42,7 @@ view! {
         /// What is done.
         action_type: Text = "actionType",
         /// For people.
-        action_description: Text = "actionDescription",
+        action_description: Text = "actionDescription" apart,
         /// How far it is.
         action_status: Text = "actionStatus",
         /// What came of it.

@@ -12,13 +12,13 @@ view! {
         /// What it is about.
         error_references: List<Reference> = "errorReferences",
         /// For people.
-        error_description: Text = "errorDescription",
+        error_description: Text = "errorDescription" apart,
         /// What to do about it.
-        error_hint: Text = "errorHint",
+        error_hint: Text = "errorHint" apart,
         /// Descriptions in other languages.
-        error_description_translations: List<Translation> = later "errorDescriptionTranslations",
+        error_description_translations: List<Translation> = later "errorDescriptionTranslations" apart,
         /// Hints in other languages.
-        error_hint_translations: List<Translation> = later "errorHintTranslations",
+        error_hint_translations: List<Translation> = later "errorHintTranslations" apart,
     }
 }
 
@@ -32,7 +32,7 @@ view! {
         /// What it is about.
         info_references: List<Reference> = "infoReferences",
         /// For people.
-        info_description: Text = "infoDescription",
+        info_description: Text = "infoDescription" apart,
     }
 }
 

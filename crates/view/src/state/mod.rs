@@ -30,9 +30,9 @@ view! {
         /// Edges still ahead.
         edge_states: List<EdgeState> = "edgeStates",
         /// Where it is.
-        position: Position = "agvPosition",
+        position: Position = "agvPosition" apart,
         /// How fast it is.
-        velocity: Velocity = "velocity",
+        velocity: Velocity = "velocity" apart,
         /// What it carries.
         loads: List<Load> = "loads",
         /// Whether it moves.
@@ -42,7 +42,7 @@ view! {
         /// Whether it wants more base.
         new_base_request: bool = "newBaseRequest",
         /// In metres.
-        distance_since_last_node: Number = "distanceSinceLastNode",
+        distance_since_last_node: Number = "distanceSinceLastNode" apart,
         /// Actions and how far they are; in 3.0 those of the order only.
         action_states: List<ActionState> = "actionStates",
         /// Instant actions and how far they are.
@@ -50,7 +50,7 @@ view! {
         /// Actions of zones and how far they are.
         zone_action_states: List<ActionState> = later "zoneActionStates",
         /// Its battery.
-        battery_state: BatteryState = "batteryState",
+        battery_state: BatteryState = "batteryState" apart,
         /// Who is in control.
         operating_mode: Text = "operatingMode",
         /// What is wrong.
