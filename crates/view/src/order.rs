@@ -32,7 +32,7 @@ view! {
         /// Whether it belongs to the base.
         released: bool = "released",
         /// Where it is.
-        node_position: NodePosition = "nodePosition",
+        node_position: Box<NodePosition> = "nodePosition",
         /// What is to be done there.
         actions: List<ActionView> = "actions",
     }
@@ -72,11 +72,11 @@ view! {
         /// In radians a second.
         max_rotation_speed: Number = "maxRotationSpeed",
         /// The curve to follow.
-        trajectory: Trajectory = "trajectory",
+        trajectory: Box<Trajectory> = "trajectory",
         /// In metres.
         length: Number = "length",
         /// How far the vehicle may leave the curve.
-        corridor: Corridor = "corridor",
+        corridor: Box<Corridor> = "corridor",
         /// What is to be done on it.
         actions: List<ActionView> = "actions",
     }

@@ -13,7 +13,7 @@ use serde::Deserializer;
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 
 pub(crate) use free::skip;
-pub(crate) use object::{View, message};
+pub(crate) use object::{View, boxed, message, plain};
 
 use crate::{Member, Names, Number, Print, TOTAL, print};
 

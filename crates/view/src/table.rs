@@ -132,6 +132,26 @@ macro_rules! view {
 
             $($further)*
         }
+
+        impl $crate::read::Readable for $name {
+            fn read_object<'de, A: serde::de::MapAccess<'de>>(
+                slot: &mut $crate::Member<Self>,
+                object: A,
+                reader: &$crate::read::Reader<'_>,
+            ) -> Result<$crate::Print, A::Error> {
+                $crate::read::plain(slot, object, reader)
+            }
+        }
+
+        impl $crate::read::Readable for Box<$name> {
+            fn read_object<'de, A: serde::de::MapAccess<'de>>(
+                slot: &mut $crate::Member<Self>,
+                object: A,
+                reader: &$crate::read::Reader<'_>,
+            ) -> Result<$crate::Print, A::Error> {
+                $crate::read::boxed(slot, object, reader)
+            }
+        }
     };
     (@has) => { false };
     (@has $mark:ident) => { true };

@@ -12,9 +12,9 @@ view! {
         /// headerId of the state it goes with.
         reference_state_header_id: Number = later "referenceStateHeaderId",
         /// The way it plans.
-        planned_path: PlannedPath = later "plannedPath",
+        planned_path: Box<PlannedPath> = later "plannedPath",
         /// The way it takes next.
-        intermediate_path: IntermediatePath = later "intermediatePath",
+        intermediate_path: Box<IntermediatePath> = later "intermediatePath",
     }
 }
 

@@ -7,7 +7,7 @@ use serde::Deserializer;
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 
 use super::free::{self, Skip};
-use super::{Name, Readable, Reader, numbers};
+use super::{Name, Reader, numbers};
 use crate::names::Found;
 use crate::print::{self, Members};
 use crate::{Header, Json, Member, Number, Object, Print};
@@ -95,17 +95,28 @@ impl<'de, V: View> Visitor<'de> for Whole<'_, '_, V> {
     }
 }
 
-impl<V: View> Readable for V {
-    fn read_object<'de, A: MapAccess<'de>>(
-        slot: &mut Member<Self>,
-        object: A,
-        reader: &Reader<'_>,
-    ) -> Result<Print, A::Error> {
-        let mut view = V::default();
-        let print = fill(&mut view, object, reader)?;
-        *slot = Member::There(view);
-        Ok(print)
-    }
+/// Reads an object into its place.
+pub(crate) fn plain<'de, V: View, A: MapAccess<'de>>(
+    slot: &mut Member<V>,
+    object: A,
+    reader: &Reader<'_>,
+) -> Result<Print, A::Error> {
+    let mut view = V::default();
+    let print = fill(&mut view, object, reader)?;
+    *slot = Member::There(view);
+    Ok(print)
+}
+
+/// Reads an object that is rare, or bigger than what it stands in.
+pub(crate) fn boxed<'de, V: View, A: MapAccess<'de>>(
+    slot: &mut Member<Box<V>>,
+    object: A,
+    reader: &Reader<'_>,
+) -> Result<Print, A::Error> {
+    let mut view = Box::<V>::default();
+    let print = fill(&mut *view, object, reader)?;
+    *slot = Member::There(view);
+    Ok(print)
 }
 
 /// What the name of a member means.

@@ -40,9 +40,9 @@ view! {
         /// Where on the vehicle it is.
         load_position: Text = "loadPosition",
         /// Where its box is.
-        bounding_box_reference: BoundingBox = "boundingBoxReference",
+        bounding_box_reference: Box<BoundingBox> = "boundingBoxReference",
         /// How big it is.
-        load_dimensions: Dimensions = "loadDimensions",
+        load_dimensions: Box<Dimensions> = "loadDimensions",
         /// In kilograms.
         weight: Number = "weight",
     }

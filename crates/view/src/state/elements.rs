@@ -14,7 +14,7 @@ view! {
         /// Whether it belongs to the base.
         released: bool = "released",
         /// Where it is.
-        node_position: NodePosition = "nodePosition",
+        node_position: Box<NodePosition> = "nodePosition",
     }
 }
 
@@ -30,7 +30,7 @@ view! {
         /// Whether it belongs to the base.
         released: bool = "released",
         /// The curve that is followed.
-        trajectory: Trajectory = "trajectory",
+        trajectory: Box<Trajectory> = "trajectory",
     }
 }
 

@@ -64,9 +64,9 @@ view! {
         /// Zone sets on board.
         zone_sets: List<ZoneSetState> = later "zoneSets",
         /// The way it plans.
-        planned_path: PlannedPath = later "plannedPath",
+        planned_path: Box<PlannedPath> = later "plannedPath",
         /// The way it takes next.
-        intermediate_path: IntermediatePath = later "intermediatePath",
+        intermediate_path: Box<IntermediatePath> = later "intermediatePath",
         /// What it asks for in zones.
         zone_requests: List<ZoneRequest> = later "zoneRequests",
         /// What it asks for on edges.

@@ -48,7 +48,7 @@ view! {
         /// The set of the zone.
         zone_set_id: Text = "zoneSetId",
         /// The new way.
-        trajectory: Trajectory = "trajectory",
+        trajectory: Box<Trajectory> = "trajectory",
     }
 }
 
