@@ -9,6 +9,7 @@ use std::fmt;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
+use crate::print;
 pub use object::Object;
 pub(crate) use object::{Entry, Shape};
 pub(crate) use table::{Found, Table};
@@ -106,6 +107,7 @@ const fn same(one: &str, other: &str) -> bool {
 pub struct Names {
     /// By object.
     tables: Vec<Table>,
+    id: u64,
 }
 
 /// Why a table of names cannot be used.
@@ -156,23 +158,23 @@ impl Default for Names {
     fn default() -> Self {
         let table = |object: Object| {
             let members = object.shape().members.iter();
-            Table::new(
-                &members
-                    .map(|entry| (!entry.later).then_some(entry.wire))
-                    .collect::<Vec<_>>(),
-                object.shape(),
-            )
+            let names = members.map(|entry| (!entry.later).then_some(entry.wire));
+            Table::new(&names.collect::<Vec<_>>(), object.shape())
         };
-        Self {
-            tables: Object::ALL.into_iter().map(table).collect(),
-        }
+        Self::of(Object::ALL.into_iter().map(table).collect())
     }
 }
 
 impl Names {
+    fn of(tables: Vec<Table>) -> Self {
+        let names = Field::all().map(|field| tables[field.object as usize].name(field.index).unwrap_or_default());
+        let id = print::of_bytes(names.collect::<Vec<_>>().join("\n").as_bytes());
+        Self { tables, id }
+    }
+
     /// The default names with these changes.
     fn changed(changes: &BTreeMap<String, BTreeMap<String, Change>>) -> Result<Self, NamesError> {
-        let mut names = Self::default();
+        let mut tables = Self::default().tables;
         for (object, changes) in changes {
             let found = Object::of_name(object).ok_or_else(|| NamesError::NoObject(object.clone()))?;
             let shape = found.shape();
@@ -207,9 +209,15 @@ impl Names {
                     name: name.to_owned(),
                 });
             }
-            names.tables[found as usize] = table;
+            tables[found as usize] = table;
         }
-        Ok(names)
+        Ok(Self::of(tables))
+    }
+
+    /// A number that tells these names from others: what was read by the one is not what is read by the other.
+    #[must_use]
+    pub const fn id(&self) -> u64 {
+        self.id
     }
 
     /// What the version calls a member, with a slash where it stands inside another one; `None` when it has none.

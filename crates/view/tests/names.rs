@@ -60,6 +60,8 @@ fn a_version_has_what_2_x_has_unless_its_table_says_otherwise() {
     assert!(!names.lacks(StateView::maps));
     assert!(names.lacks(StateView::instant_action_states));
     let older = self::names("state.maps = false");
+    assert_ne!(older.id(), names.id());
+    assert_eq!(self::names("state.maps = true").id(), names.id());
     assert!(older.lacks(StateView::maps));
     let message = json!({ "maps": [], "instantActionStates": [] });
     let view = MessageView::of_value(Topic::State, &message, &older);
