@@ -12,7 +12,6 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use vda5050_tck::audit::{Audit, Options};
 use vda5050_tck::capture::{Item, Lines, Mapping, Message};
 use vda5050_tck::journal::Parsed;
-use vda5050_tck::run::Library;
 use vda5050_tck::simulate::Site;
 
 const MESSAGES: u64 = 4_000;
@@ -37,7 +36,7 @@ fn read(text: &str) -> Vec<Message> {
 }
 
 fn audit(criterion: &mut Criterion) {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let text = recording();
     let messages = read(&text);
     assert_eq!(messages.len() as u64, MESSAGES);

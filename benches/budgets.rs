@@ -18,7 +18,7 @@ use vda5050_tck::explore::{Coverage, Exploration, Grammar};
 use vda5050_tck::judge::judge;
 use vda5050_tck::link::mqtt::{BenchOptions, MqttBench};
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 
 /// What was measured.
 struct Measured {
@@ -110,7 +110,7 @@ fn start_up() -> Vec<Measured> {
 }
 
 fn virtual_suite() -> Vec<Measured> {
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let pack = library.rules.packs.latest();
     let begun = Instant::now();
     let request = VirtualRun::of_role(Role::Agv, &library, pack);
@@ -136,7 +136,7 @@ fn virtual_suite() -> Vec<Measured> {
 /// Conversations with the reference AGV: drawn, made tests, carried out and judged, on one core.
 fn exploration() -> Vec<Measured> {
     const CONVERSATIONS: usize = 100;
-    let mut library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let mut library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let pack = library.rules.packs.latest().clone();
     let grammar = Grammar::load(&library.assets, Role::Agv)
         .unwrap()

@@ -15,14 +15,13 @@ use vda5050_tck::clock::{Moment, Stamp};
 use vda5050_tck::reference::agv::Agv;
 use vda5050_tck::reference::deviations::personas::mock;
 use vda5050_tck::reference::{Device, Input, Output};
-use vda5050_tck::run::Library;
 use vda5050_tck::simulate::ReferenceAgv;
 
 const VEHICLES: usize = 1_000;
 const SECONDS: u64 = 60;
 
 fn main() {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let before = resident();
     let mut fleet: Vec<Agv> = (0..VEHICLES)

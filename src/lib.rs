@@ -11,10 +11,10 @@
 //! ```no_run
 //! use std::path::Path;
 //! use vda5050_tck::profile::{self, Surroundings};
-//! use vda5050_tck::run::{Library, Place, RunError, SocketRun};
+//! use vda5050_tck::run::{Place, RunError, SocketRun};
 //!
 //! # fn main() -> Result<(), RunError> {
-//! let library = Library::load(None)?;
+//! let library = crate::assets::library(None)?;
 //! let pack = library.rules.packs.latest();
 //! let surroundings = Surroundings::of_process();
 //! let profile = profile::load(Some(Path::new("device.toml")), &[], &surroundings)?;
@@ -28,11 +28,11 @@
 //! A built-in device in virtual time, with one of its faults:
 //!
 //! ```
-//! use vda5050_tck::run::{Library, RunError, VirtualRun, run_silently};
+//! use vda5050_tck::run::{RunError, VirtualRun, run_silently};
 //! use vda5050_tck::verdict::Verdict;
 //!
 //! # fn main() -> Result<(), RunError> {
-//! let library = Library::load(None)?;
+//! let library = crate::assets::library(None)?;
 //! let pack = library.rules.packs.latest();
 //! let mut run = VirtualRun::of(&library, pack);
 //! run.tests.retain(|test| test.id == "order-rejection/lower-update-id");
@@ -50,34 +50,31 @@
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-pub mod audit;
-pub mod bench;
-pub mod broker;
-pub mod capture;
-pub mod checks;
+mod assets;
 pub mod cli;
-pub mod clock;
-pub mod course;
-pub mod diagnostic;
-pub mod engine;
-pub mod explore;
-pub mod journal;
-pub mod judge;
-pub mod link;
-pub mod maps;
-pub mod nurbs;
-pub mod pack;
-pub mod pattern;
-pub mod profile;
-pub mod qualify;
-pub mod reference;
-pub mod report;
-pub mod result;
-pub mod run;
-pub mod simulate;
-pub mod suite;
-pub mod tap;
 pub mod ui;
-pub mod verdict;
-pub mod watch;
-pub mod yaml;
+
+pub use assets::{Own, embedded, library};
+pub use tck_audit as audit;
+pub use tck_base::{clock, diagnostic, nurbs, pattern, secrets, verdict, yaml};
+pub use tck_capture as capture;
+pub use tck_check as check;
+pub use tck_checks as checks;
+pub use tck_course as course;
+pub use tck_engine as engine;
+pub use tck_explore as explore;
+pub use tck_journal as journal;
+pub use tck_judge as judge;
+pub use tck_net::{bench, broker, link, maps, tap};
+pub use tck_pack as pack;
+pub use tck_profile as profile;
+pub use tck_qualify as qualify;
+pub use tck_reference as reference;
+pub use tck_report as report;
+pub use tck_result as result;
+pub use tck_run as run;
+pub use tck_simulate as simulate;
+pub use tck_suite as suite;
+pub use tck_view as view;
+pub use tck_watch as watch;
+pub use tck_wire as wire;

@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use vda5050_tck::diagnostic::Diagnostic;
-use vda5050_tck::pack::{Assets, Catalogue, Packs, Role};
+use vda5050_tck::pack::{Catalogue, Packs, Role};
 use vda5050_tck::suite::{CheckInfo, HookFacts, PackVocabulary, Suites};
 
 const CHECKS: [CheckInfo; 1] = [CheckInfo {
@@ -62,7 +62,7 @@ fn files(name: &str, text: &str) -> Vec<(String, String)> {
 
 #[test]
 fn every_bad_suite_yields_the_one_diagnostic_it_expects() {
-    let assets = Assets::embedded();
+    let assets = vda5050_tck::embedded();
     let packs = Packs::load(&assets).expect("packs");
     let catalogue = Catalogue::load(&assets).expect("catalogue");
     let vocabulary = PackVocabulary::new(&packs, &catalogue, &HOOKS);

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use vda5050_tck::pack::Role;
 use vda5050_tck::report::junit::Inconclusive;
-use vda5050_tck::run::{Bundle, Library, VirtualRun, run_silently, sources, write_all};
+use vda5050_tck::run::{Bundle, VirtualRun, run_silently, sources, write_all};
 
 const FILES: [&str; 6] = [
     "journal.jsonl",
@@ -25,7 +25,7 @@ const FILES: [&str; 6] = [
 ];
 
 fn make(folder: &Path) {
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let pack = library.rules.packs.latest().clone();
     let mut request = VirtualRun::of(&library, &pack);
     let wanted = [

@@ -1,12 +1,12 @@
 //! A device that floods the harness ends the run, and what was found until then stands.
 
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::{End, Library, VirtualRun, run_silently};
+use vda5050_tck::run::{End, VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 #[test]
 fn a_master_control_that_floods_its_vehicle_ends_the_run_and_is_failed() {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let mut request = VirtualRun::of_role(Role::MasterControl, &library, pack);
     request.faults = vec!["order-repeated-for-ever".to_owned()];

@@ -6,10 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Pack;
 use vda5050_tck::reference::deviations::agv::FAULTS;
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 /// The allocator of the program: a run is a million small trees.
@@ -85,7 +86,7 @@ fn is_about(result: &RunResult, test: &str, breaks: &[&str]) -> bool {
 
 #[test]
 fn every_test_that_is_not_about_a_lasting_mistake_is_decided_as_without_it() {
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{all:?}"));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{all:?}"));
     let pack = library.rules.packs.get("2.1.0").unwrap();
     let mut requests = vec![VirtualRun::of(&library, pack)];
     requests.extend(LASTING.iter().map(|fault| VirtualRun {
@@ -126,7 +127,7 @@ fn every_test_that_is_not_about_a_lasting_mistake_is_decided_as_without_it() {
 
 #[test]
 fn what_was_read_over_stands_at_the_test() {
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{all:?}"));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{all:?}"));
     let pack = library.rules.packs.get("2.1.0").unwrap();
     let request = VirtualRun {
         faults: vec!["finished-order-listed".to_owned()],

@@ -18,11 +18,12 @@ use serde::Deserialize;
 use vda5050_tck::audit::{Options, own_run};
 use vda5050_tck::capture::{Item, Mapping, Recorded};
 use vda5050_tck::journal::file::JournalWriter;
+use vda5050_tck::judge::Library;
 use vda5050_tck::judge::judge;
 use vda5050_tck::pack::Role;
 use vda5050_tck::qualify::decided;
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 use vda5050_tck::verdict::{Accumulated, Verdict};
 
 /// The allocator of the program: a run is a million small trees.
@@ -92,7 +93,7 @@ fn differences(result: &RunResult, expected: &Expected) -> String {
 
 #[test]
 fn journals_are_judged_as_they_always_were() {
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/journals");
     let mut cases: Vec<_> = std::fs::read_dir(&folder)
         .expect("fixtures/journals")
@@ -126,7 +127,7 @@ fn journals_are_judged_as_they_always_were() {
 
 #[test]
 fn a_journal_without_its_end_gives_no_better_verdict() {
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let kept = std::fs::read_dir(root.join("fixtures/journals")).expect("fixtures/journals");
     let mut all: Vec<_> = kept.map(|entry| entry.expect("a folder").path()).collect();
@@ -181,7 +182,7 @@ fn of_audit(library: &Library, journal: &Path) -> Found {
 
 #[test]
 fn the_journal_of_a_run_is_audited_like_the_run_was_judged() {
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let kept = std::fs::read_dir(root.join("fixtures/journals")).expect("fixtures/journals");
     let mut journals: Vec<PathBuf> = kept.map(|entry| entry.expect("a folder").path()).collect();

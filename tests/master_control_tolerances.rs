@@ -11,11 +11,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use vda5050_tck::judge::Library;
 use vda5050_tck::pack::{Pack, Role};
 use vda5050_tck::qualify::decided;
 use vda5050_tck::reference::deviations::master_control::TOLERANCES;
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 /// The allocator of the program: a run is a million small trees.
@@ -72,7 +73,7 @@ fn blemishes(result: &RunResult) -> Result<Vec<String>, String> {
 
 /// Runs with each of these sets of tolerances. Nothing may fail; gives what was not a pass.
 fn accused(sets: &[Vec<&str>]) -> String {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let requests: Vec<VirtualRun> = sets.iter().map(|set| with(&library, pack, set)).collect();
     let mut worse = String::new();
@@ -156,7 +157,7 @@ fn with_fifty_seeds_the_verdicts_are_the_same() {
 }
 
 fn same_verdicts(seeds: std::ops::Range<u64>) {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let requests: Vec<VirtualRun> = seeds
         .map(|seed| {

@@ -77,7 +77,7 @@ fn is_read(path: &str, code: &str, suites: &str) -> bool {
 #[test]
 fn every_setting_is_read_by_somebody() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let code = text_below(&root.join("src"), ".rs", "/profile");
+    let code = text_below(&root.join("src"), ".rs", "/profile") + &text_below(&root.join("crates"), ".rs", "/profile");
     let suites = text_below(&root.join("suites"), ".yaml", "/requirements");
     let ignored: Vec<&str> = KEYS
         .iter()

@@ -8,16 +8,17 @@
 
 use std::sync::Arc;
 
+use vda5050_tck::judge::Library;
 use vda5050_tck::judge::judge;
 use vda5050_tck::report::json;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 
 /// The allocator of the program: a run is a million small trees.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn library() -> Library {
-    Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]))
+    vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]))
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use vda5050_tck::checks;
-use vda5050_tck::pack::{Assets, Catalogue, Packs, Role};
+use vda5050_tck::pack::{Catalogue, Packs, Role};
 use vda5050_tck::suite::{CheckInfo, HookFacts, Suites};
 
 /// The hooks these suites use, with their parameters.
@@ -42,10 +42,10 @@ const HOOKS: &[(&str, &[&str])] = &[
 ];
 
 fn load() -> (Suites, Catalogue) {
-    let assets = Assets::embedded();
+    let assets = vda5050_tck::embedded();
     let packs = Packs::load(&assets).expect("packs");
     let catalogue = Catalogue::load(&assets).expect("catalogue");
-    let known: Vec<CheckInfo> = checks::registry()
+    let known: Vec<CheckInfo> = checks::REGISTRY
         .iter()
         .map(|check| CheckInfo {
             name: check.name,
@@ -92,7 +92,7 @@ fn every_suite_loads_without_a_complaint() {
 #[test]
 fn every_named_check_has_a_monitor_or_a_test() {
     let (suites, _) = load();
-    for check in checks::registry() {
+    for check in checks::REGISTRY {
         let named = format!("check: {}", check.name);
         let runs = |text: &str| text.split(&named).skip(1).any(|rest| rest.starts_with(['\n', ' ']));
         assert!(

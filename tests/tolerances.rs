@@ -8,12 +8,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Pack;
 use vda5050_tck::qualify::{Decider, decided};
 use vda5050_tck::reference::Fault;
 use vda5050_tck::reference::deviations::agv::{FAULTS, TOLERANCES};
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 use vda5050_tck::verdict::Verdict;
 
 /// The allocator of the program: a run is a million small trees.
@@ -158,7 +159,7 @@ fn follows(result: &RunResult, id: &str, holds: &impl Fn(&str) -> bool) -> bool 
 
 /// Runs with each of these sets of tolerances; gives the warnings. Nothing may be worse.
 fn warnings(sets: &[Vec<&str>], wanted: Wanted) -> String {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let requests = sets.iter().map(|set| with(&library, pack, set)).collect();
     let mut worse = String::new();
@@ -247,7 +248,7 @@ fn liberties_that_meet_in_time_accuse_nobody() {
 /// What a vehicle reports of its own hides no wrong refusal.
 #[test]
 fn a_warning_that_comes_and_goes_hides_no_fault() {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let faults = FAULTS
         .iter()
@@ -317,7 +318,7 @@ fn with_fifty_seeds_the_verdicts_are_the_same() {
 }
 
 fn same_verdicts(seeds: std::ops::Range<u64>) {
-    let library = Library::load(None).unwrap();
+    let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let requests = seeds
         .map(|seed| {

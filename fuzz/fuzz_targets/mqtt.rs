@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use vda5050_tck::tap::wire::Reader;
+use vda5050_tck::wire::Reader;
 
 fuzz_target!(|input: (u8, Vec<Vec<u8>>)| {
     let (level, parts) = input;

@@ -7,9 +7,9 @@ use std::sync::LazyLock;
 use libfuzzer_sys::fuzz_target;
 use vda5050_tck::audit::{Audit, Options};
 use vda5050_tck::capture::{Item, Lines, Mapping};
-use vda5050_tck::run::Library;
+use vda5050_tck::judge::Library;
 
-static LIBRARY: LazyLock<Library> = LazyLock::new(|| Library::load(None).expect("library"));
+static LIBRARY: LazyLock<Library> = LazyLock::new(|| vda5050_tck::library(None).expect("library"));
 
 fuzz_target!(|file: &[u8]| {
     let mut audit = Audit::new(&LIBRARY.rules, Options::default()).expect("options");

@@ -4,9 +4,9 @@
 use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
-use vda5050_tck::run::Library;
+use vda5050_tck::judge::Library;
 
-static LIBRARY: LazyLock<Library> = LazyLock::new(|| Library::load(None).expect("library"));
+static LIBRARY: LazyLock<Library> = LazyLock::new(|| vda5050_tck::library(None).expect("library"));
 
 fuzz_target!(|text: &str| {
     if let Err(problems) = LIBRARY.check_suite("suite.yaml", text) {

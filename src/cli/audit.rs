@@ -6,20 +6,20 @@ use super::args::Audit as Arguments;
 use super::exit::Exit;
 use super::problem::Problem;
 use super::recordings::{broken, in_time, open, show};
-use crate::audit::crew::{self, Crew};
-use crate::audit::export::Export;
-use crate::audit::result::{Recording, VehicleResult, verdict_of};
-use crate::audit::{AuditError, Options, bundle, own_run};
-use crate::capture::merge::Merged;
-use crate::capture::{CaptureError, Item, Message, Told};
-use crate::diagnostic::Diagnostic;
-use crate::journal::Record;
-use crate::journal::event::Event;
-use crate::run::Library;
+use tck_audit::crew::{self, Crew};
+use tck_audit::export::Export;
+use tck_audit::result::{Recording, VehicleResult, verdict_of};
+use tck_audit::{AuditError, Options, bundle, own_run};
+use tck_base::diagnostic::Diagnostic;
+use tck_capture::merge::Merged;
+use tck_capture::{CaptureError, Item, Message, Told};
+use tck_journal::Record;
+use tck_journal::event::Event;
+use tck_judge::Library;
 
 /// `audit`.
 pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let options = Options {
         topic_template: arguments.topic_template.clone(),
         vehicles: arguments.vehicle.clone(),

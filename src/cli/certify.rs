@@ -3,10 +3,10 @@
 use super::args;
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::pack::Role;
-use crate::profile::{self, Effective, Surroundings};
-use crate::report::certificate::OWED;
+use tck_base::diagnostic::Diagnostic;
+use tck_pack::Role;
+use tck_profile::{self as profile, Effective, Surroundings};
+use tck_report::certificate::OWED;
 
 /// Names a folder of suites for other commands.
 const OWN_SUITES: &str = "VDA5050_TCK_SUITES";

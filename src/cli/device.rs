@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::pack::{Pack, Role};
-use crate::profile::Effective;
-use crate::run::Library;
-use crate::simulate::BuiltIn;
+use tck_base::diagnostic::Diagnostic;
+use tck_judge::Library;
+use tck_pack::{Pack, Role};
+use tck_profile::Effective;
+use tck_simulate::BuiltIn;
 
 /// The protocol version the device is judged by.
 pub(super) fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Problem> {
@@ -28,7 +28,7 @@ pub(super) fn check_faults(role: Role, faults: &[String]) -> Result<(), Problem>
     let known = BuiltIn::faults(role);
     for fault in faults {
         if !known.iter().any(|known| known.name == fault) {
-            let hint = match crate::diagnostic::closest(fault, known.iter().map(|known| known.name)) {
+            let hint = match tck_base::diagnostic::closest(fault, known.iter().map(|known| known.name)) {
                 Some(close) => format!("did you mean `{close}`?"),
                 None => "`vda5050-tck list faults` shows them all".to_owned(),
             };
@@ -56,11 +56,11 @@ pub(super) fn tolerate(device: &mut BuiltIn, tolerances: &[String]) -> Result<()
     for name in tolerances {
         let role = device.role();
         device.tolerate(name).map_err(|unknown| {
-            let hint = match crate::diagnostic::closest(name, BuiltIn::tolerances(role).iter().map(|known| known.name))
-            {
-                Some(close) => format!("did you mean `{close}`?"),
-                None => "`vda5050-tck list tolerances` shows them all".to_owned(),
-            };
+            let hint =
+                match tck_base::diagnostic::closest(name, BuiltIn::tolerances(role).iter().map(|known| known.name)) {
+                    Some(close) => format!("did you mean `{close}`?"),
+                    None => "`vda5050-tck list tolerances` shows them all".to_owned(),
+                };
             Diagnostic::whole("unknown-tolerance", unknown.to_string()).hint(hint)
         })?;
     }

@@ -9,16 +9,16 @@ use serde_json::json;
 use super::args::{BrokerArgs, Discover, Format, Init, ListenArgs};
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::bench::endpoint::{Credentials, Endpoint};
-use crate::diagnostic::Diagnostic;
-use crate::pack::Assets;
-use crate::profile;
-use crate::run::{Device, Heard, Library, Wishes, draft, listen};
 use crate::ui::escaped;
+use tck_base::diagnostic::Diagnostic;
+use tck_judge::Library;
+use tck_net::bench::endpoint::{Credentials, Endpoint};
+use tck_profile as profile;
+use tck_run::{Device, Heard, Wishes, draft, listen};
 
 /// `discover`.
 pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
-    let library = Library::load(None)?;
+    let library = crate::assets::library(None)?;
     let heard = hear(&arguments.listen, &library)?;
     let devices = heard.devices();
     match arguments.format {
@@ -51,7 +51,7 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
             .hint("give another name with --file, or write over it with --force")
             .into());
     }
-    let library = Library::load(None)?;
+    let library = crate::assets::library(None)?;
     let heard = hear(&arguments.listen, &library)?;
     let is_meant = |device: &&Device| {
         let same = |wanted: &Option<String>, own: &str| wanted.as_deref().is_none_or(|wanted| wanted == own);
@@ -101,7 +101,7 @@ fn export(folder: &Path, format: Format) -> Result<Exit, Problem> {
             .hint("give a folder that is not there yet")
             .into());
     }
-    let assets = Assets::embedded();
+    let assets = crate::assets::embedded();
     let files = assets.under("").map(|file| {
         let inside = file.path.strip_prefix("suites/").unwrap_or(&file.path);
         (inside.to_owned(), file.text.as_str())
@@ -129,7 +129,7 @@ fn export(folder: &Path, format: Format) -> Result<Exit, Problem> {
 pub(super) fn endpoint(arguments: &BrokerArgs) -> Result<Endpoint, Problem> {
     let credentials = arguments.username.clone().map(|username| Credentials {
         username,
-        password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
+        password: std::env::var(tck_profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
     Endpoint::parse(&arguments.broker, arguments.tls_ca.as_deref(), credentials).map_err(|error| {
         Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))

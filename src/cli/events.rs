@@ -8,13 +8,13 @@ use serde_json::{Map, Value, json};
 
 use super::problem::Problem;
 use super::screen::Screen;
-use crate::engine::Watcher;
-use crate::journal::event::{Gate, Plan};
-use crate::link::mqtt::BenchInfo;
-use crate::result::{RunResult, TestResult};
-use crate::run;
-use crate::suite::model::{Step, Test};
 use crate::ui::Output;
+use tck_engine::Watcher;
+use tck_journal::event::{Gate, Plan};
+use tck_net::link::mqtt::BenchInfo;
+use tck_result::{RunResult, TestResult};
+use tck_run as run;
+use tck_suite::model::{Step, Test};
 
 /// Format of the stream.
 pub const FORMAT: &str = "vda5050-tck.events/1";
@@ -75,7 +75,7 @@ impl Followed {
         for requirement in &result.requirements {
             if let Some(verdict) = requirement
                 .verdict
-                .filter(|verdict| *verdict != crate::verdict::Verdict::Pass)
+                .filter(|verdict| *verdict != tck_base::verdict::Verdict::Pass)
             {
                 self.tell(
                     "requirement",
@@ -85,8 +85,8 @@ impl Followed {
         }
         self.tell(
             "run-ended",
-            json!({ "verdict": result.verdict.map_or("none", crate::verdict::Verdict::word),
-                "statement": crate::report::statement::statement(result), "partial": result.partial,
+            json!({ "verdict": result.verdict.map_or("none", tck_base::verdict::Verdict::word),
+                "statement": tck_report::statement::statement(result), "partial": result.partial,
                 "reason": result.partial_reason, "seconds": result.seconds, "root": root.map(|root| format!("sha256:{root}")),
                 "exit": exit }),
         );
@@ -145,7 +145,7 @@ impl run::Progress for Followed {
                 "place": decision.place, "message": decision.message, "witness": decision.witness })
         });
         let decisions: Vec<Value> = decisions.collect();
-        let verdict = result.verdict.unwrap_or(crate::verdict::Verdict::Error);
+        let verdict = result.verdict.unwrap_or(tck_base::verdict::Verdict::Error);
         let members = json!({ "test": result.id, "verdict": verdict, "seconds": result.seconds,
             "reason": result.reason, "decisions": decisions,
             "repetition": result.repetitions.last().map(|repetition| repetition.number) });

@@ -1,6 +1,6 @@
 //! Exit codes, and which one a verdict means.
 
-use crate::verdict::Verdict;
+use tck_base::verdict::Verdict;
 
 /// What the process says to the script that started it. A code never means two things.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -2,13 +2,13 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::checks;
-use crate::pack::{Pack, Requirement, Role};
-use crate::profile::{HOOKS, SAMPLE_ACTIONS, STATEMENTS};
-use crate::reference::Fault;
-use crate::run::Library;
-use crate::simulate::BuiltIn;
-use crate::suite::model::{Monitor, Rule, Test};
+use tck_checks as checks;
+use tck_judge::Library;
+use tck_pack::{Pack, Requirement, Role};
+use tck_profile::{HOOKS, SAMPLE_ACTIONS, STATEMENTS};
+use tck_reference::Fault;
+use tck_simulate::BuiltIn;
+use tck_suite::model::{Monitor, Rule, Test};
 
 /// Everything that has this name.
 pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
@@ -25,7 +25,7 @@ pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
     }
     let monitors = suites.monitors.iter().filter(|monitor| monitor.id == id);
     found.extend(monitors.map(|known| monitor(known)));
-    if let Some(check) = checks::find(id) {
+    if let Some(check) = tck_check::find(checks::REGISTRY, id) {
         found.push(json!({ "kind": "check", "id": id, "doc": check.doc, "decides": check.decides }));
     }
     for hook in HOOKS.iter().filter(|hook| hook.name == id) {
@@ -86,7 +86,7 @@ fn requirement(known: &Requirement, library: &Library, pack: &Pack) -> Value {
 }
 
 fn test(known: &Test, cases: usize) -> Value {
-    let steps = known.steps.iter().flat_map(crate::suite::model::Step::clauses);
+    let steps = known.steps.iter().flat_map(tck_suite::model::Step::clauses);
     let decides: Vec<Value> = steps
         .map(|(requirement, clause)| json!({ "requirement": requirement, "clause": clause }))
         .collect();

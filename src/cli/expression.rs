@@ -14,9 +14,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::select::matches;
-use crate::diagnostic::{self, Diagnostic, Source, Span};
-use crate::report::sources::Sources;
-use crate::suite::model::Test;
+use tck_base::diagnostic::{self, Diagnostic, Source, Span};
+use tck_report::sources::Sources;
+use tck_suite::model::Test;
 
 /// What is asked of a test.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -7,16 +7,16 @@ use super::args::{Audit as Arguments, Format};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::recordings::{broken, in_time, mapping, show};
-use crate::audit::Options;
-use crate::audit::result::Recording;
-use crate::capture::merge::Merged;
-use crate::capture::{Recorded, Told};
-use crate::clock::WallClock;
-use crate::diagnostic::Diagnostic;
-use crate::run::Library;
 use crate::ui::{LineOptions, Lines};
-use crate::watch::Watch;
-use crate::watch::session::Viewer as _;
+use tck_audit::Options;
+use tck_audit::result::Recording;
+use tck_base::clock::WallClock;
+use tck_base::diagnostic::Diagnostic;
+use tck_capture::merge::Merged;
+use tck_capture::{Recorded, Told};
+use tck_judge::Library;
+use tck_watch::Watch;
+use tck_watch::session::Viewer as _;
 
 /// Judges until it is interrupted.
 pub fn follow(arguments: &Arguments, library: &Library, options: Options) -> Result<Exit, Problem> {
@@ -29,7 +29,7 @@ pub fn follow(arguments: &Arguments, library: &Library, options: Options) -> Res
     let mut watch = Watch::new(&library.rules, options)?;
     let mut lines = Lines::of_process(LineOptions {
         json: arguments.format == Format::Json,
-        color: super::color() == crate::report::text::Color::Always,
+        color: super::color() == tck_report::text::Color::Always,
         ..LineOptions::default()
     });
     let clock = WallClock::start();

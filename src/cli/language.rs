@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::checks;
-use crate::pack::Pack;
-use crate::profile::{HOOKS, VEHICLE_WORDS};
-use crate::run::Library;
-use crate::suite::{harness_topics, variables};
+use tck_checks as checks;
+use tck_judge::Library;
+use tck_pack::Pack;
+use tck_profile::{HOOKS, VEHICLE_WORDS};
+use tck_suite::{harness_topics, variables};
 
 /// Parts of the schema that are no part of the language: they stand for it, or are filled in.
 const NOT_SHOWN: [&str; 6] = ["filled", "step", "steps", "test", "state", "monitor"];
@@ -158,7 +158,7 @@ fn sections(library: &Library) -> Result<Vec<Section>, String> {
         name: String::new(),
         doc: "What a pattern cannot say. `check:` names one; `with:` hands over its arguments.".to_owned(),
         columns: ["Check", "Arguments", "What it holds"],
-        rows: checks::registry()
+        rows: checks::REGISTRY
             .iter()
             .map(|check| {
                 let doc = format!("{} Can decide {}.", check.doc, check.decides.join(", "));

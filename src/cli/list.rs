@@ -8,16 +8,17 @@ use serde_json::json;
 use super::args::{Explain, Format, List, Listing};
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::checks;
-use crate::diagnostic::{self, Diagnostic};
-use crate::pack::{Pack, Requirement, Role};
-use crate::profile::{HOOKS, VEHICLE_WORDS};
-use crate::reference::Fault;
-use crate::report::coverage;
-use crate::run::{Library, sources};
-use crate::simulate::BuiltIn;
-use crate::suite::model::{Monitor, Rule, Test, Verb};
 use crate::ui::{self, Output};
+use tck_base::diagnostic::{self, Diagnostic};
+use tck_checks as checks;
+use tck_judge::Library;
+use tck_pack::{Pack, Requirement, Role};
+use tck_profile::{HOOKS, VEHICLE_WORDS};
+use tck_reference::Fault;
+use tck_report::coverage;
+use tck_run::sources;
+use tck_simulate::BuiltIn;
+use tck_suite::model::{Monitor, Rule, Test, Verb};
 
 /// `list`.
 pub fn list(arguments: &List) -> Result<Exit, Problem> {
@@ -30,7 +31,7 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
     if arguments.page && !matches!(arguments.what, Listing::Requirements | Listing::Language) {
         return Err(Diagnostic::whole("usage", "`--page` is about `list requirements` and `list language`").into());
     }
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
     let roles: Vec<Role> = arguments
         .role
@@ -53,7 +54,7 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         (Listing::Requirements, Format::Text) if arguments.page => {
             let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
             let meant = |role: &str| arguments.role.is_none_or(|wanted| role == wanted.word() || role == "both");
-            crate::report::markdown::requirements(&quoted, &pack.version.to_string(), meant)
+            tck_report::markdown::requirements(&quoted, &pack.version.to_string(), meant)
         }
         (Listing::Requirements, Format::Text) => requirements(&library, &pack, &roles),
         (Listing::Requirements, Format::Json) => lines(of_roles(&library, &pack, &roles).map(|requirement| {
@@ -259,7 +260,7 @@ fn monitors(library: &Library, pack: &Pack, roles: &[Role]) -> String {
 
 /// `explain`.
 pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
     let id = arguments.id.as_str();
     let suites = &library.rules.suites;
@@ -275,7 +276,7 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
     if let Some(monitor) = suites.monitors.iter().find(|monitor| monitor.id == id) {
         text.push_str(&about_monitor(monitor));
     }
-    if let Some(check) = checks::find(id) {
+    if let Some(check) = tck_check::find(checks::REGISTRY, id) {
         let _ = writeln!(
             text,
             "check {id}\n\n{}\n\ncan decide {}",
@@ -315,7 +316,7 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             .map(|requirement| requirement.id.as_str())
             .chain(suites.tests.iter().map(|test| test.id.as_str()))
             .chain(suites.monitors.iter().map(|monitor| monitor.id.as_str()))
-            .chain(checks::registry().iter().map(|check| check.name))
+            .chain(checks::REGISTRY.iter().map(|check| check.name))
             .chain(HOOKS.iter().map(|hook| hook.name))
             .chain(all_faults().map(|fault| fault.name))
             .chain(super::explained::settings().map(|(name, _)| name))
@@ -455,7 +456,7 @@ fn about_monitor(monitor: &Monitor) -> String {
     let _ = writeln!(text, "file           {}", monitor.source.name);
     let _ = writeln!(text, "decides        {}", decides.join(", "));
     if let Rule::Check(check) = &monitor.rule
-        && let Some(definition) = checks::find(&check.name)
+        && let Some(definition) = tck_check::find(checks::REGISTRY, &check.name)
     {
         let _ = writeln!(text, "check          {}: {}", check.name, definition.doc);
     }

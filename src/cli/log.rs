@@ -9,7 +9,7 @@ use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::{EnvFilter, fmt};
 
 use super::problem::Problem;
-use crate::profile::Secrets;
+use tck_profile::Secrets;
 
 /// What is logged unless said: everything of this program, and what goes wrong elsewhere.
 const USUAL: &str = "warn,vda5050_tck=debug";

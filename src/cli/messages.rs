@@ -9,15 +9,15 @@ use serde_json::{Value, json};
 use super::args::{Format, Validate};
 use super::pieces::{Content, Form, Pieces};
 use super::problem::Problem;
-use crate::audit::{Flaw, single};
-use crate::diagnostic::{Diagnostic, closest};
-use crate::journal::event::PAYLOAD_LIMIT;
-use crate::journal::json::{JsonProblem, Parsed};
-use crate::journal::place;
-use crate::pack::Pack;
-use crate::report::clean::{line, short};
-use crate::run::Library;
-use crate::verdict::Verdict;
+use tck_audit::{Flaw, single};
+use tck_base::diagnostic::{Diagnostic, closest};
+use tck_base::verdict::Verdict;
+use tck_journal::event::PAYLOAD_LIMIT;
+use tck_journal::json::{JsonProblem, Parsed};
+use tck_journal::place;
+use tck_judge::Library;
+use tck_pack::Pack;
+use tck_report::clean::{line, short};
 
 /// What was counted in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -351,5 +351,5 @@ pub fn topic_of(value: &Value) -> Option<&'static str> {
 fn unknown_topic(topic: &str, pack: &Pack) -> Diagnostic {
     let names: Vec<&str> = pack.topics().iter().map(|rule| rule.name.as_str()).collect();
     let diagnostic = Diagnostic::whole("unknown-topic", format!("there is no topic `{topic}`"));
-    diagnostic.hint(crate::diagnostic::did_you_mean(topic, names.iter().copied()))
+    diagnostic.hint(tck_base::diagnostic::did_you_mean(topic, names.iter().copied()))
 }

@@ -40,13 +40,13 @@ use std::sync::Arc;
 
 use clap::Parser as _;
 
-use crate::diagnostic::Diagnostic;
-use crate::pack::{Pack, Packs};
-use crate::report::text::Color;
-use crate::run::Library;
 use args::{Cli, Command, Format};
 use list::print;
 use problem::Problem;
+use tck_base::diagnostic::Diagnostic;
+use tck_judge::Library;
+use tck_pack::{Pack, Packs};
+use tck_report::text::Color;
 
 /// The program.
 #[must_use]

@@ -5,19 +5,20 @@ use std::path::Path;
 use super::args::{InconclusiveArg, Rendering};
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::journal::file::{self, Recording};
-use crate::judge;
-use crate::report::attestation::Attestation;
-use crate::report::certificate::{self, CertificateError};
-use crate::report::junit::{self, Flavour};
-use crate::report::{issues, json, manifest, markdown};
-use crate::result::RunResult;
-use crate::run::{Library, sources};
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::file::{self, Recording};
+use tck_judge as judge;
+use tck_judge::Library;
+use tck_report::attestation::Attestation;
+use tck_report::certificate::{self, CertificateError};
+use tck_report::junit::{self, Flavour};
+use tck_report::{issues, json, manifest, markdown};
+use tck_result::RunResult;
+use tck_run::sources;
 
 /// Prints the certificate of a run as HTML.
 pub fn certificate(folder: &Path) -> Result<Exit, Problem> {
-    let library = Library::load(None)?;
+    let library = crate::assets::library(None)?;
     let (result, root) = intact(folder, &library)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
@@ -34,7 +35,7 @@ pub fn certificate(folder: &Path) -> Result<Exit, Problem> {
 
 /// Prints an in-toto statement about the bundle of a run.
 pub fn attestation(folder: &Path) -> Result<Exit, Problem> {
-    let library = Library::load(None)?;
+    let library = crate::assets::library(None)?;
     let (result, root) = intact(folder, &library)?;
     let path = folder.join(manifest::NAME);
     let bytes = std::fs::read(&path)
@@ -45,7 +46,7 @@ pub fn attestation(folder: &Path) -> Result<Exit, Problem> {
 
 /// Prints a run for a pipeline.
 pub fn rendered(folder: &Path, rendering: Rendering, inconclusive: InconclusiveArg) -> Result<Exit, Problem> {
-    let library = Library::load(None)?;
+    let library = crate::assets::library(None)?;
     let (result, root) = intact(folder, &library)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);

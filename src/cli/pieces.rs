@@ -3,7 +3,7 @@
 
 use std::io::{self, BufRead};
 
-use crate::journal::event::PAYLOAD_LIMIT;
+use tck_journal::event::PAYLOAD_LIMIT;
 
 /// How messages stand in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use std::io::Write as _;
 
-use crate::report::markdown;
-use crate::report::sources::Sources;
-use crate::result::RunResult;
+use tck_report::markdown;
+use tck_report::sources::Sources;
+use tck_result::RunResult;
 
 /// Names the file of the summary page of a step, on GitHub.
 const SUMMARY: &str = "GITHUB_STEP_SUMMARY";

@@ -7,12 +7,13 @@ use serde_json::json;
 use super::args::Format;
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::profile::{Effective, Surroundings};
-use crate::report::advice::advice;
-use crate::report::statement::many;
-use crate::run::{How, Library, Place, RunPlan, SocketRun, Waits};
 use crate::ui::escaped;
+use tck_base::diagnostic::Diagnostic;
+use tck_judge::Library;
+use tck_profile::{Effective, Surroundings};
+use tck_report::advice::advice;
+use tck_report::statement::many;
+use tck_run::{How, Place, RunPlan, SocketRun, Waits};
 
 /// How many tests of a reason are named.
 const NAMED: usize = 3;

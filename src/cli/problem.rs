@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::diagnostic::{Diagnostic, Span};
+use tck_base::diagnostic::{Diagnostic, Span};
 
 use super::exit::Exit;
 

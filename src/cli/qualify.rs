@@ -6,15 +6,14 @@ use super::args::{Format, Qualify};
 use super::device::check_faults;
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::pack::Role;
-use crate::qualify::{Depth, Qualification};
-use crate::reference::Fault;
-use crate::run::Library;
-use crate::simulate::BuiltIn;
+use tck_pack::Role;
+use tck_qualify::{Depth, Qualification};
+use tck_reference::Fault;
+use tck_simulate::BuiltIn;
 
 /// `qualify`.
 pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let roles: Vec<Role> = match arguments.role {
         Some(role) => vec![role],
         None => vec![Role::Agv, Role::MasterControl],
@@ -59,9 +58,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         let library = &library;
         let running: Vec<_> = jobs
             .iter()
-            .map(|(_, pack, tests, faults)| {
-                scope.spawn(|| crate::qualify::qualify(library, pack, tests, faults, depth))
-            })
+            .map(|(_, pack, tests, faults)| scope.spawn(|| tck_qualify::qualify(library, pack, tests, faults, depth)))
             .collect();
         running
             .into_iter()

@@ -5,10 +5,10 @@ use std::path::Path;
 use super::args::{Audit as Arguments, Format};
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::audit::page;
-use crate::audit::result::AuditResult;
-use crate::capture::{CaptureError, Mapping, Recorded};
-use crate::diagnostic::Diagnostic;
+use tck_audit::page;
+use tck_audit::result::AuditResult;
+use tck_base::diagnostic::Diagnostic;
+use tck_capture::{CaptureError, Mapping, Recorded};
 
 /// Prints the result.
 pub(super) fn show(result: &AuditResult, format: Format) -> Result<Exit, Problem> {

@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 use super::args::{Format, Report};
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::journal::file::{self, NAME, PACKED, Recording};
-use crate::judge;
-use crate::report::{compare, json as result_file, manifest, overview, side_by_side};
-use crate::result::RunResult;
-use crate::run::{Bundle, Library, sources, write_all};
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::file::{self, NAME, PACKED, Recording};
+use tck_judge as judge;
+use tck_report::{compare, json as result_file, manifest, overview, side_by_side};
+use tck_result::RunResult;
+use tck_run::{Bundle, sources, write_all};
 
 /// `report`.
 pub fn report(arguments: &Report) -> Result<Exit, Problem> {
@@ -34,7 +34,7 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     if arguments.attestation {
         return super::papers::attestation(folder);
     }
-    let mut library = Library::load(arguments.suites.own())?;
+    let mut library = crate::assets::library(arguments.suites.own())?;
     library.add(&own_tests(folder)?)?;
     let path = file::find(folder);
     let Recording { journal, torn } = file::read(&path).map_err(|error| {
@@ -199,7 +199,7 @@ fn compare_runs(arguments: &Report, folders: &[PathBuf]) -> Result<Exit, Problem
     let steps = runs.windows(2).map(|pair| compare::compare(&pair[0], &pair[1]));
     let steps: Vec<compare::Comparison> = steps.collect();
     if arguments.page {
-        let library = Library::load(arguments.suites.own())?;
+        let library = crate::assets::library(arguments.suites.own())?;
         let pack = super::pack(&library, runs.last().map(|run| run.protocol.as_str()))?;
         let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
         let page = side_by_side::render(&runs, &names, &quoted);

@@ -19,22 +19,22 @@ use super::exit::Exit;
 use super::problem::Problem;
 use super::screen::{Screen, Show};
 use super::signals::Signals;
-use crate::bench::Vantage;
-use crate::clock::WallClock;
-use crate::diagnostic::Diagnostic;
-use crate::journal::file::JournalWriter;
-use crate::judge::RunJudge;
-use crate::link::mqtt::BrokerChoice;
-use crate::pack::Participant;
-use crate::pack::{Pack, Role};
-use crate::profile::{self, Effective, Surroundings};
-use crate::report::statement::many;
-use crate::run::{
-    Bundle, Library, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
-    write_result,
-};
-use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 use crate::ui::{Desk, put_terminal_back};
+use tck_base::clock::WallClock;
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::Vantage;
+use tck_journal::file::JournalWriter;
+use tck_judge::Library;
+use tck_judge::RunJudge;
+use tck_net::link::mqtt::BrokerChoice;
+use tck_pack::Participant;
+use tck_pack::{Pack, Role};
+use tck_profile::{self as profile, Effective, Surroundings};
+use tck_report::statement::many;
+use tck_run::{
+    Bundle, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually, write_result,
+};
+use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
 /// What `run` and `certify` have in common.
 struct Job {
@@ -60,7 +60,7 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         &[arguments.device.settings(), arguments.said.clone()].concat(),
         &surroundings,
     )?;
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     let all = library.tests(role, &pack.id);
@@ -107,13 +107,13 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
     let altered = !arguments.fault.is_empty()
         || !arguments.tolerance.is_empty()
-        || arguments.vehicle.0 != crate::simulate::Vehicle::default();
+        || arguments.vehicle.0 != tck_simulate::Vehicle::default();
     if !built_in && altered {
         let title = "`--fault`, `--tolerance` and `--vehicle` are for the built-in device, and another device is tested \
                      here";
         return Err(Diagnostic::whole("usage", title).into());
     }
-    if role == Role::MasterControl && arguments.vehicle.0 != crate::simulate::Vehicle::default() {
+    if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
     }

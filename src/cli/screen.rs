@@ -3,14 +3,14 @@
 use std::io;
 use std::time::Duration;
 
-use crate::engine::Watcher;
-use crate::journal::event::{Gate, Plan};
-use crate::link::mqtt::BenchInfo;
-use crate::result::TestResult;
-use crate::run;
-use crate::suite::model::{Step, Test, Verb};
 use crate::ui::{Desk, Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};
-use crate::verdict::{Outcome, Verdict};
+use tck_base::verdict::{Outcome, Verdict};
+use tck_engine::Watcher;
+use tck_journal::event::{Gate, Plan};
+use tck_net::link::mqtt::BenchInfo;
+use tck_result::TestResult;
+use tck_run as run;
+use tck_suite::model::{Step, Test, Verb};
 
 /// The progress of a run, for a person.
 pub struct Screen {

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::diagnostic::{self, Diagnostic};
-use crate::suite::model::Test;
+use tck_base::diagnostic::{self, Diagnostic};
+use tck_suite::model::Test;
 
 /// The tests that one of the patterns matches, in their order; all when there is no pattern.
 ///

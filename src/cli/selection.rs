@@ -7,13 +7,14 @@ use std::sync::Arc;
 use super::args::SelectionArgs;
 use super::problem::Problem;
 use super::select::{matches, select};
-use crate::diagnostic::{self, Diagnostic};
-use crate::pack::Pack;
-use crate::report::json;
-use crate::report::sources::Sources;
-use crate::run::{LATEST, Library, sources};
-use crate::suite::model::Test;
-use crate::verdict::Verdict;
+use tck_base::diagnostic::{self, Diagnostic};
+use tck_base::verdict::Verdict;
+use tck_judge::Library;
+use tck_pack::Pack;
+use tck_report::json;
+use tck_report::sources::Sources;
+use tck_run::{LATEST, sources};
+use tck_suite::model::Test;
 
 /// The tests that patterns and flags select of all, in their order.
 pub(super) fn selected(

@@ -11,13 +11,13 @@ use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::signals::Signals;
-use crate::bench::endpoint::{Credentials, Endpoint};
-use crate::clock::WallClock;
-use crate::course::Layout;
-use crate::diagnostic::{Diagnostic, Source};
-use crate::pack::{Assets, Pack, Packs, Role};
-use crate::simulate::driver::RunningDevice;
-use crate::simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl, Site};
+use tck_base::clock::WallClock;
+use tck_base::diagnostic::{Diagnostic, Source};
+use tck_course::Layout;
+use tck_net::bench::endpoint::{Credentials, Endpoint};
+use tck_pack::{Pack, Packs, Role};
+use tck_simulate::driver::RunningDevice;
+use tck_simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl, Site};
 
 /// `simulate`.
 pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
@@ -26,7 +26,7 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         Simulated::MasterControl(device) => &device.connection,
         Simulated::Site(recording) => return site(recording),
     };
-    let packs = Packs::load(&Assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
+    let packs = Packs::load(&crate::assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
     let pack = super::pack_among(&packs, connection.protocol.as_deref())?;
     let endpoint = endpoint(connection)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -78,7 +78,7 @@ fn site(arguments: &SimulatedSite) -> Result<Exit, Problem> {
 fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint, Problem> {
     let credentials = connection.username.clone().map(|username| Credentials {
         username,
-        password: std::env::var(crate::profile::PASSWORD_VARIABLE).unwrap_or_default(),
+        password: std::env::var(tck_profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
     Endpoint::parse(&connection.broker, connection.tls_ca.as_deref(), credentials).map_err(|error| {
         Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
@@ -241,7 +241,7 @@ fn configured(device: &SimulatedMasterControl, pack: &Pack) -> Result<ReferenceM
         return Ok(ReferenceMasterControl::new(pack));
     }
     let fleet = if names.is_empty() {
-        Fleet::new(&like, "vda5050-tck", &[], crate::simulate::USUAL_FLEET, pack)
+        Fleet::new(&like, "vda5050-tck", &[], tck_simulate::USUAL_FLEET, pack)
     } else {
         Fleet::named(&like, &names, pack)
     };

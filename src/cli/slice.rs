@@ -6,13 +6,13 @@ use super::args::Audit as Arguments;
 use super::exit::Exit;
 use super::problem::Problem;
 use super::recordings::{broken, in_time, open};
-use crate::audit::result::AuditResult;
-use crate::audit::slice::{Target, records, smallest, written};
-use crate::audit::{Audit, Options};
-use crate::capture::merge::Merged;
-use crate::capture::{Message, Told};
-use crate::diagnostic::Diagnostic;
-use crate::run::Library;
+use tck_audit::result::AuditResult;
+use tck_audit::slice::{Target, records, smallest, written};
+use tck_audit::{Audit, Options};
+use tck_base::diagnostic::Diagnostic;
+use tck_capture::merge::Merged;
+use tck_capture::{Message, Told};
+use tck_judge::Library;
 
 /// How many messages of the vehicle before a finding are searched for its cause.
 const BEFORE: usize = 20_000;

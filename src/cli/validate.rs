@@ -10,12 +10,12 @@ use super::args::{Format, Validate};
 use super::exit::Exit;
 use super::messages::{self, Counted};
 use super::problem::Problem;
-use crate::course::Layout;
-use crate::diagnostic::{Diagnostic, Source};
-use crate::journal::place;
-use crate::profile;
-use crate::report::json as result_file;
-use crate::run::Library;
+use tck_base::diagnostic::{Diagnostic, Source};
+use tck_course::Layout;
+use tck_journal::place;
+use tck_judge::Library;
+use tck_profile as profile;
+use tck_report::json as result_file;
 
 /// A file that is read as a whole may have so many bytes.
 const WHOLE: usize = 32 << 20;
@@ -30,7 +30,7 @@ enum Found {
 
 /// `validate`.
 pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
-    let library = Library::load(None)?;
+    let library = crate::assets::library(None)?;
     let mut wrong = 0;
     for path in &expanded(&arguments.files)? {
         let name = path.display().to_string();
@@ -67,7 +67,7 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
                         Format::Json => super::print(&format!(
                             "{}\n",
                             serde_json::json!({ "file": name, "ok": false, "code": one.code, "title": one.title,
-                                "line": one.span.as_ref().map(crate::diagnostic::Span::line), "hint": one.hint })
+                                "line": one.span.as_ref().map(tck_base::diagnostic::Span::line), "hint": one.hint })
                         ))?,
                     };
                 }

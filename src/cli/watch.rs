@@ -6,16 +6,15 @@ use std::time::Duration;
 use super::args::{Format, Watch as Arguments};
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::audit::{Options, page};
-use crate::diagnostic::Diagnostic;
-use crate::run::Library;
 use crate::ui::{FullScreen, LineOptions, Lines};
-use crate::watch::Rotation;
-use crate::watch::session::{Settings, WatchError, run};
+use tck_audit::{Options, page};
+use tck_base::diagnostic::Diagnostic;
+use tck_watch::Rotation;
+use tck_watch::session::{Settings, WatchError, run};
 
 /// `watch`.
 pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let rotation = Rotation {
         size: arguments.rotate_size,
         every: arguments.rotate_every,
@@ -61,7 +60,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
             every: arguments.every,
             json,
             summary: arguments.summary,
-            color: super::color() == crate::report::text::Color::Always,
+            color: super::color() == tck_report::text::Color::Always,
         });
         runtime.block_on(async {
             let interrupt = super::run::interrupts()?;

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use crate::pack::Role;
-use crate::profile::{HookInfo, VehicleWord};
-use crate::reference::Fault;
-use crate::reference::deviations::agv::Tolerance;
+use tck_pack::Role;
+use tck_profile::{HookInfo, VehicleWord};
+use tck_reference::Fault;
+use tck_reference::deviations::agv::Tolerance;
 
 /// Every hook with its parameters, by role.
 #[must_use]
@@ -86,7 +86,7 @@ pub fn tolerances(tolerances: &[Tolerance]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::profile::{HOOKS, VEHICLE_WORDS};
+    use tck_profile::{HOOKS, VEHICLE_WORDS};
 
     #[test]
     fn hooks_are_listed_by_role_with_their_parameters() {
@@ -112,7 +112,7 @@ mod tests {
                 wrong: "Sends no state.",
             },
         ];
-        insta::assert_snapshot!(faults(&some, crate::reference::deviations::agv::lapse), @r"
+        insta::assert_snapshot!(faults(&some, tck_reference::deviations::agv::lapse), @r"
         outdated-update-taken-over  Takes over an update that is older than the one it has. (ORD-REJ-10, ORD-REJ-11)
         silent                      Sends no state. (STATE-01)
         ");

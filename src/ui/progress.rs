@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::verdict::Outcome;
+use tck_base::verdict::Outcome;
 
 /// What a run is about.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -14,7 +14,7 @@ use tokio::sync::watch;
 
 use super::keyboard::typed;
 use super::output::escaped;
-use crate::run::{Answer, Person, Wanted};
+use tck_run::{Answer, Person, Wanted};
 
 /// How long the keyboard is read before it is looked whether the answer is still wanted.
 const GLANCE: Duration = Duration::from_millis(50);

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::output::{Output, escaped};
 use super::progress::{Progress, RunTitle, TestLine};
-use crate::verdict::{Outcome, Verdict};
+use tck_base::verdict::{Outcome, Verdict};
 
 /// What a terminal can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,11 +7,11 @@ use console::Style;
 use serde_json::{Value, json};
 
 use super::output::Output;
-use crate::report::clean::{line, short};
-use crate::verdict::Verdict;
-use crate::watch::glance::Glance;
-use crate::watch::session::{Contact, Happening, Viewer};
-use crate::watch::{Notice, Watch};
+use tck_base::verdict::Verdict;
+use tck_report::clean::{line, short};
+use tck_watch::glance::Glance;
+use tck_watch::session::{Contact, Happening, Viewer};
+use tck_watch::{Notice, Watch};
 
 /// How much of a message is shown beside a finding, in characters.
 const MESSAGE: usize = 400;

@@ -7,7 +7,7 @@ use serde_json::Value;
 use vda5050_tck::pack::Role;
 use vda5050_tck::profile::Setting;
 use vda5050_tck::report::junit::Inconclusive;
-use vda5050_tck::run::{Bundle, Library, VirtualRun, run_silently, sources, write_all};
+use vda5050_tck::run::{Bundle, VirtualRun, run_silently, sources, write_all};
 
 use crate::bench::Bench;
 use crate::tool::{Running, tool};
@@ -15,7 +15,7 @@ use crate::tool::{Running, tool};
 /// A bundle as `certify` leaves it, of a few tests.
 pub fn certified(folder: &Path) {
     fs::create_dir(folder).unwrap();
-    let library = Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let pack = library.rules.packs.latest().clone();
     let mut request = VirtualRun::of(&library, &pack);
     request.tests = library.tests(Role::Agv, &pack.id);

@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
 
+use vda5050_tck::bench::LinkError;
 use vda5050_tck::bench::client::ClientEvent;
-use vda5050_tck::bench::{LinkError, Vantage};
 use vda5050_tck::clock::Stamp;
+use vda5050_tck::journal::Vantage;
 use vda5050_tck::journal::event::{Direction, Event, LinkFault, Occurrence, Packet, Source};
 use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::{BenchInfo, BenchOptions};

@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vda5050_tck::explore::{Coverage, Exploration, Finding};
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::Library;
 use vda5050_tck::simulate::BuiltIn;
 
 use crate::{grammar, seed};
@@ -38,7 +37,7 @@ fn names(role: Role) -> Vec<&'static str> {
 
 /// What conversations find.
 fn found(one: &Explored, conversations: usize) -> Vec<Finding> {
-    let mut library = Library::load(None).unwrap();
+    let mut library = vda5050_tck::library(None).unwrap();
     let exploration = Exploration {
         grammar: grammar(&library, one.role),
         seed: one.seed,

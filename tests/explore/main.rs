@@ -7,8 +7,9 @@ mod seed;
 mod shrinking;
 
 use vda5050_tck::explore::{Chain, ConversationFile, Finding, Grammar, findings};
+use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 
 /// The allocator of the program: a run is a million small trees.
 #[global_allocator]

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vda5050_tck::explore::shrink::shrink;
 use vda5050_tck::explore::{Chain, Coverage, Exploration, Finding};
+use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::Library;
 
 use crate::{found, grammar};
 
@@ -106,7 +106,7 @@ fn a_shrunk_conversation_is_nearly_as_short_as_the_shortest_one_known() {
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
             scope.spawn(|| {
-                let mut library = Library::load(None).unwrap();
+                let mut library = vda5050_tck::library(None).unwrap();
                 while let Some(known) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let complaint = match shrunk(known, &mut library) {
                         Err(why) => why,

@@ -3,17 +3,19 @@
 //! The whole proof, every fault and every clause in every version, is `vda5050-tck qualify`, which CI runs. Here a share
 //! of the faults is tried: those that the last change is about, and a part that is drawn by the commit.
 
+use vda5050_tck::judge::Library;
 use vda5050_tck::pack::{Pack, Role};
 use vda5050_tck::qualify::{Depth, Qualification, decided, qualify};
 use vda5050_tck::reference::Fault;
-use vda5050_tck::run::{Library, VirtualRun, run_silently};
+use vda5050_tck::run::{VirtualRun, run_silently};
 use vda5050_tck::simulate::BuiltIn;
 use vda5050_tck::verdict::Verdict;
 
 use super::share;
 
 fn library() -> Library {
-    Library::load(None).unwrap_or_else(|all| panic!("{}", all.iter().map(ToString::to_string).collect::<String>()))
+    vda5050_tck::library(None)
+        .unwrap_or_else(|all| panic!("{}", all.iter().map(ToString::to_string).collect::<String>()))
 }
 
 fn tried(library: &Library, pack: &Pack, role: Role, faults: &[Fault]) -> Qualification {

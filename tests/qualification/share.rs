@@ -6,9 +6,9 @@
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Role;
 use vda5050_tck::reference::Fault;
-use vda5050_tck::run::Library;
 use vda5050_tck::simulate::BuiltIn;
 
 use crate::seed::{drawn_by, git};
@@ -20,7 +20,7 @@ const SHARE: u64 = 8;
 pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
     let seed = drawn_by();
     let base = std::env::var("QUALIFY_BASE").unwrap_or_else(|_| "HEAD~1".to_owned());
-    let change = git(&["diff", "--unified=0", &base, "--", "src", "suites"]).unwrap_or_default();
+    let change = git(&["diff", "--unified=0", &base, "--", "src", "crates", "suites"]).unwrap_or_default();
     let touched = touched(library, role, &change);
     let is_drawn = |fault: &Fault| {
         let mut hasher = DefaultHasher::new();
@@ -66,7 +66,7 @@ fn touched(library: &Library, role: Role, change: &str) -> BTreeSet<&'static str
 
 #[test]
 fn a_change_draws_the_faults_it_names_and_those_of_the_tests_it_is_in() {
-    let library = Library::load(None).unwrap_or_else(|_| panic!("the suites load"));
+    let library = vda5050_tck::library(None).unwrap_or_else(|_| panic!("the suites load"));
     let named = touched(
         &library,
         Role::Agv,

@@ -133,7 +133,10 @@ pub enum NamesError {
         name: String,
     },
     /// A name that cannot be one.
-    #[error("`{name}` cannot be the name of `{object}.{member}`: it is a name, or two with a slash between them")]
+    #[error(
+        "{name} cannot stand for `{object}.{member}`: that is a name, two with a slash between them, or whether the version \
+         has the member"
+    )]
     NoName {
         /// The object.
         object: String,
@@ -142,16 +145,6 @@ pub enum NamesError {
         /// What stands there.
         name: String,
     },
-}
-
-/// What a version does with a member.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged)]
-enum Change {
-    /// Whether it has the member, by its usual name.
-    Has(bool),
-    /// Another name, or a name inside another member.
-    Named(String),
 }
 
 impl Default for Names {
@@ -173,7 +166,7 @@ impl Names {
     }
 
     /// The default names with these changes.
-    fn changed(changes: &BTreeMap<String, BTreeMap<String, Change>>) -> Result<Self, NamesError> {
+    fn changed(changes: &BTreeMap<String, BTreeMap<String, Value>>) -> Result<Self, NamesError> {
         let mut tables = Self::default().tables;
         for (object, changes) in changes {
             let found = Object::of_name(object).ok_or_else(|| NamesError::NoObject(object.clone()))?;
@@ -190,17 +183,16 @@ impl Names {
                     member: member.clone(),
                 })?;
                 members[at] = match change {
-                    Change::Has(has) => has.then_some(shape.members[at].wire),
-                    Change::Named(name) => Some(name),
+                    Value::Bool(has) => has.then_some(shape.members[at].wire),
+                    Value::String(name) if is_name(name) => Some(name),
+                    other => {
+                        return Err(NamesError::NoName {
+                            object: object.clone(),
+                            member: member.clone(),
+                            name: other.to_string(),
+                        });
+                    }
                 };
-                let parts = members[at].map(|name| name.split('/'));
-                if parts.is_some_and(|parts| parts.clone().count() > 2 || parts.into_iter().any(str::is_empty)) {
-                    return Err(NamesError::NoName {
-                        object: object.clone(),
-                        member: member.clone(),
-                        name: members[at].unwrap_or_default().to_owned(),
-                    });
-                }
             }
             let table = Table::new(&members, shape);
             if let Some(name) = table.doubled() {
@@ -253,6 +245,11 @@ impl Names {
     pub(crate) fn table(&self, object: Object) -> &Table {
         &self.tables[object as usize]
     }
+}
+
+/// Whether it is a name, or two with a slash between them.
+fn is_name(name: &str) -> bool {
+    name.split('/').count() <= 2 && !name.split('/').any(str::is_empty)
 }
 
 impl<'de> Deserialize<'de> for Names {

@@ -13,14 +13,6 @@ impl Print {
     pub const fn bits(self) -> u64 {
         self.0
     }
-
-    /// The fingerprint of a value that has no view. That of an object with a view is the same where the version has the
-    /// usual names for its members.
-    #[must_use]
-    pub fn of_value(value: &serde_json::Value) -> Self {
-        // A tree has no syntax that could be wrong.
-        crate::read::skip(value).unwrap_or_default()
-    }
 }
 
 /// Mixes two numbers.

@@ -96,8 +96,8 @@ fn a_table_that_cannot_be_meant_is_refused() {
     assert!(refused("status.maps = true").contains("there is no object `status`"));
     assert!(refused("state.map = true").contains("the views know no member `state.map`"));
     assert!(refused(r#"state.paused = "driving""#).contains("two members of `state` are called `driving`"));
-    assert!(refused(r#"state.paused = "a/b/c""#).contains("cannot be the name of `state.paused`"));
-    assert!(refused(r#"state.paused = """#).contains("cannot be the name of `state.paused`"));
+    assert!(refused(r#"state.paused = "a/b/c""#).contains("cannot stand for `state.paused`"));
+    assert!(refused(r#"state.paused = """#).contains("cannot stand for `state.paused`"));
     let twice = r#"batteryState = { batteryCharge = "cell/charge", reach = "cell/charge" }"#;
     assert!(refused(twice).contains("two members of `batteryState` are called `charge`"));
     let both = r#"batteryState = { batteryCharge = "charging/charge" }"#;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{Format, InconclusiveArg, SuiteArgs};
-use crate::pack::Role;
+use tck_pack::Role;
 
 const LIST_HELP: &str = "\
 Examples:

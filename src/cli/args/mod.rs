@@ -1,6 +1,6 @@
 //! What can be typed. Help texts are written for somebody who has never seen the tool.
 //!
-//! Flags that are settings of a device (`--broker`, `--serial` …) are handed to [`crate::profile::load`] as
+//! Flags that are settings of a device (`--broker`, `--serial` …) are handed to [`tck_profile::load`] as
 //! they stand, so that a value means the same on the command line, in the environment and in a file.
 
 mod audit;
@@ -20,8 +20,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::report::junit::Inconclusive;
-use crate::run::Own;
+use crate::assets::Own;
+use tck_report::junit::Inconclusive;
 
 pub use audit::Audit;
 pub use discover::{BrokerArgs, Discover, Init, ListenArgs};

@@ -199,7 +199,7 @@ pub struct Qualify {
     pub tests: Vec<String>,
     /// Only this side's [agv, master-control]; both unless said
     #[arg(long, value_name = "ROLE", value_parser = super::inspect::parse_role)]
-    pub role: Option<crate::pack::Role>,
+    pub role: Option<tck_pack::Role>,
     /// Print which fault fails which clause, too
     #[arg(long)]
     pub matrix: bool,

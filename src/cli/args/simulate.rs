@@ -6,8 +6,8 @@ use std::str::FromStr;
 use clap::{Args, Subcommand};
 use serde_json::Value;
 
-use crate::diagnostic;
-use crate::profile::{VEHICLE_WORDS, find_vehicle_word};
+use tck_base::diagnostic;
+use tck_profile::{VEHICLE_WORDS, find_vehicle_word};
 
 use super::Format;
 use super::vehicle::VehicleKind;

@@ -61,7 +61,7 @@ fn flags_become_settings_by_their_names_in_the_profile() {
     ];
     assert_eq!(settings, expected.map(|(name, text)| (name, text.to_owned())));
     for (name, _) in settings {
-        assert!(crate::profile::Key::find(name).is_some(), "{name}");
+        assert!(tck_profile::Key::find(name).is_some(), "{name}");
     }
 }
 
@@ -116,11 +116,11 @@ fn variables_of_flags_are_known_to_the_settings() {
     }
     let variables = variables(&Cli::command());
     assert!(variables.iter().any(|name| name == "VDA5050_TCK_PROFILE"));
-    let surroundings = crate::profile::Surroundings {
+    let surroundings = tck_profile::Surroundings {
         environment: variables.into_iter().map(|name| (name, "x".to_owned())).collect(),
         ..Default::default()
     };
-    if let Err(wrong) = crate::profile::load(None, &[], &surroundings) {
+    if let Err(wrong) = tck_profile::load(None, &[], &surroundings) {
         panic!("{}", wrong[0]);
     }
 }
@@ -150,7 +150,7 @@ fn examples(command: &clap::Command) -> Vec<String> {
 fn every_example_in_a_help_is_a_command_and_names_tests_that_exist() {
     let all = examples(&Cli::command());
     assert!(all.len() > 30, "only {} examples were found", all.len());
-    let library = crate::run::Library::load(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let library = crate::assets::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let protocol = library.rules.packs.latest().id.clone();
     for line in all {
         let patterns = match parse(&line) {
@@ -159,7 +159,7 @@ fn every_example_in_a_help_is_a_command_and_names_tests_that_exist() {
             Ok(_) => Vec::new(),
             Err(error) => panic!("{line}: {error}"),
         };
-        let tests = library.tests(crate::pack::Role::Agv, &protocol);
+        let tests = library.tests(tck_pack::Role::Agv, &protocol);
         let found = crate::cli::select::select(&tests, &patterns);
         assert!(
             found.is_ok(),

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
-use crate::simulate::Vehicle;
+use tck_simulate::Vehicle;
 
 /// A kind of reference AGV.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -9,12 +9,13 @@ use serde_json::json;
 use crate::cli::args::{Explore, Format};
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
-use crate::explore::{Chain, ConversationFile, Coverage, Exploration, Finding, findings};
-use crate::pack::{Pack, Role};
-use crate::reference::Fault;
-use crate::run::{Library, VirtualRun, run_silently};
-use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl};
-use crate::suite::model::Test;
+use tck_explore::{Chain, ConversationFile, Coverage, Exploration, Finding, findings};
+use tck_judge::Library;
+use tck_pack::{Pack, Role};
+use tck_reference::Fault;
+use tck_run::{VirtualRun, run_silently};
+use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl};
+use tck_suite::model::Test;
 
 /// Conversations that one device is told, and the tests they are.
 type Round<'a> = (&'a [(Chain, ConversationFile)], Vec<Arc<Test>>);

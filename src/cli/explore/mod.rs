@@ -11,12 +11,11 @@ use super::args::Explore;
 use super::device::{check_faults, pack_of};
 use super::exit::Exit;
 use super::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Stage as _};
-use crate::profile::{self, Surroundings};
-use crate::run::Library;
-use crate::verdict::Verdict;
 use stage::{Device, OnStage};
+use tck_base::diagnostic::Diagnostic;
+use tck_base::verdict::Verdict;
+use tck_explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Stage as _};
+use tck_profile::{self as profile, Surroundings};
 
 /// How much more often a stimulus is drawn on which the exploration is focused.
 const FOCUS: u32 = 20;
@@ -29,7 +28,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         &arguments.device.settings(),
         &surroundings,
     )?;
-    let library = Library::load(arguments.suites.own())?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     check_faults(role, &arguments.fault)?;
@@ -89,7 +88,7 @@ fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
         let matching: Vec<&String> = names.filter(|name| super::select::matches(pattern, name)).collect();
         if matching.is_empty() {
             let names = grammar.stimuli.keys().map(String::as_str);
-            let hint = match crate::diagnostic::closest(pattern, names) {
+            let hint = match tck_base::diagnostic::closest(pattern, names) {
                 Some(close) => format!("did you mean `{close}`?"),
                 None => "`vda5050-tck explore --stimuli` shows them all".to_owned(),
             };

@@ -7,10 +7,10 @@ use serde_json::json;
 
 use crate::cli::args::Format;
 use crate::cli::problem::Problem;
-use crate::explore::{Exploration, Explored, Grammar, Shown, Source, family};
-use crate::pack::Catalogue;
-use crate::result::RunResult;
-use crate::verdict::Verdict;
+use tck_base::verdict::Verdict;
+use tck_explore::{Exploration, Explored, Grammar, Shown, Source, family};
+use tck_pack::Catalogue;
+use tck_result::RunResult;
 
 /// Where an exploration has left what it wrote.
 #[derive(Clone, Copy)]

@@ -11,20 +11,19 @@ use crate::cli::args::Explore;
 use crate::cli::device::tolerate;
 use crate::cli::problem::Problem;
 use crate::cli::run::{person, stop};
-use crate::clock::WallClock;
-use crate::explore::{ConversationFile, Explored, Purpose, Stage};
-use crate::journal::file::JournalWriter;
-use crate::judge::RunJudge;
-use crate::pack::{Catalogue, Pack, Participant, Role};
-use crate::profile::{Effective, Surroundings};
-use crate::report::junit::Inconclusive;
-use crate::result::RunResult;
-use crate::run::{
-    Bundle, Finished, Library, Place, Request, Silent, SocketRun, VirtualRun, run_virtually, sources, write_all,
-};
-use crate::simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
-use crate::suite::model::Test;
 use crate::ui::Desk;
+use tck_base::clock::WallClock;
+use tck_explore::{ConversationFile, Explored, Purpose, Stage};
+use tck_journal::file::JournalWriter;
+use tck_judge::Library;
+use tck_judge::RunJudge;
+use tck_pack::{Catalogue, Pack, Participant, Role};
+use tck_profile::{Effective, Surroundings};
+use tck_report::junit::Inconclusive;
+use tck_result::RunResult;
+use tck_run::{Bundle, Finished, Place, Request, Silent, SocketRun, VirtualRun, run_virtually, sources, write_all};
+use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
+use tck_suite::model::Test;
 
 /// What is explored.
 pub(super) enum Device {

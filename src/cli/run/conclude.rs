@@ -6,15 +6,15 @@ use crate::cli::events::Followed;
 use crate::cli::exit::Exit;
 use crate::cli::problem::Problem;
 
-use crate::diagnostic::Diagnostic;
-use crate::engine::Recorder;
-use crate::report::known::measure;
-use crate::report::sources::Sources;
-use crate::report::text::Color;
-use crate::report::{overview, text};
-use crate::result::RunResult;
-use crate::run::{Bundle, End, Finished, sources, write_all};
-use crate::verdict::Verdict;
+use tck_base::diagnostic::Diagnostic;
+use tck_base::verdict::Verdict;
+use tck_engine::Recorder;
+use tck_report::known::measure;
+use tck_report::sources::Sources;
+use tck_report::text::Color;
+use tck_report::{overview, text};
+use tck_result::RunResult;
+use tck_run::{Bundle, End, Finished, sources, write_all};
 
 impl Job {
     /// Writes the bundle and says the verdict.
@@ -51,7 +51,7 @@ impl Job {
             _ if self.output.speaks_events() => {}
             args::Format::Json => {
                 let text =
-                    crate::report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
+                    tck_report::json::to_string(&result).map_err(|error| Problem::Environment(error.to_string()))?;
                 crate::cli::print(&text)?;
             }
             args::Format::Text => {

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::cli::problem::Problem;
-use crate::diagnostic::Diagnostic;
-use crate::journal::Journal;
-use crate::journal::event::{Event, RunHeader};
-use crate::journal::file::{self, Recording};
-use crate::judge;
-use crate::pack::{Pack, Participant};
-use crate::run::Library;
-use crate::suite::model::Test;
+use tck_base::diagnostic::Diagnostic;
+use tck_journal::Journal;
+use tck_journal::event::{Event, RunHeader};
+use tck_journal::file::{self, Recording};
+use tck_judge as judge;
+use tck_judge::Library;
+use tck_pack::{Pack, Participant};
+use tck_suite::model::Test;
 
 /// A run that broke off.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::journal::place;
-use crate::report::clean::line;
+use tck_journal::place;
+use tck_report::clean::line;
 
 /// One line of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]

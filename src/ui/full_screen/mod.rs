@@ -10,8 +10,8 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 use super::keyboard::typed;
-use crate::watch::session::{Contact, Happening, Viewer};
-use crate::watch::{Notice, Watch};
+use tck_watch::session::{Contact, Happening, Viewer};
+use tck_watch::{Notice, Watch};
 use view::{Focus, View};
 
 /// See the module.

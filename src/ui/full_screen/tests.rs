@@ -3,10 +3,9 @@ use ratatui::backend::TestBackend;
 use serde_json::json;
 
 use super::*;
-use crate::audit::Options;
-use crate::capture::{Message, Place};
-use crate::clock::{Moment, Stamp};
-use crate::run::Library;
+use tck_audit::Options;
+use tck_base::clock::{Moment, Stamp};
+use tck_capture::{Message, Place};
 
 fn heard(watch: &mut Watch<'_>, serial: &str, name: &str, payload: &serde_json::Value) {
     let utc = jiff::Timestamp::from_second(1_767_225_600).expect("time");
@@ -56,7 +55,7 @@ fn key(view: &mut View, code: KeyCode) -> bool {
 
 #[test]
 fn vehicles_findings_and_the_wrong_member_are_shown() {
-    let library = Library::load(None).expect("suites");
+    let library = crate::assets::library(None).expect("suites");
     let version = library.rules.packs.latest().version.to_string();
     let options = Options {
         only: vec!["message/schema".to_owned()],
@@ -90,7 +89,7 @@ fn vehicles_findings_and_the_wrong_member_are_shown() {
 
 #[test]
 fn a_screen_of_any_size_and_a_fleet_are_drawn() {
-    let library = Library::load(None).expect("suites");
+    let library = crate::assets::library(None).expect("suites");
     let version = library.rules.packs.latest().version.to_string();
     let mut watch = Watch::new(&library.rules, Options::default()).expect("options");
     for number in 0..60 {

@@ -7,10 +7,10 @@ use ratatui::text::{Line, Span, Text};
 use ratatui::widgets::{Block, Cell, Paragraph, Row, Table, TableState};
 
 use super::marked;
-use crate::report::clean::{line, short};
-use crate::verdict::Verdict;
-use crate::watch::glance::{Glance, Kind};
-use crate::watch::session::Contact;
+use tck_base::verdict::Verdict;
+use tck_report::clean::{line, short};
+use tck_watch::glance::{Glance, Kind};
+use tck_watch::session::Contact;
 
 /// Which list the keys move in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

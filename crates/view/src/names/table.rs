@@ -1,6 +1,6 @@
 //! From the name of a member to its place in a view, without hashing all of the name.
 
-use super::{Entry, Shape};
+use super::object::{Entry, Shape};
 use crate::print;
 
 /// Places in the index; a power of two, at least twice as many as an object has members.

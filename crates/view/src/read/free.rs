@@ -6,9 +6,9 @@ use std::marker::PhantomData;
 use serde::Deserializer;
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 
-use super::{Name, Readable, Reader, numbers};
+use super::walk::{Name, Reader, numbers};
 use crate::print::{self, Members, Sequence};
-use crate::{ELEMENTS, Json, List, Member, Number, Print, Text};
+use crate::{ELEMENTS, Json, List, Number, Print, Text};
 
 /// The fingerprint of a value.
 pub(crate) fn skip<'de, D: Deserializer<'de>>(value: D) -> Result<Print, D::Error> {
@@ -163,36 +163,12 @@ pub(super) fn object<'de, A: MapAccess<'de>>(mut object: A, reader: &Reader<'_>)
     Ok((Json::Object(List::new(kept, total)), members.done()))
 }
 
-impl Readable for Json {
-    fn of_flag(flag: bool) -> Option<Self> {
-        Some(Self::Flag(flag))
-    }
-
-    fn of_number(number: Number) -> Option<Self> {
-        Some(Self::Number(number))
-    }
-
-    fn of_text(text: &str) -> Option<Self> {
-        Some(Self::Text(Text::new(text)))
-    }
-
-    fn read_list<'de, A: SeqAccess<'de>>(
-        slot: &mut Member<Self>,
-        list: A,
-        reader: &Reader<'_>,
-    ) -> Result<Print, A::Error> {
-        let (json, print) = self::list(list, reader)?;
-        *slot = Member::There(json);
-        Ok(print)
-    }
-
-    fn read_object<'de, A: MapAccess<'de>>(
-        slot: &mut Member<Self>,
-        object: A,
-        reader: &Reader<'_>,
-    ) -> Result<Print, A::Error> {
-        let (json, print) = self::object(object, reader)?;
-        *slot = Member::There(json);
-        Ok(print)
+impl Print {
+    /// The fingerprint of a value that has no view. That of an object with a view is the same where the version has the
+    /// usual names for its members.
+    #[must_use]
+    pub fn of_value(value: &serde_json::Value) -> Self {
+        // A tree has no syntax that could be wrong.
+        skip(value).unwrap_or_default()
     }
 }

@@ -5,7 +5,8 @@ use serde::de::{DeserializeSeed, SeqAccess};
 
 use super::free::Skip;
 use super::object::{View, Whole};
-use super::{Readable, Reader, Slot};
+use super::slot::{Readable, Slot};
+use super::walk::Reader;
 use crate::print::Sequence;
 use crate::{ELEMENTS, List, Member, Number, Print, Text};
 

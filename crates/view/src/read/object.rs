@@ -7,10 +7,11 @@ use serde::Deserializer;
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 
 use super::free::{self, Skip};
-use super::{Name, Reader, numbers};
+use super::slot::Readable;
+use super::walk::{Name, Reader, numbers};
 use crate::names::Found;
 use crate::print::{self, Members};
-use crate::{Header, Json, Member, Number, Object, Print};
+use crate::{Deviation, Ellipse, Header, Json, Member, Number, Object, Print};
 
 /// A view, as the table of its members defines it.
 pub(crate) trait View: Default {
@@ -119,6 +120,23 @@ pub(crate) fn boxed<'de, V: View, A: MapAccess<'de>>(
     Ok(print)
 }
 
+impl Readable for Deviation {
+    fn of_number(radius: Number) -> Option<Self> {
+        Some(Self::Radius(radius))
+    }
+
+    fn read_object<'de, A: MapAccess<'de>>(
+        slot: &mut Member<Self>,
+        object: A,
+        reader: &Reader<'_>,
+    ) -> Result<Print, A::Error> {
+        let mut ellipse = Box::<Ellipse>::default();
+        let print = fill(&mut *ellipse, object, reader)?;
+        *slot = Member::There(Self::Ellipse(ellipse));
+        Ok(print)
+    }
+}
+
 /// What the name of a member means.
 enum Meaning<'t> {
     Member(u8),
@@ -128,11 +146,7 @@ enum Meaning<'t> {
 }
 
 /// Reads the members of an object.
-pub(super) fn fill<'de, V: View, A: MapAccess<'de>>(
-    view: &mut V,
-    mut object: A,
-    reader: &Reader<'_>,
-) -> Result<Print, A::Error> {
+fn fill<'de, V: View, A: MapAccess<'de>>(view: &mut V, mut object: A, reader: &Reader<'_>) -> Result<Print, A::Error> {
     let table = reader.names.table(V::OBJECT);
     let header = view.header_mut().map(|_| reader.names.table(Object::Header));
     let (mut members, mut apart) = (Members::default(), Members::default());

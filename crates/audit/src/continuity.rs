@@ -1,0 +1,307 @@
+//! Where messages are missing.
+//!
+//! A gap in the count of a topic is a hole, and so is what only a message explains that the recording does not hold: an
+//! order in a state that was never seen on its way, or an action nobody sent.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use tck_base::clock::Moment;
+use tck_base::pattern::whole;
+
+/// How many orders and actions are kept in mind.
+const SENT: usize = 8192;
+
+/// How far recorders change the order of messages of different topics.
+const CROSSING: Duration = Duration::from_millis(100);
+
+/// What a message is for those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// It follows the last one of its topic.
+    Follows,
+    /// There was none before that it could follow.
+    Begins,
+    /// Something is missing since that moment.
+    Hole(Moment),
+}
+
+/// Texts that are known, by their print, bounded.
+#[derive(Debug, Default)]
+struct Sent {
+    known: BTreeSet<u64>,
+    order: VecDeque<u64>,
+}
+
+impl Sent {
+    fn add(&mut self, what: impl Hash) {
+        let print = print(what);
+        if self.known.insert(print) {
+            self.order.push_back(print);
+        }
+        if self.order.len() > SENT
+            && let Some(oldest) = self.order.pop_front()
+        {
+            self.known.remove(&oldest);
+        }
+    }
+
+    fn has(&self, print: u64) -> bool {
+        self.known.contains(&print)
+    }
+}
+
+fn print(what: impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    what.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// See the module.
+#[derive(Debug, Default)]
+pub(super) struct Continuity {
+    last: BTreeMap<String, (Option<u64>, Moment)>,
+    sent: Sent,
+    /// Orders and actions of the last state.
+    shown: Option<BTreeSet<u64>>,
+    /// Since when commands come one after the other, and what a state shows that knows the last of them.
+    command: Option<(Moment, Moment, BTreeSet<u64>)>,
+    /// How many holes there are.
+    pub holes: u64,
+}
+
+impl Continuity {
+    /// Takes in a message that came live.
+    pub fn note(&mut self, name: &str, message: Option<&Value>, now: Moment) -> Step {
+        let id = message.and_then(|message| whole(message.get("headerId")?));
+        if name == "connection" {
+            // The count may begin anew on every topic of the vehicle.
+            self.last
+                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions"));
+            self.shown = None;
+            self.last.insert(name.to_owned(), (id, now));
+            return Step::Begins;
+        }
+        let before = self.last.insert(name.to_owned(), (id, now));
+        let counted = match before {
+            None => Step::Begins,
+            Some((Some(before), _)) if id == Some(next(before)) => Step::Follows,
+            Some((_, since)) => Step::Hole(since),
+        };
+        let step = match (counted, message) {
+            (Step::Hole(since), _) => Step::Hole(since),
+            (step, Some(message)) if name == "state" && !self.explained(message) => {
+                Step::Hole(before.map_or(now, |(_, since)| since)).max_of(step)
+            }
+            (step, _) => step,
+        };
+        if let Step::Hole(_) = step {
+            self.holes += 1;
+            self.forget();
+        }
+        self.learn(name, message);
+        if let Some(message) = message.filter(|_| matches!(name, "order" | "instantActions")) {
+            let since = match &self.command {
+                Some((since, last, _)) if now.since(*last) <= CROSSING => *since,
+                _ => now,
+            };
+            self.command = Some((since, now, marks(message)));
+        }
+        step
+    }
+
+    /// Since when it is not known what the master control had seen: a state came so soon after a command which it does not
+    /// know that it may have been sent before.
+    pub fn crossed(&self, name: &str, message: Option<&Value>, now: Moment) -> Option<Moment> {
+        let (since, last, marks) = self.command.as_ref()?;
+        let state = message.filter(|_| name == "state" && now.since(*last) <= CROSSING)?;
+        let mut known = shown(state).into_iter().chain(blamed(state));
+        (!known.any(|print| marks.contains(&print))).then_some(*since)
+    }
+
+    /// Whether a message follows the last one of its topic by its count.
+    pub fn goes_on(&self, name: &str, message: &Value) -> bool {
+        let id = message.get("headerId").and_then(whole);
+        let before = self.last.get(name).and_then(|(before, _)| *before);
+        name != "connection" && before.is_some() && id == before.map(next)
+    }
+
+    /// Nothing was seen for a while: no message that comes follows another one.
+    pub fn interrupted(&mut self) {
+        self.holes += 1;
+        self.last.clear();
+        self.command = None;
+        self.forget();
+    }
+
+    /// What was sent before does not count any more.
+    pub fn forget(&mut self) {
+        self.sent = Sent::default();
+        self.shown = None;
+    }
+
+    /// Keeps in mind what was sent, and what is shown.
+    pub fn learn(&mut self, name: &str, message: Option<&Value>) {
+        match (name, message) {
+            ("order", Some(order)) => self.order(order),
+            ("instantActions", Some(message)) => self.actions(message, &["actions", "instantActions"]),
+            ("state", Some(state)) => self.shown = Some(shown(state)),
+            _ => {}
+        }
+    }
+
+    /// Whether all that a state shows beyond the one before was sent.
+    fn explained(&self, state: &Value) -> bool {
+        let Some(before) = &self.shown else { return true };
+        shown(state).difference(before).all(|print| self.sent.has(*print))
+    }
+
+    fn order(&mut self, order: &Value) {
+        let id = order.get("orderId").and_then(Value::as_str);
+        let update = order.get("orderUpdateId").and_then(whole);
+        if let (Some(id), Some(update)) = (id, update) {
+            self.sent.add((id, update));
+        }
+        for list in ["nodes", "edges"] {
+            for element in order.get(list).and_then(Value::as_array).into_iter().flatten() {
+                self.actions(element, &["actions"]);
+            }
+        }
+    }
+
+    fn actions(&mut self, holder: &Value, lists: &[&str]) {
+        for list in lists {
+            for action in holder.get(*list).and_then(Value::as_array).into_iter().flatten() {
+                if let Some(id) = action.get("actionId").and_then(Value::as_str) {
+                    self.sent.add(id);
+                }
+            }
+        }
+    }
+}
+
+impl Step {
+    /// A hole is a hole whatever the count says.
+    fn max_of(self, other: Self) -> Self {
+        match self {
+            Self::Hole(_) => self,
+            _ => other,
+        }
+    }
+}
+
+/// The number after this one; the count begins anew behind the largest.
+fn next(id: u64) -> u64 {
+    if id == u64::from(u32::MAX) { 0 } else { id + 1 }
+}
+
+/// Prints by which a state shows that it knows a command: its order, its actions, or an error about one of them.
+fn marks(message: &Value) -> BTreeSet<u64> {
+    let text = |holder: &Value, member: &str| holder.get(member).and_then(Value::as_str).map(str::to_owned);
+    let id = text(message, "orderId");
+    let update = message.get("orderUpdateId").and_then(whole);
+    let order = id.as_deref().zip(update).map(print);
+    let lists = ["actions", "instantActions"].into_iter();
+    let actions = lists.flat_map(|list| message.get(list).and_then(Value::as_array).into_iter().flatten());
+    let actions = actions.filter_map(|action| text(action, "actionId"));
+    let named = id.clone().into_iter().chain(actions);
+    let named: Vec<u64> = named.map(|name| print(name.as_str())).collect();
+    order.into_iter().chain(named).collect()
+}
+
+/// Prints of what the errors of a state refer to.
+fn blamed(state: &Value) -> Vec<u64> {
+    let list = |holder: &Value, member: &str| {
+        holder
+            .get(member)
+            .and_then(Value::as_array)
+            .cloned()
+            .unwrap_or_default()
+    };
+    let errors = list(state, "errors").into_iter();
+    let references = errors.flat_map(|error| list(&error, "errorReferences"));
+    let values = references.filter_map(|reference| Some(print(reference.get("referenceValue")?.as_str()?)));
+    values.collect()
+}
+
+/// Prints of the order and of the actions that a state shows.
+fn shown(state: &Value) -> BTreeSet<u64> {
+    let id = state.get("orderId").and_then(Value::as_str).filter(|id| !id.is_empty());
+    let update = state.get("orderUpdateId").and_then(whole);
+    let order = id.zip(update).map(print);
+    let actions = state
+        .get("actionStates")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten();
+    let actions = actions.filter_map(|action| action.get("actionId").and_then(Value::as_str).map(print));
+    order.into_iter().chain(actions).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn steps(messages: &[(&str, Value)]) -> Vec<Step> {
+        let mut continuity = Continuity::default();
+        let all = messages.iter().enumerate();
+        all.map(|(at, (name, value))| continuity.note(name, Some(value), Moment::from_micros(at as u64)))
+            .collect()
+    }
+
+    #[test]
+    fn a_gap_a_fall_and_a_repeat_are_holes() {
+        let found = steps(&[1, 2, 4, 5, 5, 3].map(|id| ("state", json!({ "headerId": id }))));
+        let hole = |at| Step::Hole(Moment::from_micros(at));
+        assert_eq!(
+            found,
+            [Step::Begins, Step::Follows, hole(1), Step::Follows, hole(3), hole(4)]
+        );
+        let wraps = [u64::from(u32::MAX), 0].map(|id| ("state", json!({ "headerId": id })));
+        assert_eq!(steps(&wraps)[1], Step::Follows);
+    }
+
+    #[test]
+    fn what_nobody_sent_is_a_hole_once() {
+        let state = |id: u64, order: &str| ("state", json!({ "headerId": id, "orderId": order, "orderUpdateId": 0 }));
+        let order = ("order", json!({ "headerId": 1, "orderId": "b", "orderUpdateId": 0 }));
+        let found = steps(&[state(1, "a"), order, state(2, "b"), state(3, "c"), state(4, "c")]);
+        assert_eq!(found[2], Step::Follows);
+        assert_eq!(found[3], Step::Hole(Moment::from_micros(2)));
+        assert_eq!(found[4], Step::Follows);
+    }
+
+    #[test]
+    fn a_state_that_does_not_know_the_command_before_it_may_have_crossed_it() {
+        let order = json!({ "headerId": 1, "orderId": "b", "orderUpdateId": 0 });
+        let at = |milliseconds: u64| Moment::from_micros(milliseconds * 1000);
+        let crossed = |state: Value, milliseconds| {
+            let mut continuity = Continuity::default();
+            continuity.note("order", Some(&order), at(10));
+            continuity.crossed("state", Some(&state), at(milliseconds))
+        };
+        let other = json!({ "orderId": "a", "orderUpdateId": 3 });
+        assert_eq!(crossed(other.clone(), 60), Some(at(10)));
+        assert_eq!(crossed(other.clone(), 200), None);
+        assert_eq!(crossed(order.clone(), 60), None);
+        let references = json!([{ "referenceKey": "orderId", "referenceValue": "b" }]);
+        let refused = json!({ "orderId": "a", "orderUpdateId": 3, "errors": [{ "errorReferences": references }] });
+        assert_eq!(crossed(refused, 60), None);
+    }
+
+    #[test]
+    fn a_connection_lets_the_count_begin_anew() {
+        let found = steps(&[
+            ("state", json!({ "headerId": 9 })),
+            ("connection", json!({ "headerId": 4 })),
+            ("state", json!({ "headerId": 0 })),
+            ("state", json!({ "headerId": 1 })),
+        ]);
+        assert_eq!(found, [Step::Begins, Step::Begins, Step::Begins, Step::Follows]);
+    }
+}

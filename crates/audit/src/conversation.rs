@@ -1,0 +1,137 @@
+//! What a vehicle and its master control say to each other, in order: shown to the judge of each side, and where something
+//! is missing between two messages, so that nobody is blamed for a hole in the recording.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use super::Scene;
+use super::arrived::{Arrived, is_at_rest, of_side, timestamp};
+use super::continuity::{Continuity, Step};
+use super::result::SideResult;
+use super::side::Side;
+use tck_base::clock::Moment;
+use tck_pack::{Pack, Role};
+
+/// See the module.
+#[derive(Default)]
+pub(super) struct Conversation {
+    /// The rules, once the version is known.
+    pack: Option<Arc<Pack>>,
+    sides: Vec<Side>,
+    continuity: Continuity,
+    /// By role: how far the clock of the sender is from that of the recorder.
+    clocks: BTreeMap<&'static str, i64>,
+}
+
+/// What came out of it.
+pub(super) struct Concluded {
+    /// The version it was judged by.
+    pub protocol: Option<String>,
+    pub sides: Vec<SideResult>,
+    pub holes: u64,
+}
+
+impl Conversation {
+    /// The version is known: from here on it is judged.
+    pub fn begin(&mut self, pack: Arc<Pack>, sides: Vec<Side>) {
+        self.pack = Some(pack);
+        self.sides = sides;
+    }
+
+    /// The rules it is judged by; `None` before it is.
+    pub fn pack(&self) -> Option<&Pack> {
+        self.pack.as_deref()
+    }
+
+    pub fn sides_mut(&mut self) -> impl Iterator<Item = &mut Side> {
+        self.sides.iter_mut()
+    }
+
+    /// Nothing was seen for a while.
+    pub fn interrupted(&mut self, since: Moment) {
+        self.continuity.interrupted();
+        for side in &mut self.sides {
+            side.broken(since);
+        }
+    }
+
+    /// Whether a message follows the last one of its topic by its count.
+    pub fn goes_on(&self, name: &str, message: &Value) -> bool {
+        self.continuity.goes_on(name, message)
+    }
+
+    /// Shows a message to both sides.
+    pub fn show(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+        let Some(rule) = self.pack.as_ref().and_then(|pack| pack.topic(&arrived.name)) else {
+            return;
+        };
+        let publisher = rule.publisher;
+        let message = arrived.entry.json();
+        if !arrived.stale {
+            let moment = arrived.at.moment;
+            if let Some(since) = self.continuity.crossed(&arrived.name, message, moment) {
+                let commanding = self.sides.iter_mut().filter(|side| side.role == Role::MasterControl);
+                commanding.for_each(|side| side.broken(since));
+            }
+            let step = self.continuity.note(&arrived.name, message, moment);
+            let begins_anew = arrived.name == "connection";
+            for side in &mut self.sides {
+                match step {
+                    Step::Hole(since) => side.broken(since),
+                    // Nobody knows what becomes of a vehicle while it is away.
+                    Step::Begins if begins_anew && side.role == Role::MasterControl => side.broken(arrived.at.moment),
+                    Step::Follows if arrived.name == "state" => side.confirmed(scene),
+                    _ => {}
+                }
+            }
+            // What was sent of an order before is not known: judging begins where none is under way.
+            let may_begin = arrived.name == "state" && step == Step::Follows && message.is_some_and(is_at_rest);
+            if may_begin && self.sides.iter().any(|side| !side.watches()) {
+                self.continuity.forget();
+                self.continuity.learn(&arrived.name, message);
+                for side in &mut self.sides {
+                    side.broken(Moment::from_micros(u64::MAX));
+                    side.mended(scene);
+                }
+            }
+        }
+        // How far the clocks are apart is not known to be the mistake of the device.
+        let word = publisher.word();
+        let said = message.and_then(timestamp).filter(|_| !arrived.stale);
+        if let Some(said) = said.filter(|_| !self.clocks.contains_key(word)) {
+            let apart = said.as_microsecond().saturating_sub(arrived.at.utc.as_microsecond());
+            self.clocks.insert(word, apart);
+        }
+        for side in &mut self.sides {
+            let own = side.role == publisher;
+            side.messages += u64::from(own);
+            if arrived.stale && !own {
+                continue;
+            }
+            let apart = self.clocks.get(word).copied().unwrap_or_default();
+            let entry = of_side(arrived, own, apart);
+            side.observe(&entry, arrived.at.utc, scene);
+            if own && publisher == Role::Agv {
+                side.confirmed(scene);
+            }
+        }
+    }
+
+    /// What came out. Another conversation may begin.
+    pub fn conclude(&mut self, scene: Scene<'_>) -> Concluded {
+        let Self {
+            pack,
+            sides,
+            continuity,
+            ..
+        } = std::mem::take(self);
+        let sides = sides.into_iter().filter(|side| side.messages > 0);
+        Concluded {
+            protocol: pack.map(|pack| pack.version.to_string()),
+            sides: sides.map(|side| side.finish(scene)).collect(),
+            holes: continuity.holes,
+        }
+    }
+}

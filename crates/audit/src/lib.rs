@@ -1,0 +1,344 @@
+//! Traffic nobody scripted, judged by the monitors: recordings of a site.
+//!
+//! [`Audit`] is shown message after message and finds vehicles by their topics. Each vehicle, and the master control
+//! that commands it, is judged by itself, by the protocol version its messages name. What a recording cannot show is
+//! not judged: it may begin in the middle, lack messages, hold them twice, or hold what was retained yesterday. [`scope`]
+//! says which monitor is used how, [`continuity`] finds the holes, and [`arrival`] puts messages back into their order.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod arrival;
+mod arrived;
+pub mod bundle;
+mod cause;
+mod continuity;
+mod conversation;
+pub mod crew;
+pub mod export;
+mod header;
+mod news;
+mod outcome;
+mod own_run;
+pub mod page;
+pub mod result;
+mod scope;
+mod side;
+mod single;
+pub mod slice;
+pub mod time_line;
+mod topics;
+mod vehicle;
+mod wires;
+
+use std::collections::BTreeMap;
+
+use tck_capture::{Message, Place, Told, Wire, WireEvent};
+use tck_journal::event::Packet;
+use tck_judge::Rules;
+use tck_suite::model::Monitor;
+
+pub use news::{Address, Found};
+pub use own_run::{OwnRunError, own_run};
+use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
+pub use single::{Flaw, single};
+use topics::{Named, Topics};
+use vehicle::Vehicle;
+use wires::{Publisher, Wires};
+
+/// How many vehicles are judged; messages of further ones are counted.
+const VEHICLES: usize = 10_000;
+
+/// What is judged.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// How topics are built, where a site has renamed them.
+    pub topic_template: Option<String>,
+    /// Only these vehicles: serial number, or manufacturer and serial number with a slash between.
+    pub vehicles: Vec<String>,
+    /// Only monitors of these names, or that decide these requirements; a `*` at the end stands for anything.
+    pub only: Vec<String>,
+}
+
+impl Options {
+    fn wants_vehicle(&self, manufacturer: &str, serial_number: &str) -> bool {
+        let named = |wanted: &String| {
+            wanted == serial_number
+                || wanted
+                    .split_once('/')
+                    .is_some_and(|(one, other)| (one, other) == (manufacturer, serial_number))
+        };
+        self.vehicles.is_empty() || self.vehicles.iter().any(named)
+    }
+
+    fn wants_monitor(&self, monitor: &Monitor) -> bool {
+        let fits = |wanted: &str, name: &str| match wanted.strip_suffix('*') {
+            Some(begin) => name.starts_with(begin),
+            None => name == wanted,
+        };
+        let named = |wanted: &String| {
+            let mut checks = monitor.checks.iter();
+            fits(wanted, &monitor.id) || checks.any(|binding| fits(wanted, binding.requirement.as_str()))
+        };
+        self.only.is_empty() || self.only.iter().any(named)
+    }
+}
+
+/// Why nothing can be audited.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum AuditError {
+    /// The template does not name the topic.
+    #[error("the topic template `{0}` has no {{topic}} and no {{serialNumber}}: vehicles cannot be told apart")]
+    Template(String),
+    /// No monitor is left.
+    #[error("no monitor is called `{0}`, and none decides a requirement of that name")]
+    NoMonitor(String),
+}
+
+/// Whether a topic of this name is the master control's.
+fn is_command(name: &str) -> bool {
+    matches!(name, "order" | "instantActions")
+}
+
+/// What all vehicles share.
+#[derive(Clone, Copy)]
+struct Scene<'a> {
+    rules: &'a Rules,
+    options: &'a Options,
+    places: &'a Whence,
+    /// Whether each finding is told at once.
+    live: bool,
+}
+
+/// See the module.
+pub struct Audit<'r> {
+    rules: &'r Rules,
+    options: Options,
+    topics: Topics,
+    vehicles: BTreeMap<String, Vehicle>,
+    wires: Wires,
+    messages: u64,
+    elsewhere: u64,
+    beyond: u64,
+    places: Whence,
+    live: bool,
+    news: Vec<Found>,
+    first: Option<jiff::Timestamp>,
+    last: Option<jiff::Timestamp>,
+}
+
+impl<'r> Audit<'r> {
+    /// Begins.
+    ///
+    /// # Errors
+    /// What is wrong with the options.
+    pub fn new(rules: &'r Rules, options: Options) -> Result<Self, AuditError> {
+        for wanted in &options.only {
+            let alone = Options {
+                only: vec![wanted.clone()],
+                ..Options::default()
+            };
+            let monitors = &rules.suites.monitors;
+            if !monitors.iter().any(|monitor| alone.wants_monitor(monitor)) {
+                return Err(AuditError::NoMonitor(wanted.clone()));
+            }
+        }
+        Ok(Self {
+            topics: Topics::new(&rules.packs, options.topic_template.as_deref())?,
+            rules,
+            options,
+            vehicles: BTreeMap::new(),
+            wires: Wires::default(),
+            messages: 0,
+            elsewhere: 0,
+            beyond: 0,
+            places: Whence::default(),
+            live: false,
+            news: Vec::new(),
+            first: None,
+            last: None,
+        })
+    }
+
+    /// From now on what is found is told at once, see [`Audit::news`].
+    #[must_use]
+    pub fn live(mut self) -> Self {
+        self.live = true;
+        self
+    }
+
+    /// What was found since this was asked last; nothing unless it is [`Audit::live`].
+    pub fn news(&mut self) -> Vec<Found> {
+        std::mem::take(&mut self.news)
+    }
+
+    /// How many messages it was shown.
+    #[must_use]
+    pub fn messages(&self) -> u64 {
+        self.messages
+    }
+
+    /// Whose topic this is; `None` for one of no vehicle, or of one that is not wanted.
+    #[must_use]
+    pub fn address(&self, topic: &str) -> Option<Address> {
+        let named = self.topics.read(topic)?;
+        let wanted = self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        wanted.then_some(Address {
+            vehicle: named.key,
+            manufacturer: named.manufacturer,
+            serial_number: named.serial_number,
+            name: named.name,
+        })
+    }
+
+    /// Shows it the next message.
+    pub fn observe(&mut self, message: Message) {
+        if message.after_gap {
+            self.interrupted();
+        }
+        self.numbered(self.messages + 1, message);
+    }
+
+    /// Shows it the message of that number.
+    fn numbered(&mut self, number: u64, message: Message) {
+        self.messages = number;
+        self.first = self.first.or(message.at);
+        self.last = message.at.or(self.last);
+        let Some(named) = self.topics.read(&message.topic) else {
+            self.elsewhere += 1;
+            return;
+        };
+        if !self.options.wants_vehicle(&named.manufacturer, &named.serial_number) {
+            self.elsewhere += 1;
+            return;
+        }
+        let place: Place = message.place;
+        self.places.note(self.messages, place);
+        if !self.vehicles.contains_key(&named.key) {
+            if self.vehicles.len() >= VEHICLES {
+                self.beyond += 1;
+                return;
+            }
+            self.vehicles
+                .insert(named.key.clone(), Vehicle::new(&named, message.at.is_some()));
+        }
+        if let Some(vehicle) = self.vehicles.get_mut(&named.key) {
+            let scene = Scene {
+                rules: self.rules,
+                options: &self.options,
+                places: &self.places,
+                live: self.live,
+            };
+            let carried = message.carried;
+            let counts = vehicle.observe(self.messages, &named.name, message, scene);
+            if let Some(carried) = carried.filter(|_| counts) {
+                self.wires.carried(carried, &named.key);
+            }
+            if self.live {
+                self.news.append(&mut vehicle.news());
+            }
+        }
+    }
+
+    /// Shows it what is told next.
+    pub fn take(&mut self, told: Told) {
+        match told {
+            Told::Message(message) => self.observe(message),
+            Told::Wire(wire) => self.wire(wire),
+        }
+    }
+
+    /// Shows it something of a connection.
+    pub fn wire(&mut self, wire: Wire) {
+        self.wire_at(self.messages + 1, wire, false);
+    }
+
+    /// Shows it something of a connection before the message of that number; `elsewhere` says that it is a message of a
+    /// vehicle that another thread judges.
+    fn wire_at(&mut self, number: u64, wire: Wire, elsewhere: bool) {
+        let named = match &wire.event {
+            WireEvent::Packet {
+                packet: Packet::Publish { topic, .. },
+                sent: true,
+            } => self.topics.read(topic),
+            _ => None,
+        };
+        let wanted = |named: &&Named| self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        let publisher = named.as_ref().filter(wanted).map(|named| Publisher {
+            vehicle: named.key.clone(),
+            topic: &named.name,
+            elsewhere,
+        });
+        let scene = Scene {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            live: self.live,
+        };
+        let missing = self.wires.take(wire, number, publisher, &mut self.vehicles, scene);
+        for key in missing {
+            if let Some(vehicle) = self.vehicles.get_mut(&key) {
+                vehicle.interrupted(scene);
+            }
+        }
+        if self.live {
+            for vehicle in self.vehicles.values_mut() {
+                self.news.append(&mut vehicle.news());
+            }
+        }
+    }
+
+    /// Nothing was seen for a while: nobody knows what every vehicle did meanwhile.
+    fn interrupted(&mut self) {
+        let scene = Scene {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            live: self.live,
+        };
+        for vehicle in self.vehicles.values_mut() {
+            vehicle.interrupted(scene);
+            if self.live {
+                self.news.append(&mut vehicle.news());
+            }
+        }
+    }
+
+    /// The result; the recording is at its end.
+    #[must_use]
+    pub fn finish(mut self, recordings: Vec<Recording>) -> AuditResult {
+        let scene = Scene {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            live: false,
+        };
+        for vehicle in self.vehicles.values_mut() {
+            vehicle.ready(scene);
+        }
+        self.wires.finish(&mut self.vehicles, scene);
+        let vehicles: Vec<_> = self
+            .vehicles
+            .into_values()
+            .flat_map(|vehicle| vehicle.finish(scene))
+            .collect();
+        AuditResult {
+            format: RESULT_FORMAT.to_owned(),
+            tool: tck_journal::tool(),
+            verdict: result::verdict_of(&vehicles),
+            recordings,
+            messages: self.messages,
+            first: self.first.map(|at| format!("{at:.3}")),
+            last: self.last.map(|at| format!("{at:.3}")),
+            elsewhere: self.elsewhere,
+            beyond: self.beyond,
+            vehicles,
+        }
+    }
+}
+
+#[cfg(test)]
+mod site_tests;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod wires_tests;

@@ -1,0 +1,122 @@
+//! The journal of one of our own runs: judged by all monitors, as the run was, since it holds all they need.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Options;
+use super::result::{FindingResult, SideResult, VehicleResult};
+use super::time_line::TimeLine;
+use tck_base::verdict::Verdict;
+use tck_capture::{Item, Recorded};
+use tck_journal::Entry;
+use tck_journal::event::{Event, Record, RunHeader};
+use tck_judge::{JudgeError, Observed, Rules, SideJudge};
+use tck_pack::Role;
+
+/// Why the journal of a run cannot be judged.
+#[derive(Debug, thiserror::Error)]
+pub enum OwnRunError {
+    /// It is about something else.
+    #[error(transparent)]
+    Judge(#[from] JudgeError),
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] std::io::Error),
+}
+
+/// Judges the rest of a journal behind its first record.
+///
+/// # Errors
+/// It cannot be read or judged.
+pub fn own_run(
+    rules: &Rules,
+    options: &Options,
+    recording: usize,
+    first: Record,
+    recorded: &mut Recorded,
+) -> Result<VehicleResult, OwnRunError> {
+    let header = match &first.event {
+        Event::RunBegun { header } => (**header).clone(),
+        _ => return Err(JudgeError::NoHeader.into()),
+    };
+    let mut judge = SideJudge::begin(rules, &header, &|monitor| options.wants_monitor(monitor))?.among_others();
+    let mut found: BTreeMap<(String, String, Verdict), FindingResult> = BTreeMap::new();
+    let mut messages = BTreeMap::new();
+    let mut keep = |all: Vec<Observed>, at: jiff::Timestamp| {
+        for observed in all {
+            keep(&mut found, observed, recording, at);
+        }
+    };
+    let mut last = first.at;
+    keep(judge.observe(&Entry::new(first)), last.utc);
+    while let Some(item) = recorded.read()? {
+        let Item::Record(record) = item else { continue };
+        last = record.at;
+        if let Some(name) = topic(&record.event, &header) {
+            *messages.entry(name).or_default() += 1;
+        }
+        let ended = matches!(record.event, Event::RunEnded { .. });
+        keep(judge.observe(&Entry::new(*record)), last.utc);
+        if ended {
+            keep(judge.finish(last.moment), last.utc);
+        }
+    }
+    let role = if header.role == Role::MasterControl.word() {
+        Role::MasterControl
+    } else {
+        Role::Agv
+    };
+    let judged = judge.judged().values().filter(|judged| **judged > 0).count();
+    let decided: BTreeSet<(String, String)> = judge.decided().into_iter().collect();
+    let seen = messages.values().sum();
+    let side = SideResult::new(role, seen, judged, found.into_values().collect(), decided, Vec::new());
+    Ok(VehicleResult {
+        topics: header.topics.get("state").cloned().unwrap_or_default(),
+        manufacturer: header.manufacturer,
+        serial_number: header.serial_number,
+        protocol: Some(header.protocol),
+        not_judged: None,
+        messages,
+        holes: 0,
+        twice: 0,
+        retained: 0,
+        vantage: header.vantage,
+        time_line: TimeLine::default(),
+        sides: vec![side],
+    })
+}
+
+/// The topic name of a message of the device that came.
+fn topic(event: &Event, header: &RunHeader) -> Option<String> {
+    let Event::Message { topic, .. } = event else {
+        return None;
+    };
+    let of_vehicles = header.vehicles.iter().map(|vehicle| &vehicle.topics);
+    let mut all = std::iter::once(&header.topics).chain(of_vehicles).flatten();
+    all.find(|(_, full)| *full == topic).map(|(name, _)| name.clone())
+}
+
+fn keep(
+    found: &mut BTreeMap<(String, String, Verdict), FindingResult>,
+    observed: Observed,
+    recording: usize,
+    at: jiff::Timestamp,
+) {
+    let Observed { monitor, finding } = observed;
+    let key = (monitor.clone(), finding.requirement.clone(), finding.verdict);
+    let at = format!("{at:.3}");
+    let known = found.entry(key).or_insert_with(|| FindingResult {
+        monitor,
+        requirement: finding.requirement,
+        verdict: finding.verdict,
+        count: 0,
+        message: finding.first.first().copied().unwrap_or_default(),
+        recording: Some(recording),
+        line: finding.first.first().copied(),
+        first: at.clone(),
+        last: at.clone(),
+        text: finding.message,
+        interpretation: finding.interpretation,
+    });
+    known.count += finding.count;
+    known.last = at;
+}

@@ -1,0 +1,190 @@
+//! What an audit found, for people.
+
+use std::fmt::Write as _;
+
+use super::result::{AuditResult, FindingResult, SideResult, VehicleResult};
+use tck_base::verdict::Verdict;
+use tck_report::clean::{line, short};
+use tck_report::statement::many;
+
+/// The page.
+#[must_use]
+pub fn page(result: &AuditResult) -> String {
+    let mut text = String::new();
+    for recording in &result.recordings {
+        let _ = write!(
+            text,
+            "{}: {}",
+            line(&recording.name),
+            counted(recording.lines, &recording.unit)
+        );
+        if recording.skipped > 0 {
+            let _ = write!(text, ", {} of them no message", recording.skipped);
+        }
+        text.push('\n');
+    }
+    if let (Some(first), Some(last)) = (&result.first, &result.last) {
+        let _ = writeln!(text, "from {first} to {last}");
+    }
+    for vehicle in &result.vehicles {
+        text.push_str(&of_vehicle(vehicle, result));
+    }
+    text.push('\n');
+    if result.elsewhere > 0 {
+        let _ = writeln!(
+            text,
+            "{} on other topics, or of vehicles that were not asked for",
+            counted(result.elsewhere, "message")
+        );
+    }
+    if result.beyond > 0 {
+        let _ = writeln!(
+            text,
+            "{} of further vehicles: too many to be judged at once",
+            counted(result.beyond, "message")
+        );
+    }
+    let _ = writeln!(text, "{}", conclusion(result));
+    text
+}
+
+fn conclusion(result: &AuditResult) -> String {
+    let sides = || result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
+    let kinds = |verdict: Verdict| {
+        sides()
+            .flat_map(|side| &side.findings)
+            .filter(|finding| finding.verdict == verdict)
+            .count()
+    };
+    let vehicles = many(result.vehicles.len(), "vehicle");
+    match result.verdict {
+        None if result.vehicles.is_empty() => "No message of VDA 5050 was found.".to_owned(),
+        None => format!("{vehicles}; nothing could be judged."),
+        Some(_) => format!(
+            "{vehicles}; {}, {}. What a recording cannot show was not judged; --format json lists it.",
+            many(kinds(Verdict::Fail), "violation"),
+            many(kinds(Verdict::Warning), "warning")
+        ),
+    }
+}
+
+fn of_vehicle(vehicle: &VehicleResult, result: &AuditResult) -> String {
+    let mut text = String::from("\n");
+    let version = vehicle.protocol.as_deref().unwrap_or("of an unknown version");
+    let _ = writeln!(
+        text,
+        "{} {} · VDA 5050 {version} · {}",
+        line(&vehicle.manufacturer),
+        line(&vehicle.serial_number),
+        line(&vehicle.topics)
+    );
+    let topics: Vec<String> = vehicle
+        .messages
+        .iter()
+        .map(|(name, count)| format!("{count} {name}"))
+        .collect();
+    let _ = writeln!(text, "      seen: {}", topics.join(", "));
+    let mut left = Vec::new();
+    for (count, one, more) in [
+        (
+            vehicle.holes,
+            "place where messages are missing",
+            "places where messages are missing",
+        ),
+        (vehicle.twice, "message recorded twice", "messages recorded twice"),
+        (
+            vehicle.retained,
+            "message that may be an old one",
+            "messages that may be old ones",
+        ),
+    ] {
+        if count > 0 {
+            left.push(format!("{count} {}", if count == 1 { one } else { more }));
+        }
+    }
+    if !left.is_empty() {
+        let _ = writeln!(text, "      not judged: {}", left.join(", "));
+    }
+    if let Some(why) = &vehicle.not_judged {
+        let _ = writeln!(text, "n/a   {}", line(why));
+    }
+    for side in &vehicle.sides {
+        text.push_str(&of_side(side, result));
+    }
+    text
+}
+
+fn of_side(side: &SideResult, result: &AuditResult) -> String {
+    let who = match side.role.as_str() {
+        "agv" => "the vehicle",
+        _ => "its master control",
+    };
+    let held = |known: &&super::result::Decided| known.verdict == Verdict::Pass;
+    let hold = side.requirements.iter().filter(held).count();
+    let others = side.requirements.len() - hold;
+    let mut text = format!(
+        "{}{who}, {}: {} kept",
+        tag(side.verdict),
+        counted(side.messages, "message"),
+        many(hold, "requirement"),
+    );
+    if others > 0 {
+        let _ = write!(text, ", {others} not");
+    }
+    text.push('\n');
+    for finding in &side.findings {
+        text.push_str(&of_finding(finding, result));
+    }
+    for known in &side.information {
+        let _ = writeln!(
+            text,
+            "      {} {}, {}: {}",
+            known.requirement,
+            known.monitor,
+            times(known.count),
+            short(&line(&known.text), 200)
+        );
+    }
+    text
+}
+
+fn of_finding(finding: &FindingResult, result: &AuditResult) -> String {
+    let recording = finding.recording.and_then(|number| result.recordings.get(number));
+    let place = match (recording, finding.line) {
+        (Some(recording), Some(at)) => format!("{}:{at}", line(&recording.name)),
+        _ => format!("message {}", finding.message),
+    };
+    let mut text = format!(
+        "      {}{} {}, {}: {place}, {}\n",
+        tag(Some(finding.verdict)),
+        finding.requirement,
+        finding.monitor,
+        times(finding.count),
+        finding.first
+    );
+    let _ = writeln!(text, "            {}", short(&line(&finding.text), 400));
+    text
+}
+
+fn times(count: u64) -> String {
+    match count {
+        1 => "once".to_owned(),
+        2 => "twice".to_owned(),
+        _ => format!("{count} times"),
+    }
+}
+
+fn counted(count: u64, one: &str) -> String {
+    many(usize::try_from(count).unwrap_or(usize::MAX), one)
+}
+
+fn tag(verdict: Option<Verdict>) -> &'static str {
+    match verdict {
+        Some(Verdict::Pass) => "PASS  ",
+        Some(Verdict::Warning) => "WARN  ",
+        Some(Verdict::Inconclusive) => "INCONCLUSIVE ",
+        Some(Verdict::Error) => "ERROR ",
+        Some(Verdict::Fail) => "FAIL  ",
+        None => "n/a   ",
+    }
+}

@@ -1,0 +1,240 @@
+//! What an audit found, for programs.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use serde::Serialize;
+
+use super::time_line::TimeLine;
+use tck_base::verdict::{Accumulated, Verdict};
+use tck_capture::Place;
+use tck_pack::Role;
+
+/// Format of the result of an audit.
+pub const RESULT_FORMAT: &str = "vda5050-tck.audit/1";
+/// Of so many messages it is known where they stand.
+const PLACES: usize = 16_384;
+
+/// The result.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct AuditResult {
+    /// [`RESULT_FORMAT`].
+    pub format: String,
+    /// Name and version of the tool.
+    pub tool: String,
+    /// The worst of all sides; `None` when nothing was judged.
+    pub verdict: Option<Verdict>,
+    /// The recordings.
+    pub recordings: Vec<Recording>,
+    /// Messages in all.
+    pub messages: u64,
+    /// When the first one was recorded.
+    pub first: Option<String>,
+    /// When the last one was recorded.
+    pub last: Option<String>,
+    /// Messages on topics of no vehicle, or of one that is not wanted.
+    pub elsewhere: u64,
+    /// Messages of vehicles beyond those that are judged at once.
+    pub beyond: u64,
+    /// The vehicles.
+    pub vehicles: Vec<VehicleResult>,
+}
+
+/// One recording.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Recording {
+    /// Its name.
+    pub name: String,
+    /// What it consists of: `line`, or `frame` of captured traffic.
+    pub unit: String,
+    /// Lines in all.
+    pub lines: u64,
+    /// Lines that hold no message.
+    pub skipped: u64,
+}
+
+/// One vehicle, with the master control that commands it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct VehicleResult {
+    /// Manufacturer.
+    pub manufacturer: String,
+    /// Serial number.
+    pub serial_number: String,
+    /// Its topics, with `{topic}` for the name.
+    pub topics: String,
+    /// Protocol version it is judged by.
+    pub protocol: Option<String>,
+    /// Why it is not judged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<String>,
+    /// Messages by topic name.
+    pub messages: BTreeMap<String, u64>,
+    /// How often messages are missing.
+    pub holes: u64,
+    /// Messages that were recorded twice.
+    pub twice: u64,
+    /// Messages that were stored by the broker, or may have been: they are not judged.
+    pub retained: u64,
+    /// `subscriber`, or `tap` where packets were recorded.
+    pub vantage: String,
+    /// What it did over time.
+    #[serde(skip_serializing_if = "TimeLine::is_empty")]
+    pub time_line: TimeLine,
+    /// Its sides.
+    pub sides: Vec<SideResult>,
+}
+
+/// One side.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct SideResult {
+    /// `agv` or `master-control`.
+    pub role: String,
+    /// `None` when nothing was judged.
+    pub verdict: Option<Verdict>,
+    /// Messages of this side.
+    pub messages: u64,
+    /// How many monitors had something to judge.
+    pub judged: usize,
+    /// Fails and warnings, the worst first.
+    pub findings: Vec<FindingResult>,
+    /// What is worth knowing, and decides nothing.
+    pub information: Vec<FindingResult>,
+    /// The requirements that were decided.
+    pub requirements: Vec<Decided>,
+    /// The monitors that could not judge.
+    pub undecided: Vec<Undecided>,
+}
+
+/// What a monitor found, with all of its kind.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct FindingResult {
+    /// Id of the monitor.
+    pub monitor: String,
+    /// The requirement.
+    pub requirement: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// How often.
+    pub count: u64,
+    /// Number of the first message that shows it, counted from 1.
+    pub message: u64,
+    /// Number of its recording, counted from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recording: Option<usize>,
+    /// Its line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<u64>,
+    /// When it was found first.
+    pub first: String,
+    /// When it was found last.
+    pub last: String,
+    /// What is wrong, of the first one.
+    pub text: String,
+    /// The ruling it rests on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interpretation: Option<String>,
+}
+
+/// A requirement that was decided.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Decided {
+    /// Its id.
+    pub id: String,
+    /// How.
+    pub verdict: Verdict,
+    /// By which monitors.
+    pub decided_by: Vec<String>,
+}
+
+/// A monitor that could not judge.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Undecided {
+    /// Its id.
+    pub monitor: String,
+    /// Why.
+    pub why: String,
+}
+
+impl SideResult {
+    /// Puts a side together.
+    #[must_use]
+    pub fn new(
+        role: Role,
+        messages: u64,
+        judged: usize,
+        found: Vec<FindingResult>,
+        passed: BTreeSet<(String, String)>,
+        undecided: Vec<Undecided>,
+    ) -> Self {
+        let is_finding = |finding: &FindingResult| matches!(finding.verdict, Verdict::Fail | Verdict::Warning);
+        let (mut findings, information): (Vec<_>, Vec<_>) = found.into_iter().partition(is_finding);
+        findings.sort_by(|one, other| {
+            let key = |finding: &FindingResult| (std::cmp::Reverse(finding.verdict), finding.message);
+            key(one).cmp(&key(other))
+        });
+        let mut verdict: Accumulated = findings.iter().map(|finding| finding.verdict).collect();
+        if judged > 0 {
+            verdict.add(Verdict::Pass);
+        }
+        let mut decided: BTreeMap<String, (Verdict, BTreeSet<String>)> = BTreeMap::new();
+        let passed = passed.into_iter().map(|(id, monitor)| (id, Verdict::Pass, monitor));
+        let broken = findings.iter().map(|finding| {
+            let FindingResult {
+                requirement, monitor, ..
+            } = finding;
+            (requirement.clone(), finding.verdict, monitor.clone())
+        });
+        for (id, verdict, monitor) in passed.chain(broken) {
+            let known = decided.entry(id).or_insert((verdict, BTreeSet::new()));
+            known.0 = known.0.join(verdict);
+            known.1.insert(monitor);
+        }
+        let requirements = decided.into_iter().map(|(id, (verdict, by))| Decided {
+            id,
+            verdict,
+            decided_by: by.into_iter().collect(),
+        });
+        Self {
+            role: role.word().to_owned(),
+            verdict: verdict.get(),
+            messages,
+            judged,
+            findings,
+            information,
+            requirements: requirements.collect(),
+            undecided,
+        }
+    }
+}
+
+/// The worst verdict of all sides.
+#[must_use]
+pub fn verdict_of(vehicles: &[VehicleResult]) -> Option<Verdict> {
+    let sides = vehicles.iter().flat_map(|vehicle| &vehicle.sides);
+    sides.filter_map(|side| side.verdict).collect::<Accumulated>().get()
+}
+
+/// Where the last messages stand.
+#[derive(Debug, Default)]
+pub struct Whence(VecDeque<(u64, Place)>);
+
+impl Whence {
+    pub(super) fn note(&mut self, message: u64, place: Place) {
+        if self.0.len() == PLACES {
+            self.0.pop_front();
+        }
+        self.0.push_back((message, place));
+    }
+
+    /// Where a message stands, if that is still known.
+    pub(super) fn of(&self, message: u64) -> Option<Place> {
+        let at = self.0.binary_search_by_key(&message, |(number, _)| *number).ok()?;
+        self.0.get(at).map(|(_, place)| *place)
+    }
+}

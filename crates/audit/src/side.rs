@@ -1,0 +1,264 @@
+//! One side of a vehicle's traffic: what the vehicle says, or what is said to it.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+use super::news::Found;
+use super::outcome::Outcome;
+use super::result::{FindingResult, Undecided};
+use super::scope::{self, PACKETS, Use};
+use super::{Scene, cause};
+use tck_base::clock::{Moment, Stamp};
+use tck_base::verdict::Verdict;
+use tck_journal::Entry;
+use tck_journal::event::{Event, Record, RunHeader, Source};
+use tck_judge::{Observed, SideJudge};
+use tck_pack::{Pack, Role};
+use tck_result::MonitorFinding;
+use tck_suite::model::Monitor;
+
+/// How many findings wait for their confirmation.
+const OPEN: usize = 256;
+/// How many different findings a side keeps.
+const DIFFERENT: usize = 512;
+
+/// How many causes are told apart, of one requirement.
+const CAUSES: usize = 16;
+
+/// Monitor, requirement and verdict, and the cause.
+type Key = ((String, String, Verdict), String);
+
+/// See the module.
+pub(super) struct Side {
+    pub role: Role,
+    header: RunHeader,
+    /// Whether the recording says when messages came.
+    timed: bool,
+    begun: Stamp,
+    each: SideJudge,
+    /// Those that need an unbroken record, from where it is one.
+    unbroken: Option<SideJudge>,
+    kept: BTreeMap<Key, FindingResult>,
+    /// What holds only if nothing turns out to be missing: since when, and what.
+    open: VecDeque<(Moment, Observed, jiff::Timestamp)>,
+    judged: BTreeMap<String, u64>,
+    decided: BTreeSet<(String, String)>,
+    pub messages: u64,
+    /// What was found since it was taken last, where somebody wants to know at once.
+    pub news: Vec<Found>,
+}
+
+impl Side {
+    /// Begins; `None` when the rules have no such side.
+    pub fn begin(role: Role, header: RunHeader, begun: Stamp, timed: bool, scene: Scene<'_>) -> Option<Self> {
+        let mut each = start(&header, scene, &|id| scope::of(id) == Some(Use::EachMessage))?;
+        each.observe(&first(&header, begun));
+        Some(Self {
+            role,
+            header,
+            timed,
+            begun,
+            each,
+            unbroken: None,
+            kept: BTreeMap::new(),
+            open: VecDeque::new(),
+            judged: BTreeMap::new(),
+            decided: BTreeSet::new(),
+            messages: 0,
+            news: Vec::new(),
+        })
+    }
+
+    /// Whether the monitors that need an unbroken record are on duty.
+    pub fn watches(&self) -> bool {
+        self.unbroken.is_some()
+    }
+
+    /// Something is missing since then.
+    pub fn broken(&mut self, since: Moment) {
+        self.open.retain(|(at, ..)| *at < since);
+        if let Some(judge) = self.unbroken.take() {
+            self.absorb(&judge);
+        }
+    }
+
+    /// From here on nothing is missing, as far as can be told.
+    pub fn mended(&mut self, scene: Scene<'_>) {
+        if self.unbroken.is_some() {
+            return;
+        }
+        let timed = self.timed;
+        let wanted = move |id: &str| match scope::of(id) {
+            Some(Use::Unbroken) => true,
+            Some(Use::UnbrokenInTime) => timed,
+            _ => false,
+        };
+        self.unbroken = start(&self.header, scene, &wanted).map(|mut judge| {
+            judge.observe(&first(&self.header, self.begun));
+            judge
+        });
+    }
+
+    /// Nothing was missing up to here.
+    pub fn confirmed(&mut self, scene: Scene<'_>) {
+        while let Some((_, observed, utc)) = self.open.pop_front() {
+            self.keep(observed, utc, scene);
+        }
+    }
+
+    /// Shows it a message.
+    pub fn observe(&mut self, entry: &Arc<Entry>, utc: jiff::Timestamp, scene: Scene<'_>) {
+        for observed in self.each.observe(entry) {
+            self.keep(observed, utc, scene);
+        }
+        let found = self
+            .unbroken
+            .as_mut()
+            .map(|judge| judge.observe(entry))
+            .unwrap_or_default();
+        for observed in found {
+            if self.open.len() == OPEN {
+                self.open.pop_front();
+            }
+            self.open.push_back((entry.at().moment, observed, utc));
+        }
+    }
+
+    fn keep(&mut self, observed: Observed, utc: jiff::Timestamp, scene: Scene<'_>) {
+        let Observed { monitor, finding } = observed;
+        let key = self.key(&monitor, &finding);
+        let last = format!("{utc:.3}");
+        let message = finding.first.first().copied().unwrap_or_default();
+        if scene.live {
+            let known = self.kept.get(&key).map_or(0, |known| known.count);
+            self.news.push(Found {
+                manufacturer: self.header.manufacturer.clone(),
+                serial_number: self.header.serial_number.clone(),
+                role: self.role.word().to_owned(),
+                monitor: monitor.clone(),
+                requirement: finding.requirement.clone(),
+                verdict: finding.verdict,
+                count: known + finding.count,
+                before: known,
+                message,
+                at: last.clone(),
+                text: finding.message.clone(),
+                interpretation: finding.interpretation.clone(),
+            });
+        }
+        if let Some(known) = self.kept.get_mut(&key) {
+            known.count += finding.count;
+            known.last = last;
+            return;
+        }
+        if self.kept.len() >= DIFFERENT {
+            return;
+        }
+        let place = scene.places.of(message);
+        let finding = FindingResult {
+            monitor,
+            requirement: finding.requirement,
+            verdict: finding.verdict,
+            count: finding.count,
+            message,
+            recording: place.map(|place| place.file),
+            line: place.map(|place| place.line),
+            first: last.clone(),
+            last,
+            text: finding.message,
+            interpretation: finding.interpretation,
+        };
+        self.kept.insert(key, finding);
+    }
+
+    /// Takes over what was found of its connections.
+    pub fn wired(&mut self, outcome: Outcome, scene: Scene<'_>) {
+        for (id, judged) in outcome.judged {
+            *self.judged.entry(id).or_default() += judged;
+        }
+        self.decided.extend(outcome.decided);
+        for (observed, utc) in outcome.found {
+            self.keep(observed, utc, scene);
+        }
+    }
+
+    /// What a finding is counted with: others of the same cause, or all others where there are too many causes.
+    fn key(&self, monitor: &str, finding: &MonitorFinding) -> Key {
+        let group = (monitor.to_owned(), finding.requirement.clone(), finding.verdict);
+        let key = (group, cause::of(&finding.message));
+        let causes = self.kept.range((key.0.clone(), String::new())..);
+        let causes = causes.take_while(|(known, _)| known.0 == key.0).count();
+        if self.kept.contains_key(&key) || causes < CAUSES {
+            return key;
+        }
+        (key.0, String::new())
+    }
+
+    fn absorb(&mut self, judge: &SideJudge) {
+        for (id, judged) in judge.judged() {
+            *self.judged.entry(id).or_default() += judged;
+        }
+        self.decided.extend(judge.decided());
+    }
+
+    /// What came out.
+    pub fn finish(mut self, scene: Scene<'_>) -> super::result::SideResult {
+        // What is found at the very end may be explained by what comes next.
+        self.open.clear();
+        if let Some(judge) = self.unbroken.take() {
+            self.absorb(&judge);
+        }
+        for (id, judged) in self.each.judged() {
+            *self.judged.entry(id).or_default() += judged;
+        }
+        self.decided.extend(self.each.decided());
+        let findings = self.kept.into_values().collect();
+        let mut undecided = Vec::new();
+        for monitor in of_side(scene, self.role, &self.header) {
+            let id = monitor.id.clone();
+            let why = match scope::of(&id) {
+                Some(Use::Never(why)) => why,
+                Some(Use::UnbrokenInTime) if !self.timed => "the recording does not say when messages came",
+                Some(Use::Packets) if self.judged.get(&id).is_none_or(|judged| *judged == 0) => PACKETS,
+                _ if self.judged.get(&id).is_none_or(|judged| *judged == 0) => "nothing came that it could judge",
+                _ => continue,
+            };
+            undecided.push(Undecided {
+                monitor: id,
+                why: why.to_owned(),
+            });
+        }
+        let judged = self.judged.values().filter(|judged| **judged > 0).count();
+        super::result::SideResult::new(self.role, self.messages, judged, findings, self.decided, undecided)
+    }
+}
+
+pub(super) fn start(header: &RunHeader, scene: Scene<'_>, used: &dyn Fn(&str) -> bool) -> Option<SideJudge> {
+    let wanted = |monitor: &Monitor| used(&monitor.id) && scene.options.wants_monitor(monitor);
+    SideJudge::begin(scene.rules, header, &wanted).ok()
+}
+
+/// The record that every journal begins with.
+pub(super) fn first(header: &RunHeader, at: Stamp) -> Arc<Entry> {
+    Entry::new(Record {
+        seq: 0,
+        at,
+        source: Source::Harness,
+        direction: None,
+        event: Event::RunBegun {
+            header: Box::new(header.clone()),
+        },
+    })
+}
+
+/// The monitors that are meant for this side and version, and wanted.
+fn of_side<'s>(scene: Scene<'s>, role: Role, header: &RunHeader) -> impl Iterator<Item = &'s Arc<Monitor>> {
+    let pack: Option<&Arc<Pack>> = scene.rules.packs.get(&header.protocol);
+    let version = pack.map(|pack| pack.version);
+    let monitors = scene.rules.suites.monitors.iter();
+    monitors.filter(move |monitor| {
+        monitor.device.is_none_or(|device| device == role)
+            && version.is_some_and(|version| monitor.spec.contains(version))
+            && scene.options.wants_monitor(monitor)
+    })
+}

@@ -1,0 +1,193 @@
+//! One message, judged by itself: what it breaks whatever came before and comes after.
+
+use bytes::Bytes;
+
+use super::header::header;
+use super::scope::{self, Use};
+use tck_base::clock::{Moment, Stamp};
+use tck_base::verdict::Verdict;
+use tck_journal::event::{Direction, Event, Record, Source};
+use tck_journal::{Entry, Payload};
+use tck_judge::{Rules, SideJudge};
+use tck_pack::Pack;
+
+/// What is wrong with a message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Flaw {
+    /// Every requirement that is broken by this.
+    pub requirements: Vec<String>,
+    /// Fail or warning.
+    pub verdict: Verdict,
+    /// Id of the monitor.
+    pub monitor: String,
+    /// One line.
+    pub text: String,
+    /// The ruling it rests on.
+    pub interpretation: Option<String>,
+}
+
+/// Judges a message of a topic of this name by all monitors that need nothing else; the worst flaws come first.
+#[must_use]
+pub fn single(rules: &Rules, pack: &Pack, name: &str, payload: &Bytes) -> Vec<Flaw> {
+    let Some(publisher) = pack.topic(name).map(|rule| rule.publisher) else {
+        return Vec::new();
+    };
+    let event = Event::Message {
+        topic: topic(name),
+        qos: 0,
+        retain: false,
+        dup: false,
+        payload: Payload::keep(payload.clone()),
+    };
+    let draft = record(
+        1,
+        Stamp {
+            moment: Moment::START,
+            utc: jiff::Timestamp::UNIX_EPOCH,
+        },
+        event,
+    );
+    let message = Entry::new(draft.clone());
+    let text = |member: &str| {
+        let text = message.json().and_then(|message| message.get(member)?.as_str());
+        text.unwrap_or_default().to_owned()
+    };
+    // What its clock says cannot be held against anything.
+    let at = Stamp {
+        moment: Moment::START,
+        utc: text("timestamp").parse().unwrap_or_default(),
+    };
+    let names = pack.topics().iter().map(|rule| rule.name.as_str());
+    let topics = names.map(|name| (name.to_owned(), topic(name))).collect();
+    let header = header(publisher, pack, &text("manufacturer"), &text("serialNumber"), topics);
+    // Topics are no part of a message.
+    let is_meant = |id: &str| scope::of(id) == Some(Use::EachMessage) && !id.starts_with("topic/");
+    let Ok(mut judge) = SideJudge::begin(rules, &header, &|monitor| is_meant(&monitor.id)) else {
+        return Vec::new();
+    };
+    let begun = Event::RunBegun {
+        header: Box::new(header),
+    };
+    let mut found = judge.observe(&Entry::new(record(0, at, begun)));
+    found.extend(judge.observe(&Entry::beside(&message, Record { at, ..draft })));
+    let mut flaws: Vec<Flaw> = Vec::new();
+    for observed in found {
+        let finding = observed.finding;
+        if !matches!(finding.verdict, Verdict::Fail | Verdict::Warning) {
+            continue;
+        }
+        let same = flaws.iter_mut().find(|flaw| {
+            flaw.verdict == finding.verdict && flaw.text == finding.message && flaw.monitor == observed.monitor
+        });
+        match same {
+            Some(flaw) => flaw.requirements.push(finding.requirement),
+            None => flaws.push(Flaw {
+                requirements: vec![finding.requirement],
+                verdict: finding.verdict,
+                monitor: observed.monitor,
+                text: finding.message,
+                interpretation: finding.interpretation,
+            }),
+        }
+    }
+    flaws.sort_by_key(|flaw| std::cmp::Reverse(flaw.verdict));
+    flaws
+}
+
+fn topic(name: &str) -> String {
+    format!("interface/v2/manufacturer/serial/{name}")
+}
+
+fn record(seq: u64, at: Stamp, event: Event) -> Record {
+    Record {
+        seq,
+        at,
+        source: Source::Link,
+        direction: Some(Direction::FromDevice),
+        event,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+
+    fn flaws(name: &str, text: &str) -> Vec<(String, Verdict)> {
+        let library = tck_testing::library();
+        let pack = library.rules.packs.latest();
+        let found = single(&library.rules, pack, name, &Bytes::from(text.to_owned()));
+        found
+            .into_iter()
+            .flat_map(|flaw| {
+                let verdict = flaw.verdict;
+                flaw.requirements.into_iter().map(move |id| (id, verdict))
+            })
+            .collect()
+    }
+
+    fn good(name: &str) -> String {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        std::fs::read_to_string(format!("{folder}/fixtures/messages/2.1/good/{name}.json")).expect("fixture")
+    }
+
+    #[test]
+    fn good_messages_have_no_flaw() {
+        let folder = format!("{}/fixtures/messages", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+        let library = tck_testing::library();
+        let mut seen = 0;
+        for pack in library.rules.packs.all() {
+            let version = format!("{}.{}", pack.version.major, pack.version.minor);
+            for entry in std::fs::read_dir(format!("{folder}/{version}/good")).expect("folder") {
+                let path = entry.expect("entry").path();
+                let file = path.file_name().expect("name").to_string_lossy().into_owned();
+                let name = pack
+                    .topics()
+                    .iter()
+                    .map(|rule| rule.name.as_str())
+                    .find(|name| file.starts_with(name));
+                let text = Bytes::from(std::fs::read(&path).expect("message"));
+                let found = single(&library.rules, pack, name.expect("topic"), &text);
+                // Some of them have other digits in their times, which the schema allows.
+                let more: Vec<&Flaw> = found.iter().filter(|flaw| flaw.requirements != ["HDR-03"]).collect();
+                assert!(more.is_empty(), "{}: {more:?}", path.display());
+                seen += 1;
+            }
+        }
+        assert!(seen > 10);
+    }
+
+    #[test]
+    fn what_the_schema_cannot_say_is_found_in_a_message_alone() {
+        let state = good("state-idle").replace(":30Z", ":30.00Z");
+        let twice = state.replacen('{', "{\"driving\": false,", 1);
+        assert_eq!(flaws("state", &twice), [("JSON-10".to_owned(), Verdict::Warning)]);
+        let wrong: Vec<String> = flaws("state", &state.replace("AUTOMATIC", "AUTOMATISCH"))
+            .into_iter()
+            .map(|(id, _)| id)
+            .collect();
+        assert!(
+            wrong.contains(&"JSON-02".to_owned()) && wrong.contains(&"MODE-01".to_owned()),
+            "{wrong:?}"
+        );
+        let local = serde_json::from_str::<Value>(&state).map(|mut value| {
+            value["timestamp"] = "2026-01-01T12:00:00+01:00".into();
+            value.to_string()
+        });
+        let found = flaws("state", &local.expect("JSON"));
+        assert!(
+            found
+                .iter()
+                .any(|(id, verdict)| id == "HDR-03" && *verdict == Verdict::Fail),
+            "{found:?}"
+        );
+        let order = serde_json::from_str::<Value>(&good("order-full")).map(|mut order| {
+            order["edges"][0]["startNodeId"] = "nowhere".into();
+            order.to_string()
+        });
+        assert!(!flaws("order", &order.expect("JSON")).is_empty());
+        assert!(flaws("state", "{\"a\": NaN}").iter().any(|(id, _)| id == "JSON-08"));
+        assert!(flaws("no-topic", "{}").is_empty());
+    }
+}

@@ -1,0 +1,355 @@
+//! One vehicle of a recording, with the master control that commands it: what came, in its order, and by which version of
+//! the protocol its [`conversation`](super::conversation) is judged.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::Scene;
+use super::arrival::{Known, Sorted};
+use super::arrived::{Arrived, timestamp, version};
+use super::conversation::{Concluded, Conversation};
+use super::header::header;
+use super::news::Found;
+use super::outcome::Outcome;
+use super::result::VehicleResult;
+use super::side::Side;
+use super::time_line::TimeLine;
+use super::topics::Named;
+use tck_base::clock::{Moment, Stamp};
+use tck_base::pattern::whole;
+use tck_capture::Message;
+use tck_journal::event::{Event, Record, RunHeader, Source};
+use tck_journal::{Entry, Payload};
+use tck_pack::{Pack, Role, Version};
+
+/// How many messages wait until the vehicle has said which version it speaks.
+const WAITING: usize = 64;
+/// How long a topic is believed to be seen at its sender.
+const FIRST_HAND: Duration = Duration::from_secs(60);
+/// How often the version of a vehicle may change; a vehicle that changes it more often is judged by the last one.
+const STRETCHES: usize = 16;
+
+/// See the module.
+pub(super) struct Vehicle {
+    named: Named,
+    timed: bool,
+    manufacturer: String,
+    serial_number: String,
+    origin: Option<jiff::Timestamp>,
+    now: Moment,
+    known: Known,
+    sorted: BTreeMap<String, Sorted<Arrived>>,
+    /// Topics of which something came.
+    begun: BTreeSet<String>,
+    waiting: Vec<Arrived>,
+    conversation: Conversation,
+    /// The version it names, where there are no rules for it.
+    foreign: Option<String>,
+    counts: BTreeMap<String, u64>,
+    twice: u64,
+    stale: u64,
+    /// When a message of this topic was seen last on its way from its sender.
+    first_hand: BTreeMap<String, Option<jiff::Timestamp>>,
+    time_line: TimeLine,
+    /// Whether its connections were judged.
+    wired: bool,
+    /// What came out while it spoke another version.
+    earlier: Vec<VehicleResult>,
+    /// What was found of those.
+    news: Vec<Found>,
+}
+
+impl Vehicle {
+    pub fn new(named: &Named, timed: bool) -> Self {
+        Self {
+            manufacturer: named.manufacturer.clone(),
+            serial_number: named.serial_number.clone(),
+            named: named.clone(),
+            timed,
+            origin: None,
+            now: Moment::START,
+            known: Known::default(),
+            sorted: BTreeMap::new(),
+            begun: BTreeSet::new(),
+            waiting: Vec::new(),
+            conversation: Conversation::default(),
+            foreign: None,
+            counts: BTreeMap::new(),
+            twice: 0,
+            stale: 0,
+            first_hand: BTreeMap::new(),
+            time_line: TimeLine::default(),
+            wired: false,
+            earlier: Vec::new(),
+            news: Vec::new(),
+        }
+    }
+
+    /// Takes in a message; says whether it was worth something.
+    pub fn observe(&mut self, number: u64, name: &str, message: Message, scene: Scene<'_>) -> bool {
+        if self.is_copy(name, &message) {
+            return false;
+        }
+        *self.counts.entry(name.to_owned()).or_default() += 1;
+        let is_first = self.begun.insert(name.to_owned());
+        // Where the recording does not say it, the first message of a topic may be one that was stored.
+        let stale = message.retain.unwrap_or(is_first);
+        if !stale && self.known.again(name, &message.payload) {
+            self.twice += 1;
+            return true;
+        }
+        self.stale += u64::from(stale);
+        let payload = Payload::keep(message.payload);
+        let draft = Entry::new(Record {
+            seq: number,
+            at: Stamp {
+                moment: self.now,
+                utc: message.at.unwrap_or_default(),
+            },
+            source: Source::Link,
+            direction: None,
+            event: Event::Message {
+                topic: message.topic,
+                qos: message.qos.unwrap_or_default(),
+                retain: stale,
+                dup: false,
+                payload,
+            },
+        });
+        let at = self.stamp(message.at, draft.json());
+        let id = draft.json().and_then(|message| whole(message.get("headerId")?));
+        let arrived = Arrived {
+            number,
+            name: name.to_owned(),
+            at,
+            stale,
+            entry: draft,
+        };
+        let mut due = Vec::new();
+        if self.timed {
+            for sorted in self.sorted.values_mut() {
+                due.extend(sorted.due(at.moment));
+            }
+        }
+        if stale || !self.timed {
+            due.push(arrived);
+        } else {
+            let sorted = self.sorted.entry(name.to_owned()).or_default();
+            due.extend(sorted.take(id, at.moment, arrived));
+        }
+        due.sort_by_key(|arrived| arrived.at.moment);
+        for arrived in due {
+            self.pass(arrived, scene);
+        }
+        true
+    }
+
+    /// Whether a broker hands on what is seen at its sender, too.
+    fn is_copy(&mut self, name: &str, message: &Message) -> bool {
+        let Some(carried) = message.carried else { return false };
+        if carried.sent {
+            self.first_hand.insert(name.to_owned(), message.at);
+            return false;
+        }
+        let is_recent = |at: &Option<jiff::Timestamp>| match (at, message.at) {
+            (Some(at), Some(now)) => now.duration_since(*at).unsigned_abs() <= FIRST_HAND,
+            _ => true,
+        };
+        self.first_hand.get(name).is_some_and(is_recent)
+    }
+
+    /// The header of a judge of one of its sides, once its version is known.
+    pub fn own_header(&self, role: Role) -> Option<RunHeader> {
+        Some(self.header(role, self.conversation.pack()?))
+    }
+
+    /// Takes over what was found of a connection.
+    pub fn wired(&mut self, role: Role, outcome: Outcome, scene: Scene<'_>) {
+        if let Some(side) = self.conversation.sides_mut().find(|side| side.role == role) {
+            self.wired = true;
+            side.wired(outcome, scene);
+        }
+    }
+
+    /// Nothing was seen for a while.
+    pub fn interrupted(&mut self, scene: Scene<'_>) {
+        for arrived in self.held() {
+            self.pass(arrived, scene);
+        }
+        self.sorted.clear();
+        self.conversation.interrupted(self.now);
+    }
+
+    /// What was found since this was asked last.
+    pub fn news(&mut self) -> Vec<Found> {
+        let mut news = std::mem::take(&mut self.news);
+        for side in self.conversation.sides_mut() {
+            news.append(&mut side.news);
+        }
+        news
+    }
+
+    /// All that are held back.
+    fn held(&mut self) -> Vec<Arrived> {
+        let mut rest: Vec<Arrived> = self.sorted.values_mut().flat_map(Sorted::all).collect();
+        rest.sort_by_key(|arrived| arrived.number);
+        rest
+    }
+
+    /// When a message came. Without a time of the recorder, what the message says of itself has to do.
+    fn stamp(&mut self, recorded: Option<jiff::Timestamp>, message: Option<&Value>) -> Stamp {
+        let said = || message.and_then(timestamp);
+        let utc = if self.timed { recorded } else { said() };
+        let origin = *self.origin.get_or_insert(utc.unwrap_or_default());
+        let since = utc.map_or(0, |utc| utc.as_microsecond().saturating_sub(origin.as_microsecond()));
+        let since = Moment::from_micros(u64::try_from(since).unwrap_or_default());
+        self.now = self.now.max(since);
+        Stamp {
+            moment: self.now,
+            utc: utc.unwrap_or_default(),
+        }
+    }
+
+    /// A message whose turn it is.
+    fn pass(&mut self, arrived: Arrived, scene: Scene<'_>) {
+        if let Some(message) = arrived.entry.json().filter(|_| !arrived.stale) {
+            self.time_line.note(&arrived.name, message, arrived.at.utc);
+        }
+        if self.is_updated(&arrived) {
+            let concluded = self.conclude(scene);
+            self.earlier.push(concluded);
+        }
+        if self.conversation.pack().is_some() {
+            self.conversation.show(&arrived, scene);
+            return;
+        }
+        if self.foreign.is_some() {
+            return;
+        }
+        let of_vehicle = !arrived.stale && !matches!(arrived.name.as_str(), "order" | "instantActions");
+        self.waiting.push(arrived);
+        if of_vehicle || self.waiting.len() >= WAITING {
+            self.settle(scene, self.waiting.len() >= WAITING);
+        }
+    }
+
+    /// Whether the vehicle speaks another version from this message on: it is back with other software. Where its count
+    /// goes on as if nothing had been, the version of the message is wrong instead.
+    fn is_updated(&self, arrived: &Arrived) -> bool {
+        let is_command = matches!(arrived.name.as_str(), "order" | "instantActions");
+        if arrived.stale || is_command || self.earlier.len() >= STRETCHES {
+            return false;
+        }
+        let Some(message) = arrived.entry.json() else {
+            return false;
+        };
+        let Some(said) = version(message) else { return false };
+        let is_other = match (self.conversation.pack(), &self.foreign) {
+            (Some(pack), _) => said.parse().is_ok_and(|said: Version| said != pack.version),
+            (None, Some(foreign)) => said != *foreign,
+            (None, None) => false,
+        };
+        is_other && !self.conversation.goes_on(&arrived.name, message)
+    }
+
+    /// Finds the version, and judges what waited for it.
+    fn settle(&mut self, scene: Scene<'_>, at_last: bool) {
+        let commands = |arrived: &&Arrived| matches!(arrived.name.as_str(), "order" | "instantActions");
+        let (sent, said): (Vec<&Arrived>, Vec<&Arrived>) = self.waiting.iter().partition(commands);
+        // What was stored may be from before a change of the vehicle's software.
+        let lately = said.iter().filter(|arrived| at_last || !arrived.stale);
+        let versions = lately.chain(sent.iter().filter(|_| at_last));
+        let mut versions = versions.filter_map(|arrived| version(arrived.entry.json()?));
+        let found = versions.next();
+        let (pack, begun) = match (&found, self.waiting.first()) {
+            (Some(version), Some(first)) => (scene.rules.packs.get(version), first.at),
+            _ => return,
+        };
+        let Some(pack) = pack.cloned() else {
+            self.foreign = found;
+            self.waiting.clear();
+            return;
+        };
+        self.identify();
+        let roles = [Role::Agv, Role::MasterControl];
+        let sides = roles.map(|role| Side::begin(role, self.header(role, &pack), begun, self.timed, scene));
+        self.conversation.begin(pack, sides.into_iter().flatten().collect());
+        for arrived in std::mem::take(&mut self.waiting) {
+            self.conversation.show(&arrived, scene);
+        }
+    }
+
+    /// Where the topics do not say who the vehicle is, its messages do.
+    fn identify(&mut self) {
+        let said = self.waiting.iter().filter_map(|arrived| arrived.entry.json());
+        for message in said {
+            let text = |member: &str| message.get(member).and_then(Value::as_str).map(str::to_owned);
+            for (own, member) in [
+                (&mut self.manufacturer, "manufacturer"),
+                (&mut self.serial_number, "serialNumber"),
+            ] {
+                if own.is_empty() {
+                    *own = text(member).unwrap_or_default();
+                }
+            }
+        }
+    }
+
+    fn header(&self, role: Role, pack: &Pack) -> RunHeader {
+        let topics = self.named.all(pack.topics().iter().map(|rule| rule.name.as_str()));
+        header(role, pack, &self.manufacturer, &self.serial_number, topics)
+    }
+
+    /// Nothing comes any more that would say which version it speaks.
+    pub fn ready(&mut self, scene: Scene<'_>) {
+        for arrived in self.held() {
+            self.pass(arrived, scene);
+        }
+        if self.conversation.pack().is_none() && self.foreign.is_none() {
+            self.settle(scene, true);
+        }
+    }
+
+    /// What came out, version by version.
+    pub fn finish(mut self, scene: Scene<'_>) -> Vec<VehicleResult> {
+        self.ready(scene);
+        let last = self.conclude(scene);
+        self.earlier.push(last);
+        self.earlier
+    }
+
+    /// What came out since the vehicle speaks this version.
+    fn conclude(&mut self, scene: Scene<'_>) -> VehicleResult {
+        if self.conversation.pack().is_none() && self.foreign.is_none() {
+            self.settle(scene, true);
+        }
+        self.news = self.news();
+        let foreign = self.foreign.take();
+        let Concluded { protocol, sides, holes } = self.conversation.conclude(scene);
+        let not_judged = protocol.is_none().then(|| match &foreign {
+            Some(version) => format!("protocol version {version}, which this program does not have"),
+            None => "no message names a protocol version".to_owned(),
+        });
+        VehicleResult {
+            manufacturer: self.manufacturer.clone(),
+            serial_number: self.serial_number.clone(),
+            topics: self
+                .named
+                .all(["{topic}"].into_iter())
+                .into_values()
+                .next()
+                .unwrap_or_default(),
+            protocol,
+            not_judged,
+            messages: std::mem::take(&mut self.counts),
+            holes,
+            twice: std::mem::take(&mut self.twice),
+            retained: std::mem::take(&mut self.stale),
+            vantage: if self.wired { "tap" } else { "subscriber" }.to_owned(),
+            time_line: std::mem::take(&mut self.time_line),
+            sides,
+        }
+    }
+}

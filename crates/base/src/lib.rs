@@ -1,0 +1,11 @@
+//! What everything stands on: time, verdicts, diagnostics, YAML, patterns, curves and secrets.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod clock;
+pub mod diagnostic;
+pub mod nurbs;
+pub mod pattern;
+pub mod secrets;
+pub mod verdict;
+pub mod yaml;

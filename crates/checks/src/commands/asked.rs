@@ -1,0 +1,72 @@
+//! Kinds of instant actions that must not come, whatever the array they come in is called.
+
+use serde_json::Value;
+
+use super::{Command, Found};
+use crate::traffic::{Traffic, quote, text};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// See the module.
+pub(crate) const NOT_ASKED: Check = Check {
+    name: "commands/not-asked",
+    decides: &[
+        "ACT-08", "CONN-12", "CONN-14", "FACT-15", "IACT-02", "INFO-02", "INFO-03", "MODE-04", "VIS-03",
+    ],
+    doc: "No instant action of the `types` is sent, or none but those of `except`. Without an \
+          array `actions` they are looked for in `instantActions`, as older versions called it: there they are as wrong.",
+    arguments: &["types", "except"],
+    start: |context| {
+        let list = |name: &str| -> Option<Vec<String>> {
+            let list = context.with.get(name)?.as_array()?;
+            Some(list.iter().filter_map(Value::as_str).map(str::to_owned).collect())
+        };
+        Box::new(NotAsked {
+            traffic: Traffic::default(),
+            types: list("types"),
+            except: list("except"),
+        })
+    },
+};
+
+struct NotAsked {
+    traffic: Traffic,
+    /// What must not come; everything but the exceptions, if there are only those.
+    types: Option<Vec<String>>,
+    /// What may come all the same.
+    except: Option<Vec<String>>,
+}
+
+impl NotAsked {
+    fn forbids(&self, kind: &str) -> bool {
+        let named = |list: &Vec<String>| list.iter().any(|one| one == kind);
+        match (&self.types, &self.except) {
+            (Some(types), _) if !named(types) => false,
+            (_, Some(except)) => !named(except),
+            (types, None) => types.is_some(),
+        }
+    }
+}
+
+impl Running for NotAsked {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let command = Command::read(self.traffic, entry, context);
+        let Some(command) = command.filter(|command| command.order().is_none()) else {
+            return false;
+        };
+        let mut found = Found::new(entry, findings);
+        for (_, action) in command.actions() {
+            let kind = text(action, "actionType");
+            if self.forbids(kind) {
+                found.push(CheckFinding {
+                    requirement: None,
+                    verdict: None,
+                    seq: entry.seq(),
+                    message: format!("the instant action {} comes", quote(kind)),
+                });
+            }
+        }
+        true
+    }
+}

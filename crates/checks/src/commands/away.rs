@@ -1,0 +1,108 @@
+//! Nothing is sent to a vehicle that is known to be gone.
+
+use super::sheet::grace;
+use super::{Command, Found, said};
+use crate::traffic::{Traffic, says_broken, text};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::{Event, Packet};
+
+/// `commands/while-away`.
+pub(crate) const AWAY: Check = Check {
+    name: "commands/while-away",
+    decides: &["CONN-12"],
+    doc: "While the connection topic of a vehicle says CONNECTIONBROKEN or OFFLINE, no order and no instant action but a \
+          request for a message is sent to it. What comes within the time a message may take is not judged. A warning: \
+          nothing forbids it.",
+    arguments: &[],
+    start: |_| Box::new(Away::default()),
+};
+
+#[derive(Default)]
+struct Away {
+    traffic: Traffic,
+    /// Since when the master control may know that the vehicle is gone, and the word.
+    since: Option<(Moment, String)>,
+}
+
+impl Running for Away {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let now = entry.at().moment;
+        match entry.event() {
+            // A master control that was away itself has to hear it first.
+            Event::Fault { .. }
+            | Event::Packet {
+                packet: Packet::Connect { .. },
+                ..
+            } => self.delay(now),
+            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => self.delay(now),
+            _ => {}
+        }
+        if let Some(message) = said("connection", entry, context) {
+            let state = text(message, "connectionState");
+            let gone = says_broken(message) || Some(state) == context.pack.word("connection.offline");
+            self.since = gone.then(|| (now, state.chars().take(64).collect()));
+            return gone;
+        }
+        let Some((since, word)) = &self.since else { return false };
+        let Some(command) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        if self.traffic.disturbed || now.since(*since) < grace(context) {
+            return false;
+        }
+        let asks = |kind: &str| matches!(kind, "stateRequest" | "factsheetRequest");
+        let mut kinds = command
+            .actions()
+            .into_iter()
+            .map(|(_, action)| text(action, "actionType"));
+        let what = match command {
+            Command::Order(_) => "an order",
+            Command::Instant(_) if kinds.all(asks) => return true,
+            Command::Instant(_) => "an instant action",
+        };
+        Found::new(entry, findings).remark("CONN-12", format!("{what} is sent to a vehicle that is {word}"));
+        true
+    }
+}
+
+impl Away {
+    fn delay(&mut self, now: Moment) {
+        if let Some((since, _)) = &mut self.since {
+            *since = now;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use crate::trace::Trace;
+
+    /// What a message finds so long after the vehicle was lost, or has come back.
+    fn sent(after: f64, back: bool, kind: &str) -> Vec<String> {
+        let mut trace = Trace::master_control();
+        trace.sent("connection", &json!({ "connectionState": "CONNECTIONBROKEN" }));
+        if back {
+            trace
+                .wait(5.0)
+                .sent("connection", &json!({ "connectionState": "ONLINE" }));
+        }
+        let action = json!({ "actionId": "1", "actionType": kind });
+        trace
+            .wait(after)
+            .commands("instantActions", &json!({ "actions": [action] }));
+        trace.judge("commands/while-away").summary()
+    }
+
+    #[test]
+    fn who_is_gone_is_left_alone() {
+        assert_eq!(sent(5.0, false, "startPause"), ["CONN-12 warning"]);
+        assert!(sent(0.2, false, "startPause").is_empty());
+        assert!(sent(5.0, true, "startPause").is_empty());
+        assert!(sent(5.0, false, "stateRequest").is_empty());
+    }
+}

@@ -1,0 +1,99 @@
+//! `commands/health`: what the connection topic must not be taken for.
+//!
+//! An order that is sent to a vehicle with an error proves nothing about the connection topic: the same master control
+//! may send it without any event there. One that was kept back, and comes when nothing but the connection has changed,
+//! does.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::sheet::grace;
+use super::{Command, ELEMENTS, released, said, short};
+use crate::traffic::{Traffic, elements, quote, text};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::Event;
+
+/// See the module.
+pub(crate) const HEALTH: Check = Check {
+    name: "commands/health",
+    decides: &["CONN-14"],
+    doc: "An order that was kept back because the states of the vehicle show a FATAL error, or another order, does not \
+          come because the vehicle is ONLINE again, with the same states as before.",
+    arguments: &[],
+    start: |_| Box::new(Health::default()),
+};
+
+/// How many orders are remembered.
+const KEPT: usize = 1024;
+
+#[derive(Default)]
+struct Health {
+    traffic: Traffic,
+    orders: BTreeSet<String>,
+    /// Why no order can be begun, by the states: the error, or the order the vehicle has.
+    reason: Option<String>,
+    /// Since when a transport is kept back for it.
+    waits: Option<Moment>,
+    /// Whether the vehicle has come online since.
+    online: bool,
+}
+
+/// Why the vehicle cannot begin an order.
+fn reason(state: &Value) -> Option<String> {
+    let mut errors = elements(state, "errors").take(ELEMENTS);
+    if let Some(error) = errors.find(|error| text(error, "errorLevel") == "FATAL") {
+        return Some(format!("the FATAL error {}", quote(text(error, "errorType"))));
+    }
+    let mut base = elements(state, "nodeStates").take(ELEMENTS);
+    let driven = base.any(|node| released(node) == Some(true));
+    driven.then(|| format!("order {}", quote(text(state, "orderId"))))
+}
+
+impl Running for Health {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let now = entry.at().moment;
+        if let Event::Hook { hook, ok: true, .. } = entry.event()
+            && hook == "dispatch"
+            && self.reason.is_some()
+        {
+            self.waits.get_or_insert(now);
+        }
+        if let Some(state) = said("state", entry, context) {
+            let reason = reason(state);
+            if reason != self.reason {
+                (self.waits, self.online) = (None, false);
+                self.reason = reason;
+            }
+        }
+        if let Some(connection) = said("connection", entry, context)
+            && Some(text(connection, "connectionState")) == context.pack.word("connection.online")
+            && self.waits.is_some_and(|since| now.since(since) >= grace(context))
+        {
+            self.online = true;
+        }
+        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+        let Some(id) = order.and_then(|order| short(order, "orderId")) else {
+            return false;
+        };
+        let fresh = !self.orders.contains(&id);
+        if self.orders.len() < KEPT {
+            self.orders.insert(id.clone());
+        }
+        if !fresh {
+            return false;
+        }
+        let kept_back = self.waits.take().is_some() && std::mem::take(&mut self.online);
+        if let Some(reason) = self.reason.as_ref().filter(|_| kept_back) {
+            let text = format!(
+                "order {} was kept back for {reason}, and comes because the vehicle is ONLINE again",
+                quote(&id)
+            );
+            super::Found::new(entry, findings).broken("CONN-14", text);
+        }
+        true
+    }
+}

@@ -1,0 +1,177 @@
+//! What an id stands for: one nodeId for one place, one actionId for one action.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::graph::is_counted;
+use super::vehicle::Vehicle;
+use super::{Command, ELEMENTS, Found, fingerprint, in_sequence, place_of, short};
+use crate::orders::number;
+use crate::traffic::{Traffic, elements, quote, text, unclear};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::Event;
+
+/// `commands/node-ids`.
+pub(crate) const NODE_IDS: Check = Check {
+    name: "commands/node-ids",
+    decides: &["ORD-MSG-07"],
+    doc: "A nodeId always comes with the same map and position. A position that has moved by less than half a metre may \
+          have been corrected by somebody, which is inconclusive, unless it has moved to where the vehicle stands.",
+    arguments: &[],
+    start: |_| Box::new(NodeIds::default()),
+};
+
+/// `commands/action-ids`.
+pub(crate) const ACTION_IDS: Check = Check {
+    name: "commands/action-ids",
+    decides: &["ORD-MSG-17"],
+    doc: "An actionId stands for one action, in orders and instant actions together. It may come again where the same \
+          action stands in the same place: in a stitching node, or in a message that is sent again. Ids are forgotten \
+          when the master control is started anew.",
+    arguments: &[],
+    start: |_| Box::new(ActionIds::default()),
+};
+
+/// How many ids are remembered.
+const IDS: usize = 8192;
+/// A smaller difference is rounding, in metres.
+const SAME: f64 = 0.001;
+/// A smaller difference may be a correction, in metres.
+const CORRECTED: f64 = 0.5;
+
+#[derive(Default)]
+struct NodeIds {
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// Place of each node.
+    known: BTreeMap<String, (f64, f64, String)>,
+}
+
+impl Running for NodeIds {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.vehicle.note(entry, context);
+        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+        let Some(order) = order else { return false };
+        let stands: Vec<(f64, f64)> = self
+            .vehicle
+            .recent(entry, context)
+            .filter_map(|seen| seen.pose.as_ref().map(|(x, y, _)| (*x, *y)))
+            .collect();
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        for node in in_sequence(order, "nodes") {
+            let (Some(id), Some((x, y, map))) = (short(node, "nodeId"), place_of(node)) else {
+                continue;
+            };
+            let Some((was_x, was_y, was_map)) = self.known.get_mut(&id) else {
+                if self.known.len() < IDS {
+                    self.known.insert(id, (x, y, map.chars().take(256).collect()));
+                }
+                continue;
+            };
+            judged = true;
+            let apart = (x - *was_x).hypot(y - *was_y);
+            let other_map = was_map.as_str() != map.chars().take(256).collect::<String>();
+            let shown = quote(&id);
+            if other_map {
+                let text = format!("node {shown} is on map {} and was on {}", quote(map), quote(was_map));
+                found.broken("ORD-MSG-07", text);
+            } else if apart > CORRECTED {
+                found.broken("ORD-MSG-07", format!("node {shown} is {apart:.2} m from where it was"));
+            } else if apart > SAME && stands.iter().any(|(at_x, at_y)| (x - at_x).hypot(y - at_y) < SAME) {
+                let text = format!("node {shown} is {apart:.3} m from where it was, right where the vehicle stands");
+                found.broken("ORD-MSG-07", text);
+            } else if apart > SAME {
+                let text = format!("node {shown} is {apart:.3} m from where it was, as after a correction");
+                found.push(unclear("ORD-MSG-07", entry.seq(), text));
+            }
+            // One change is worth one finding.
+            (*was_x, *was_y) = (x, y);
+            *was_map = map.chars().take(256).collect();
+        }
+        judged
+    }
+}
+
+#[derive(Default)]
+struct ActionIds {
+    traffic: Traffic,
+    /// Where each action stands, and what it is.
+    known: BTreeMap<String, (String, u64)>,
+}
+
+/// Every action of a message with a name for the place where it stands.
+fn placed(command: Command<'_>) -> Vec<(String, &Value)> {
+    let order = match command {
+        Command::Instant(_) => {
+            let actions = command.actions().into_iter();
+            return actions
+                .map(|(_, action)| ("an instant action".to_owned(), action))
+                .collect();
+        }
+        Command::Order(order) => order,
+    };
+    let name = short(order, "orderId").unwrap_or_default();
+    let of = |list| {
+        let name = &name;
+        elements(order, list).take(ELEMENTS).flat_map(move |element| {
+            let sequence = number(element, "sequenceId").unwrap_or_default();
+            let place = format!("order {}, sequenceId {sequence}", quote(name));
+            elements(element, "actions").map(move |action| (place.clone(), action))
+        })
+    };
+    of("nodes").chain(of("edges")).take(ELEMENTS).collect()
+}
+
+impl Running for ActionIds {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        match entry.event() {
+            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown") => self.known.clear(),
+            Event::Answer { .. } => self.known.clear(),
+            _ => {}
+        }
+        let Some(command) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        let counted = command.order().is_none_or(is_counted);
+        let mut here: BTreeMap<&str, ()> = BTreeMap::new();
+        for (place, action) in placed(command) {
+            let Some(id) = short(action, "actionId").filter(|id| !id.is_empty()) else {
+                continue;
+            };
+            judged = true;
+            let twice = here.insert(text(action, "actionId"), ()).is_some();
+            let print = fingerprint(action);
+            if twice {
+                found.broken(
+                    "ORD-MSG-17",
+                    format!("actionId {} comes twice in one message", quote(&id)),
+                );
+                continue;
+            }
+            if !counted {
+                continue;
+            }
+            if let Some((known_place, known_print)) = self.known.get(&id) {
+                if *known_place != place {
+                    let text = format!("actionId {} stands in {place} and stood in {known_place}", quote(&id));
+                    found.broken("ORD-MSG-17", text);
+                } else if *known_print != print && matches!(command, Command::Instant(_)) {
+                    // A stitching node that was changed is the business of another requirement.
+                    let text = format!("actionId {} stands for another instant action than before", quote(&id));
+                    found.broken("ORD-MSG-17", text);
+                }
+            } else if self.known.len() == IDS {
+                self.known.pop_first();
+            }
+            self.known.insert(id, (place, print));
+        }
+        judged
+    }
+}

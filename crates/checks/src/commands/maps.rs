@@ -1,0 +1,349 @@
+//! Maps: only enabled ones are used, and they are brought to the vehicle in order.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use serde_json::Value;
+
+use super::sheet::grace;
+use super::vehicle::{Outside, Vehicle};
+use super::{Command, ELEMENTS, Each, Found, content, in_sequence, parameter, place_of, said, short};
+use crate::orders::number;
+use crate::traffic::{Traffic, elements, quote, show, text};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// `commands/map-enabled`.
+pub(crate) const ENABLED: Check = Check {
+    name: "commands/map-enabled",
+    decides: &["MAP-09"],
+    doc: "The nodes of an order are on maps that the states of the vehicle list as ENABLED, that an enableMap which has \
+          FINISHED has enabled, or that an order enables on its way; of an update it is a warning. Judged only for a vehicle \
+          that lists maps, and not of the last order that is sent again as it was.",
+    arguments: &[],
+    start: |_| Box::new(Enabled::default()),
+};
+
+/// `commands/map-on-board`.
+pub(crate) const ON_BOARD: Check = Check {
+    name: "commands/map-on-board",
+    decides: &["MAP-10"],
+    doc: "The instant action enableMap names a map version that a state of the vehicle lists: it was brought on board \
+          before. Judged only for a vehicle that lists maps; otherwise it is a warning.",
+    arguments: &[],
+    start: |_| Box::new(OnBoard::default()),
+};
+
+/// `commands/map-download`.
+pub(crate) const DOWNLOADS: Check = Check {
+    name: "commands/map-download",
+    decides: &["MAP-16"],
+    doc: "downloadMap names mapId and mapDownloadLink; without mapVersion it is a warning, and so is a link without a host.",
+    arguments: &[],
+    start: |_| Each::start(download),
+};
+
+/// `commands/map-duplicate`.
+pub(crate) const DUPLICATES: Check = Check {
+    name: "commands/map-duplicate",
+    decides: &["MAP-28"],
+    doc: "When a downloadMap has failed for a map version the vehicle already lists, deleteMap for it has to come, and not \
+          to fail, before the next downloadMap for it. With `settled`, a download that follows the refusal at once is judged as well.",
+    arguments: &["settled"],
+    start: |context| {
+        Box::new(Duplicates {
+            settled: context.with.get("settled") == Some(&Value::Bool(true)),
+            ..Duplicates::default()
+        })
+    },
+};
+
+/// How many maps or downloads are remembered.
+const KEPT: usize = 256;
+
+fn download(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
+    let mut judged = false;
+    for (_, action) in command.actions() {
+        if text(action, "actionType") != "downloadMap" {
+            continue;
+        }
+        judged = true;
+        for key in ["mapId", "mapDownloadLink"] {
+            let value = parameter(action, key);
+            if value.and_then(Value::as_str).is_none_or(str::is_empty) {
+                let shown = value.map_or_else(|| "missing".to_owned(), show);
+                found.broken("MAP-16", format!("{key} of downloadMap is {shown}"));
+            }
+        }
+        if let Some(link) = parameter(action, "mapDownloadLink").and_then(Value::as_str)
+            && !link.is_empty()
+            && !is_remote(link)
+        {
+            let text = format!(
+                "mapDownloadLink {} names no host the vehicle could ask",
+                show(&link.into())
+            );
+            found.remark("MAP-16", text);
+        }
+        if parameter(action, "mapVersion").is_none() {
+            found.remark("MAP-16", "mapVersion of downloadMap is missing");
+        }
+    }
+    judged
+}
+
+/// Whether a link leads to another machine: a scheme other than that of files, and a host.
+fn is_remote(link: &str) -> bool {
+    let Some((scheme, rest)) = link.split_once("://") else {
+        return false;
+    };
+    let is_scheme = scheme
+        .bytes()
+        .all(|byte| byte.is_ascii_alphanumeric() || b"+-.".contains(&byte));
+    !scheme.is_empty()
+        && is_scheme
+        && !scheme.eq_ignore_ascii_case("file")
+        && !rest.starts_with('/')
+        && !rest.is_empty()
+}
+
+/// mapId and mapVersion of an action on maps.
+fn pair(action: &Value) -> Option<(String, String)> {
+    let text = |key: &str| Some(parameter(action, key)?.as_str()?.chars().take(256).collect());
+    Some((text("mapId")?, text("mapVersion").unwrap_or_default()))
+}
+
+#[derive(Default)]
+struct Enabled {
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// Enabled maps of the last states; `None` for a state that lists no maps.
+    reported: VecDeque<(Moment, Option<BTreeSet<String>>)>,
+    /// Maps to be enabled, by the id of the action.
+    asked: BTreeMap<String, String>,
+    /// Maps that are enabled on the way, or were by an action that has ended well.
+    usable: BTreeSet<String>,
+    /// What the last order said: whoever sends it again because no state shows it uses no map that was not used before.
+    sent: Option<u64>,
+}
+
+impl Running for Enabled {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+            self.reported.clear();
+        }
+        if let Some(state) = said("state", entry, context) {
+            let listed = state
+                .get("maps")
+                .and_then(Value::as_array)
+                .filter(|maps| !maps.is_empty());
+            let enabled = listed.map(|maps| {
+                let on = maps.iter().take(KEPT).filter(|map| text(map, "mapStatus") == "ENABLED");
+                on.filter_map(|map| short(map, "mapId")).collect()
+            });
+            if self.reported.len() == 64 {
+                self.reported.pop_front();
+            }
+            self.reported.push_back((entry.at().moment, enabled));
+            let all = elements(state, "actionStates").take(ELEMENTS);
+            for action in all.filter(|action| text(action, "actionStatus") == "FINISHED") {
+                let map = self.asked.remove(text(action, "actionId"));
+                self.usable.extend(map.filter(|_| self.usable.len() < KEPT));
+            }
+        }
+        let Some(command) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        for (scope, action) in command.actions() {
+            let (Some((map, _)), "enableMap") = (pair(action), text(action, "actionType")) else {
+                continue;
+            };
+            if scope != "INSTANT" && self.usable.len() < KEPT {
+                self.usable.insert(map);
+            } else if let Some(id) = short(action, "actionId").filter(|_| self.asked.len() < KEPT) {
+                self.asked.insert(id, map);
+            }
+        }
+        let Some(order) = command.order() else { return false };
+        let before = self.sent.replace(content(order));
+        if before == self.sent {
+            return false;
+        }
+        let (now, grace) = (entry.at().moment, grace(context));
+        let newest = self.reported.iter().rev();
+        let fresh = newest.clone().take_while(|(said, _)| now.since(*said) < grace).count();
+        let recent: Vec<_> = newest.take(fresh + 1).map(|(_, enabled)| enabled.as_ref()).collect();
+        if recent.is_empty() || recent.iter().any(Option::is_none) || self.vehicle.unsettled(entry, context) {
+            return false;
+        }
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        let mut said = BTreeSet::new();
+        let is_update = number(order, "orderUpdateId").is_some_and(|update| update > 0);
+        for node in in_sequence(order, "nodes") {
+            let Some((_, _, map)) = place_of(node).filter(|(_, _, map)| !map.is_empty()) else {
+                continue;
+            };
+            judged = true;
+            let known = recent.iter().flatten().any(|enabled| enabled.contains(map)) || self.usable.contains(map);
+            if !known && said.insert(map) {
+                let text = format!("the order is on map {}, which is not enabled", quote(map));
+                if is_update {
+                    found.remark("MAP-09", text);
+                } else {
+                    found.broken("MAP-09", text);
+                }
+            }
+        }
+        judged
+    }
+}
+
+#[derive(Default)]
+struct OnBoard {
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// Map versions of the last states.
+    listed: VecDeque<(Moment, BTreeSet<(String, String)>)>,
+}
+
+impl Running for OnBoard {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+            self.listed.clear();
+        }
+        let now = entry.at().moment;
+        if let Some(state) = said("state", entry, context) {
+            let name = |map: &Value, member| short(map, member).unwrap_or_default();
+            let maps = elements(state, "maps").take(KEPT);
+            let maps = maps.map(|map| (name(map, "mapId"), name(map, "mapVersion"))).collect();
+            if self.listed.len() == 64 {
+                self.listed.pop_front();
+            }
+            self.listed.push_back((now, maps));
+        }
+        let Some(command @ Command::Instant(_)) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        let newest = self.listed.iter().rev();
+        let fresh = newest
+            .clone()
+            .take_while(|(said, _)| now.since(*said) < grace(context))
+            .count();
+        let recent: Vec<_> = newest.take(fresh + 1).map(|(_, maps)| maps).collect();
+        if recent.is_empty() || recent.iter().any(|maps| maps.is_empty()) || self.vehicle.unsettled(entry, context) {
+            return false;
+        }
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        for (_, action) in command.actions() {
+            let (Some((id, version)), "enableMap") = (pair(action), text(action, "actionType")) else {
+                continue;
+            };
+            judged = true;
+            let is_it = |map: &(String, String)| map.0 == id && (version.is_empty() || map.1 == version);
+            if !recent.iter().any(|maps| maps.iter().any(is_it)) {
+                let text = format!(
+                    "enableMap names version {} of map {}, which is not on board",
+                    quote(&version),
+                    quote(&id)
+                );
+                found.remark("MAP-10", text);
+            }
+        }
+        judged
+    }
+}
+
+#[derive(Default)]
+struct Duplicates {
+    /// The one who asks knows that the master control has seen the refusal.
+    settled: bool,
+    traffic: Traffic,
+    vehicle: Vehicle,
+    /// Downloads by actionId.
+    asked: BTreeMap<String, (String, String)>,
+    /// Actions that were sent before: what comes again under the same id is no new download.
+    sent: BTreeSet<String>,
+    /// Pairs that were refused as duplicates, since when, and not deleted since.
+    refused: BTreeMap<(String, String), Moment>,
+    /// Deletions of such pairs by actionId: when one fails, the pair is as it was.
+    deleted: BTreeMap<String, (String, String)>,
+}
+
+impl Duplicates {
+    fn note_state(&mut self, state: &Value, at: Moment) {
+        let has = |pair: &(String, String)| {
+            elements(state, "maps")
+                .take(KEPT)
+                .any(|map| text(map, "mapId") == pair.0 && text(map, "mapVersion") == pair.1)
+        };
+        for action in elements(state, "actionStates").take(ELEMENTS) {
+            if text(action, "actionStatus") != "FAILED" {
+                continue;
+            }
+            // Each action is looked at once.
+            let id = text(action, "actionId");
+            if let Some(pair) = self.asked.remove(id).or_else(|| self.deleted.remove(id))
+                && has(&pair)
+            {
+                self.refused.insert(pair, at);
+            }
+        }
+    }
+}
+
+impl Running for Duplicates {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+            self.asked.clear();
+            self.refused.clear();
+            self.deleted.clear();
+        }
+        if let Some(state) = said("state", entry, context) {
+            self.note_state(state, entry.at().moment);
+        }
+        let Some(command) = Command::read(self.traffic, entry, context) else {
+            return false;
+        };
+        let mut found = Found::new(entry, findings);
+        let mut judged = false;
+        for (_, action) in command.actions() {
+            let Some(pair) = pair(action) else { continue };
+            match text(action, "actionType") {
+                "deleteMap" => {
+                    judged |= self.refused.remove(&pair).is_some();
+                    if self.deleted.len() < KEPT {
+                        let id = short(action, "actionId").unwrap_or_default();
+                        self.deleted.insert(id, pair);
+                    }
+                }
+                "downloadMap" => {
+                    let id = short(action, "actionId").unwrap_or_default();
+                    if self.sent.len() == KEPT {
+                        self.sent.pop_first();
+                    }
+                    if !self.sent.insert(id.clone()) {
+                        continue;
+                    }
+                    let late = |at: &Moment| self.settled || entry.at().moment.since(*at) >= grace(context);
+                    judged |= self.settled;
+                    if self.refused.get(&pair).is_some_and(late) {
+                        let text = format!("map {} is downloaded again, and was not deleted", quote(&pair.0));
+                        found.broken("MAP-28", text);
+                        self.refused.remove(&pair);
+                        judged = true;
+                    }
+                    if self.asked.len() < KEPT {
+                        self.asked.insert(id, pair);
+                    }
+                }
+                _ => {}
+            }
+        }
+        judged
+    }
+}

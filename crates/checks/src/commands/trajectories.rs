@@ -1,0 +1,81 @@
+//! Trajectories that are sent with edges.
+
+use super::{Command, Each, Found, in_sequence, place_of};
+use crate::traffic::{quote, text};
+use tck_base::nurbs::{Curve, Flaw};
+use tck_check::{Check, CheckContext};
+
+/// `commands/trajectory`.
+pub(crate) const TRAJECTORY: Check = Check {
+    name: "commands/trajectory",
+    decides: &["ORD-MSG-28", "ORD-MSG-29"],
+    doc: "Every trajectory of an order has a whole degree of at least 1, control points with x and y and with weights \
+          not below 0, and as many knots within 0 to 1 as control points, degree and one together. A missing degree \
+          and knots out of order are warnings.",
+    arguments: &[],
+    start: |_| Each::start(shape),
+};
+
+/// `commands/trajectory-ends`.
+pub(crate) const ENDS: Check = Check {
+    name: "commands/trajectory-ends",
+    decides: &["ORD-MSG-30"],
+    doc: "The first and the last control point of a trajectory in an order are where the nodes of its edge are, within \
+          their allowedDeviationXY and half a metre.",
+    arguments: &[],
+    start: |_| Each::start(ends),
+};
+
+/// How far the end of a curve may be from its node, in metres.
+const END: f64 = 0.5;
+
+fn shape(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
+    let Some(order) = command.order() else { return false };
+    let mut judged = false;
+    for edge in in_sequence(order, "edges") {
+        let Some(trajectory) = edge.get("trajectory").filter(|trajectory| !trajectory.is_null()) else {
+            continue;
+        };
+        judged = true;
+        for flaw in Curve::read(trajectory).1 {
+            let text = format!("the trajectory of edge {}: {flaw}", quote(text(edge, "edgeId")));
+            match flaw {
+                Flaw::Member(_) => found.broken("ORD-MSG-28", text),
+                Flaw::DegreeMissing => found.remark("ORD-MSG-28", text),
+                Flaw::KnotCount { .. } | Flaw::KnotRange { .. } => found.broken("ORD-MSG-29", text),
+                Flaw::KnotOrder(_) => found.remark("ORD-MSG-29", text),
+            }
+        }
+    }
+    judged
+}
+
+fn ends(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
+    let Some(order) = command.order() else { return false };
+    let (nodes, edges) = (in_sequence(order, "nodes"), in_sequence(order, "edges"));
+    if nodes.len() != edges.len() + 1 {
+        return false;
+    }
+    let mut judged = false;
+    for (edge, around) in edges.iter().zip(nodes.windows(2)) {
+        let curve = edge.get("trajectory").and_then(|trajectory| Curve::read(trajectory).0);
+        let Some((start, end)) = curve.as_ref().and_then(Curve::ends) else {
+            continue;
+        };
+        for (node, point, verb) in [(around[0], start, "begins"), (around[1], end, "ends")] {
+            let Some((x, y, _)) = place_of(node) else { continue };
+            judged = true;
+            let allowed = node
+                .pointer("/nodePosition/allowedDeviationXY")
+                .and_then(serde_json::Value::as_f64)
+                .unwrap_or_default();
+            let distance = (x - point.0).hypot(y - point.1);
+            if distance > END + allowed.max(0.0) {
+                let id = quote(text(edge, "edgeId"));
+                let text = format!("the trajectory of edge {id} {verb} {distance:.2} m from its node");
+                found.broken("ORD-MSG-30", text);
+            }
+        }
+    }
+    judged
+}

@@ -1,0 +1,252 @@
+//! `errors/persist-until-new-order`: the report of a rejected order stays until a new order is accepted.
+//!
+//! Whether an order had to be rejected, and with which words, is left to the tests.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::continuity::Continuity;
+use super::orders::number;
+use super::traffic::{Traffic, actions, broken, elements, is_to_vehicle, outside_influence, state, text, to_vehicle};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// How many actionIds of instant actions are kept in mind.
+const ACTIONS: usize = 256;
+
+/// See the module.
+pub(super) const PERSIST: Check = Check {
+    name: "errors/persist-until-new-order",
+    decides: &["ORD-REJ-03", "ORD-REJ-08"],
+    doc: "A validationError or orderError warning that answers an order is listed in every state until the vehicle \
+          shows another orderId or orderUpdateId. Errors that answer an instant action are not held to this, and a \
+          restart or a change of operating mode ends the watch; a cut of the link by the harness does not, as long as the \
+          vehicle counts its headerId on.",
+    arguments: &[],
+    start: |_| Box::new(Persist::default()),
+};
+
+#[derive(Default)]
+struct Persist {
+    traffic: Traffic,
+    life: Continuity,
+    /// Whether the last thing sent to the vehicle was an order.
+    after_order: bool,
+    /// Whether no state has come since the last instant action.
+    instant_pending: bool,
+    instant: Vec<String>,
+    /// What the last state showed: order, update, mode.
+    shown: Option<(String, Option<u64>, String)>,
+    /// Error types listed in the last state.
+    listed: Vec<String>,
+    /// Error types that have to stay, and the entry in which they appeared.
+    watched: BTreeMap<&'static str, u64>,
+}
+
+/// The requirement that demands of an error type to stay.
+fn requirement(error_type: &str) -> Option<(&'static str, &'static str)> {
+    // One check for all versions: later ones spell these in capitals.
+    match error_type {
+        "validationError" | "VALIDATION_FAILURE" => Some(("validation", "ORD-REJ-03")),
+        "orderError" | "INVALID_ORDER_ACTION" | "UNSUPPORTED_PARAMETER" => Some(("order", "ORD-REJ-08")),
+        _ => None,
+    }
+}
+
+impl Running for Persist {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.sent(entry, context);
+        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+            self.watched.clear();
+            self.shown = None;
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        if !state.get("errors").is_some_and(Value::is_array) {
+            return false;
+        }
+        let shown = (
+            text(state, "orderId").chars().take(512).collect(),
+            number(state, "orderUpdateId"),
+            text(state, "operatingMode").chars().take(64).collect(),
+        );
+        self.instant_pending = false;
+        let before = self.shown.replace(shown);
+        if before.is_none() || before != self.shown {
+            self.watched.clear();
+        }
+        let now: Vec<(String, bool)> = elements(state, "errors")
+            .take(ACTIONS)
+            .filter(|error| requirement(text(error, "errorType")).is_some())
+            .map(|error| (text(error, "errorType").to_owned(), self.is_of_instant_action(error)))
+            .collect();
+        let judged = !self.watched.is_empty();
+        let gone: Vec<(&'static str, u64)> = self
+            .watched
+            .iter()
+            .map(|(kind, since)| (*kind, *since))
+            .filter(|(kind, _)| {
+                !now.iter()
+                    .any(|(listed, _)| requirement(listed).is_some_and(|found| found.0 == *kind))
+            })
+            .collect();
+        for (kind, since) in gone {
+            self.watched.remove(kind);
+            let (name, id) = if kind == "order" {
+                ("orderError", "ORD-REJ-08")
+            } else {
+                ("validationError", "ORD-REJ-03")
+            };
+            let text = format!("the {name} of message #{since} is gone, although no new order was accepted");
+            findings.push(broken(id, entry.seq(), text));
+        }
+        // The first state of a run tells nothing about what an error answers.
+        if before.is_some() && self.after_order {
+            for (listed, instant) in &now {
+                let new = !self.listed.contains(listed);
+                if let Some((kind, _)) = requirement(listed).filter(|_| new && !instant) {
+                    self.watched.insert(kind, entry.seq());
+                }
+            }
+        }
+        self.listed = now.into_iter().map(|(listed, _)| listed).collect();
+        judged
+    }
+}
+
+impl Persist {
+    fn sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        if is_to_vehicle("order", entry, context) {
+            // Right after an instant action nobody knows which of the two an error answers.
+            self.after_order = !self.instant_pending;
+        } else if is_to_vehicle("instantActions", entry, context) {
+            self.after_order = false;
+            self.instant_pending = true;
+        }
+        if let Some(message) = to_vehicle("instantActions", entry, context) {
+            let ids = actions(message).map(|action| text(action, "actionId").to_owned());
+            self.instant.extend(ids);
+            let excess = self.instant.len().saturating_sub(ACTIONS);
+            self.instant.drain(..excess);
+        }
+    }
+
+    fn is_of_instant_action(&self, error: &Value) -> bool {
+        elements(error, "errorReferences").any(|reference| {
+            let value = text(reference, "referenceValue");
+            self.instant.iter().any(|id| id == value)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::Trace;
+    use tck_journal::Payload;
+    use tck_journal::event::{Event, Source};
+
+    const CHECK: &str = "errors/persist-until-new-order";
+
+    fn with(errors: &[&str]) -> Value {
+        let errors: Vec<Value> = errors
+            .iter()
+            .map(|error| json!({ "errorType": error, "errorLevel": "WARNING" }))
+            .collect();
+        json!({ "errors": errors })
+    }
+
+    fn rejected(error: &str) -> Trace {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&json!({}))
+            .sent("order", &json!({ "orderId": 7 }))
+            .state(&with(&[error]));
+        trace
+    }
+
+    #[test]
+    fn a_report_that_stays_until_a_new_order_is_right() {
+        let mut trace = rejected("validationError");
+        trace
+            .instant("stateRequest", "x", &json!([]))
+            .state(&with(&["other", "validationError"]));
+        trace
+            .state(&json!({ "orderId": "o" }))
+            .state(&json!({ "orderId": "o" }));
+        let outcome = trace.judge(CHECK);
+        assert!(outcome.findings.is_empty());
+        assert_eq!(outcome.judged, 1);
+    }
+
+    #[test]
+    fn reports_that_vanish_are_found() {
+        let mut trace = rejected("validationError");
+        trace.state(&json!({})).state(&json!({}));
+        assert_eq!(trace.judge(CHECK).summary(), ["ORD-REJ-03"]);
+        let mut trace = rejected("orderError");
+        trace.state(&with(&["orderError"])).state(&with(&["validationError"]));
+        assert_eq!(trace.judge(CHECK).summary(), ["ORD-REJ-08"]);
+    }
+
+    #[test]
+    fn other_errors_and_answers_to_instant_actions_may_go() {
+        let mut trace = rejected("orderUpdateError");
+        trace.state(&json!({}));
+        let error = json!({ "errorType": "orderError", "errorLevel": "WARNING",
+            "errorReferences": [{ "referenceKey": "actionId", "referenceValue": "x" }] });
+        trace
+            .instant("dance", "x", &json!([]))
+            .state(&json!({ "errors": [error] }))
+            .state(&json!({}));
+        trace
+            .instant("jump", "y", &json!([]))
+            .state(&with(&["validationError"]))
+            .state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
+    fn an_error_that_may_answer_either_of_two_messages_is_not_held_to_it() {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({})).instant("jump", "x", &json!([]));
+        trace
+            .sent("order", &json!({ "orderId": 7 }))
+            .state(&with(&["validationError"]));
+        trace.state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
+    fn an_unreadable_order_counts_as_an_order() {
+        let mut trace = Trace::subscriber();
+        trace.instant("jump", "x", &json!([])).state(&json!({}));
+        let topic = trace.topic("order");
+        let event = Event::Sent {
+            topic,
+            qos: 0,
+            retain: false,
+            payload: Payload::keep(bytes::Bytes::from_static(b"{")),
+        };
+        trace.add(Source::Harness, None, event);
+        trace.state(&with(&["validationError"])).state(&json!({}));
+        assert_eq!(trace.judge(CHECK).summary(), ["ORD-REJ-03"]);
+    }
+
+    #[test]
+    fn a_restart_or_a_change_of_mode_ends_the_watch() {
+        let mut trace = rejected("validationError");
+        trace.connection("ONLINE").state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
+        let mut trace = rejected("validationError");
+        trace.hook().state(&json!({}));
+        assert!(trace.judge(CHECK).findings.is_empty());
+        let mut trace = rejected("validationError");
+        trace.state(&json!({ "operatingMode": "MANUAL" }));
+        assert!(trace.judge(CHECK).findings.is_empty());
+    }
+}

@@ -1,0 +1,144 @@
+//! `errors/blame`: an error that comes with the failure of an action names that action, not another one.
+//!
+//! Whether there has to be an error is left to the tests.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+
+use super::traffic::{Traffic, broken, elements, is_to_vehicle, quote, state, text};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// How many actions, errors and references are looked at.
+const MANY: usize = 256;
+
+/// See the module.
+pub(super) const BLAME: Check = Check {
+    name: "errors/blame",
+    decides: &["BP-03"],
+    doc: "An error that is new in the state that first shows an action FAILED, and references a listed action, references \
+          one that has FAILED, unless another new error names the failed one. Not judged when something was sent since the state before, which the error may answer.",
+    arguments: &[],
+    start: |_| Box::new(Blame::default()),
+};
+
+#[derive(Default)]
+struct Blame {
+    traffic: Traffic,
+    /// Whether an order was sent since the last state.
+    sent: bool,
+    /// Errors of the last state.
+    listed: BTreeSet<String>,
+    /// actionIds that had FAILED in the last state; `None` before the first.
+    failed: Option<BTreeSet<String>>,
+}
+
+impl Running for Blame {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.sent |= is_to_vehicle("order", entry, context) || is_to_vehicle("instantActions", entry, context);
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        let statuses: BTreeMap<&str, &str> = elements(state, "actionStates")
+            .take(MANY)
+            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
+            .collect();
+        let has_failed = |id: &str| statuses.get(id) == Some(&"FAILED");
+        let failed: BTreeSet<String> = statuses
+            .keys()
+            .filter(|id| has_failed(id))
+            .map(|id| id.chars().take(512).collect())
+            .collect();
+        let errors: Vec<&Value> = elements(state, "errors").take(MANY).collect();
+        let before = std::mem::replace(&mut self.listed, errors.iter().map(|error| key(error)).collect());
+        let known = self.failed.replace(failed);
+        let sent = std::mem::take(&mut self.sent);
+        let (Some(known), Some(failed)) = (known, &self.failed) else {
+            return false;
+        };
+        let fresh: Vec<&String> = failed.iter().filter(|id| !known.contains(*id)).collect();
+        let [one] = fresh[..] else {
+            return false;
+        };
+        if sent {
+            return false;
+        }
+        let named = |error: &Value| -> Vec<String> {
+            elements(error, "errorReferences")
+                .take(MANY)
+                .filter(|reference| text(reference, "referenceKey") == "actionId")
+                .map(|reference| text(reference, "referenceValue").to_owned())
+                .collect()
+        };
+        let fresh: Vec<Vec<String>> = errors
+            .iter()
+            .filter(|error| !before.contains(&key(error)))
+            .map(|error| named(error))
+            .collect();
+        // Where the action has its error, another one may announce what has not FAILED yet.
+        if fresh.iter().any(|named| named.contains(one)) {
+            return true;
+        }
+        let mut judged = false;
+        for named in &fresh {
+            let others = named
+                .iter()
+                .all(|id| statuses.contains_key(id.as_str()) && !has_failed(id));
+            if let Some(other) = named.first().filter(|_| others) {
+                let text = format!(
+                    "with the failure of action {} comes an error about action {}, which has not failed",
+                    quote(one),
+                    quote(other)
+                );
+                findings.push(broken("BP-03", entry.seq(), text));
+                judged = true;
+            }
+        }
+        judged
+    }
+}
+
+fn key(error: &Value) -> String {
+    let references = error.get("errorReferences").map(Value::to_string);
+    let key = format!("{} {}", text(error, "errorType"), references.unwrap_or_default());
+    key.chars().take(2048).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::super::trace::Trace;
+
+    fn judge(blamed: &[&str], sent: bool) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        let actions = |status: &str| {
+            json!([
+                { "actionId": "a", "actionType": "beep", "actionStatus": "FINISHED" },
+                { "actionId": "b", "actionType": "pick", "actionStatus": status },
+            ])
+        };
+        trace.state(&json!({ "actionStates": actions("RUNNING") }));
+        if sent {
+            trace.instant("stateRequest", "x", &json!([]));
+        }
+        let error = |blamed: &&str| {
+            json!({ "errorType": "pickError", "errorLevel": "WARNING",
+                "errorReferences": [{ "referenceKey": "actionId", "referenceValue": blamed }] })
+        };
+        let errors: Vec<_> = blamed.iter().map(error).collect();
+        trace.state(&json!({ "actionStates": actions("FAILED"), "errors": errors }));
+        trace.judge("errors/blame").summary()
+    }
+
+    #[test]
+    fn the_error_names_the_action_that_failed() {
+        assert!(judge(&["b"], false).is_empty());
+        assert!(judge(&["z"], false).is_empty(), "something else has gone wrong");
+        assert!(judge(&["a"], true).is_empty(), "it may answer what was sent");
+        assert!(judge(&["a", "b"], false).is_empty(), "the other one may fail next");
+        assert_eq!(judge(&["a"], false), ["BP-03"]);
+    }
+}

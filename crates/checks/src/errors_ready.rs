@@ -1,0 +1,121 @@
+//! `errors/ready-under-warning`: a vehicle that only warns is ready to start.
+
+use serde_json::Value;
+
+use super::orders::last_node;
+use super::traffic::{Traffic, elements, remark, state, text, to_vehicle};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// See the module.
+pub(super) const READY: Check = Check {
+    name: "errors/ready-under-warning",
+    decides: &["ERR-03"],
+    doc: "A vehicle that reports warnings and no worse error, and that nothing else holds, sets out when it is given \
+          an order. One that stands until the end of the window is remarked on, by the ruling of the catalogue: if it \
+          has taken the order over, and the order named `order` also if it has not.",
+    arguments: &["order"],
+    start: |_| Box::new(Ready::default()),
+};
+
+#[derive(Default)]
+struct Ready {
+    traffic: Traffic,
+    /// orderId of the last order sent.
+    order: Option<String>,
+    /// The last state, if the vehicle could have set out and had not.
+    waits: Option<u64>,
+    started_at: Option<(String, u64)>,
+    set_out: bool,
+}
+
+/// Whether the vehicle reports warnings, nothing worse, and nothing else that holds it.
+fn only_warns(state: &Value) -> bool {
+    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
+    let mut errors = elements(state, "errors").peekable();
+    errors.peek().is_some()
+        && errors.all(|error| text(error, "errorLevel") == "WARNING")
+        && state.get("paused") != Some(&Value::Bool(true))
+        && safety("eStop").and_then(Value::as_str) == Some("NONE")
+        && safety("fieldViolation") == Some(&Value::Bool(false))
+        && matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
+}
+
+impl Running for Ready {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, _findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if let Some(order) = to_vehicle("order", entry, context) {
+            self.order = Some(text(order, "orderId").chars().take(512).collect());
+            self.waits = None;
+            self.started_at = None;
+            self.set_out = false;
+        }
+        let Some(state) = state(self.traffic, entry, context).filter(|_| self.order.is_some()) else {
+            return false;
+        };
+        let here = last_node(state);
+        let moved = self.started_at.is_some() && here != self.started_at;
+        if self.started_at.is_none() {
+            self.started_at = here;
+        }
+        self.set_out |= moved || state.get("driving").and_then(Value::as_bool) == Some(true);
+        let warns = only_warns(state);
+        let order = self.order.as_deref();
+        let ahead = elements(state, "nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
+        let asked = context.with.get("order").and_then(Value::as_str) == order;
+        let taken = Some(text(state, "orderId")) == order && ahead;
+        self.waits = (warns && !self.set_out && (asked || taken)).then_some(entry.seq());
+        warns && self.set_out
+    }
+
+    fn finish(&mut self, _end: Moment, _context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        if let Some(seq) = self.waits.filter(|_| !self.set_out) {
+            let text = "the vehicle reports warnings only, and does not set out";
+            findings.push(remark("ERR-03", seq, text));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::{Trace, merged};
+
+    fn judge(level: &str, last: &Value) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.with.insert("order".into(), json!("o"));
+        let errors = json!({ "errors": [{ "errorType": "x", "errorLevel": level }] });
+        trace.state(&errors).sent("order", &json!({ "orderId": "o" }));
+        trace.state(&errors).state(&merged(errors.clone(), last));
+        trace.judge("errors/ready-under-warning").summary()
+    }
+
+    #[test]
+    fn a_vehicle_that_sets_out_under_a_warning_is_right() {
+        assert!(judge("WARNING", &json!({ "driving": true })).is_empty());
+        assert!(judge("WARNING", &json!({ "lastNodeId": "n2", "lastNodeSequenceId": 2 })).is_empty());
+    }
+
+    #[test]
+    fn a_vehicle_that_stands_under_a_warning_is_remarked_on() {
+        assert_eq!(judge("WARNING", &json!({})), ["ERR-03 warning"]);
+    }
+
+    #[test]
+    fn an_order_it_refused_is_not_waited_for_unless_asked_to() {
+        let mut trace = Trace::subscriber();
+        let warning = json!({ "errors": [{ "errorType": "x", "errorLevel": "WARNING" }] });
+        trace.sent("order", &json!({ "orderId": "o" })).state(&warning);
+        assert!(trace.judge("errors/ready-under-warning").findings.is_empty());
+        let node = json!({ "nodeId": "n2", "sequenceId": 2, "released": true });
+        trace.state(&merged(warning, &json!({ "orderId": "o", "nodeStates": [node] })));
+        assert_eq!(trace.judge("errors/ready-under-warning").summary(), ["ERR-03 warning"]);
+    }
+
+    #[test]
+    fn another_reason_to_stand_is_none_of_its_business() {
+        assert!(judge("FATAL", &json!({})).is_empty());
+    }
+}

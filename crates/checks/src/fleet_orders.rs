@@ -1,0 +1,64 @@
+//! `fleet/own-orders`: an order goes on where it was begun.
+
+use std::collections::BTreeSet;
+
+use super::orders::number;
+use super::traffic::{Traffic, broken, elements, quote, text};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::Event;
+
+/// See the module.
+pub(super) const OWN_ORDERS: Check = Check {
+    name: "fleet/own-orders",
+    decides: &["TOPIC-13"],
+    doc: "An update that goes on behind the first node of its order comes to the vehicle that was given the order. Not \
+          judged for an order both vehicles were given, and not where the order may have been lost on the way.",
+    arguments: &[],
+    start: |_| Box::new(OwnOrders::default()),
+};
+
+/// How many orders are remembered.
+const ORDERS: usize = 4096;
+
+#[derive(Default)]
+struct OwnOrders {
+    traffic: Traffic,
+    /// Where the vehicle stands in the fleet.
+    place: Option<usize>,
+    own: BTreeSet<String>,
+}
+
+impl Running for OwnOrders {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if let Event::RunBegun { header } = entry.event() {
+            let mut all = header.vehicles.iter();
+            self.place =
+                all.position(|one| (one.manufacturer.as_str(), one.serial_number.as_str()) == context.identity);
+        }
+        let message = self.traffic.delivered(entry, context);
+        let order = message.filter(|message| message.name == "order").and(entry.json());
+        let Some((order, place)) = order.filter(|_| !self.traffic.disturbed).zip(self.place) else {
+            return false;
+        };
+        let id = text(order, "orderId");
+        let first = elements(order, "nodes")
+            .filter_map(|node| number(node, "sequenceId"))
+            .min();
+        let goes_on = number(order, "orderUpdateId") > Some(0) && first > Some(0);
+        let known = self.own.contains(id);
+        let owner = context.shared.fleet.borrow().owner(id);
+        if goes_on && !known && owner.is_some_and(|owner| owner != place) {
+            let text = format!(
+                "an update of order {} comes, which another vehicle was given",
+                quote(id)
+            );
+            findings.push(broken("TOPIC-13", entry.seq(), text));
+        }
+        if self.own.len() < ORDERS && !goes_on {
+            self.own.insert(id.to_owned());
+        }
+        goes_on
+    }
+}

@@ -1,0 +1,393 @@
+//! `instant/…`: every instant action of a message gets a state, begins, and stands where it may.
+//!
+//! What an action has to do is left to the tests.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::continuity::Continuity;
+use super::traffic::{
+    Delivered, Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle,
+};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// How many actions are kept in mind, and how many one message may have to be judged.
+const ACTIONS: usize = 256;
+const IN_ONE: usize = 8;
+
+/// `instant/answered`.
+pub(super) const ANSWERED: Check = Check {
+    name: "instant/answered",
+    decides: &["IACT-03"],
+    doc: "Each action of an instantActions message that obeys the schema is in actionStates within time.react, as long as \
+          no new order is accepted. Not judged while the harness disturbs the link, nor over a restart, nor with more than \
+          eight actions in one message.",
+    arguments: &[],
+    start: |_| Box::new(Answered::looking_for("IACT-03")),
+};
+
+/// `instant/answered-together`.
+pub(super) const TOGETHER: Check = Check {
+    name: "instant/answered-together",
+    decides: &["IACT-07"],
+    doc: "When one action of an instantActions message is in actionStates, so are the others: a warning from time.slow after \
+          it was sent, and found after time.react. Otherwise as instant/answered.",
+    arguments: &[],
+    start: |_| Box::new(Answered::looking_for("IACT-07")),
+};
+
+/// `instant/begins`.
+pub(super) const BEGINS: Check = Check {
+    name: "instant/begins",
+    decides: &["IACT-05"],
+    doc: "No instant action stays WAITING for longer than time.slow, which is a warning, or time.react, while the vehicle \
+          stands and no other action is under way. cancelOrder and downloadMap may wait for something outside. Otherwise \
+          as instant/answered.",
+    arguments: &[],
+    start: |_| Box::new(Answered::looking_for("IACT-05")),
+};
+
+/// `instant/scope`.
+pub(super) const SCOPE: Check = Check {
+    name: "instant/scope",
+    decides: &["ACT-10"],
+    doc: "A predefined action that is none for instantActions, and that the factsheet does not offer there, is not performed \
+          as one. finePositioning, of which the text says two things, is not judged. Otherwise as instant/answered.",
+    arguments: &[],
+    start: |_| Box::new(Answered::looking_for("ACT-10")),
+};
+
+struct Asked {
+    message: u64,
+    at: Moment,
+    kind: String,
+    /// States since it was sent.
+    states: u32,
+    listed: bool,
+    /// Since when it is WAITING, and nothing is in its way.
+    waits: Option<Moment>,
+    told: bool,
+    late: bool,
+}
+
+#[derive(Default)]
+struct Answered {
+    /// What this one looks for.
+    requirement: &'static str,
+    traffic: Traffic,
+    life: Continuity,
+    /// By actionId.
+    asked: BTreeMap<String, Asked>,
+    order: Option<(String, u64)>,
+    /// actionTypes that the factsheet offers as instant actions.
+    offered: Vec<String>,
+}
+
+fn active(status: &str) -> bool {
+    matches!(status, "INITIALIZING" | "RUNNING" | "PAUSED")
+}
+
+impl Answered {
+    fn looking_for(requirement: &'static str) -> Self {
+        Self {
+            requirement,
+            ..Self::default()
+        }
+    }
+
+    /// Whether there is something to judge.
+    fn has_subject(&self, context: &CheckContext<'_>) -> bool {
+        let mut all = self.asked.values();
+        match self.requirement {
+            "ACT-10" => all.any(|asked| is_misplaced(&asked.kind, context)),
+            "IACT-07" => {
+                let several = |asked: &Asked| {
+                    self.asked
+                        .values()
+                        .filter(|other| other.message == asked.message)
+                        .count()
+                        > 1
+                };
+                all.any(|asked| asked.listed && several(asked))
+            }
+            _ => all.any(|asked| asked.listed),
+        }
+    }
+
+    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        if let Some(Delivered { name: "factsheet", .. }) = self.traffic.delivered(entry, context) {
+            let listed = entry
+                .json()
+                .and_then(|sheet| sheet.pointer("/protocolFeatures/agvActions")?.as_array());
+            let instant = listed
+                .into_iter()
+                .flatten()
+                .take(ACTIONS)
+                .filter(|action| elements(action, "actionScopes").any(|scope| scope.as_str() == Some("INSTANT")));
+            self.offered = instant.map(|action| text(action, "actionType").to_owned()).collect();
+        }
+        let Some(message) = to_vehicle("instantActions", entry, context) else {
+            return;
+        };
+        let schema = context.pack.schema("instantActions");
+        let obeys = schema.is_none_or(|schema| schema.findings(message).is_empty());
+        let all: Vec<&Value> = actions(message).collect();
+        let id = |action: &Value| text(action, "actionId").chars().take(512).collect::<String>();
+        let fresh = |at: usize| {
+            let own = id(all[at]);
+            !own.is_empty() && !self.asked.contains_key(&own) && all[..at].iter().all(|other| id(other) != own)
+        };
+        if !obeys || self.traffic.disturbed || all.len() > IN_ONE || !(0..all.len()).all(fresh) {
+            return;
+        }
+        if self.asked.len() > ACTIONS {
+            self.asked.clear();
+        }
+        for action in &all {
+            let asked = Asked {
+                message: entry.seq(),
+                at: entry.at().moment,
+                kind: text(action, "actionType").to_owned(),
+                states: 0,
+                listed: false,
+                waits: None,
+                told: false,
+                late: false,
+            };
+            self.asked.insert(id(action), asked);
+        }
+    }
+
+    /// An action that is in no state yet.
+    fn missing(
+        &mut self,
+        now: Moment,
+        seq: u64,
+        renewed: bool,
+        limits: (Duration, Duration),
+        findings: &mut Vec<CheckFinding>,
+    ) {
+        let (slow, react) = limits;
+        let known: Vec<u64> = self
+            .asked
+            .values()
+            .filter(|asked| asked.listed)
+            .map(|asked| asked.message)
+            .collect();
+        for (id, asked) in self.asked.iter_mut().filter(|(_, asked)| !asked.listed && !asked.told) {
+            let took = now.since(asked.at);
+            let beside = known.contains(&asked.message);
+            if asked.states < 2 || (renewed && !beside) {
+                continue;
+            }
+            let text = format!(
+                "instant action {} ({}) of #{} is in no state {:.0} s after it was sent",
+                quote(id),
+                quote(&asked.kind),
+                asked.message,
+                took.as_secs_f64()
+            );
+            if took > react {
+                asked.told = true;
+                if beside {
+                    findings.push(broken(
+                        "IACT-07",
+                        seq,
+                        format!("{text}, while another one of the message is"),
+                    ));
+                }
+                findings.push(broken("IACT-03", seq, text));
+            } else if took > slow && beside && !asked.late {
+                asked.late = true;
+                findings.push(remark(
+                    "IACT-07",
+                    seq,
+                    format!("{text}, while another one of the message is"),
+                ));
+            }
+        }
+    }
+
+    fn listed(
+        &mut self,
+        state: &Value,
+        now: Moment,
+        seq: u64,
+        context: &CheckContext<'_>,
+        limits: (Duration, Duration),
+        findings: &mut Vec<CheckFinding>,
+    ) {
+        let (slow, react) = limits;
+        let busy = elements(state, "actionStates")
+            .take(ACTIONS)
+            .any(|action| active(text(action, "actionStatus")))
+            || state.get("driving").and_then(Value::as_bool) != Some(false);
+        for action in elements(state, "actionStates").take(ACTIONS) {
+            let Some(asked) = self.asked.get_mut(text(action, "actionId")) else {
+                continue;
+            };
+            asked.listed = true;
+            let status = text(action, "actionStatus");
+            let id = quote(text(action, "actionId"));
+            let performed = active(status) || status == "FINISHED";
+            if performed && !asked.told && is_misplaced(&asked.kind, context) && !self.offered.contains(&asked.kind) {
+                asked.told = true;
+                let text = format!("action {id} ({}) is {status} as an instant action", quote(&asked.kind));
+                findings.push(broken("ACT-10", seq, text));
+            }
+            // A cancellation and a download may have to wait for something outside.
+            let patient = matches!(asked.kind.as_str(), "cancelOrder" | "downloadMap");
+            if status != "WAITING" || busy || patient {
+                asked.waits = None;
+                continue;
+            }
+            let since = *asked.waits.get_or_insert(now);
+            let took = now.since(since);
+            let text = format!(
+                "instant action {id} ({}) is WAITING for {:.0} s, and nothing else is under way",
+                quote(&asked.kind),
+                took.as_secs_f64()
+            );
+            if took > react && !asked.told {
+                asked.told = true;
+                findings.push(broken("IACT-05", seq, text));
+            } else if took > slow && !asked.late {
+                asked.late = true;
+                findings.push(remark("IACT-05", seq, text));
+            }
+        }
+    }
+}
+
+/// Whether the table of predefined actions has this one, and not for instantActions. What is written about
+/// finePositioning contradicts itself.
+fn is_misplaced(kind: &str, context: &CheckContext<'_>) -> bool {
+    let known = context.pack.vocabulary().get("action").and_then(|all| all.get(kind));
+    let scopes = known.and_then(|action| action.get("scopes")?.as_array());
+    kind != "finePositioning"
+        && scopes.is_some_and(|scopes| !scopes.iter().any(|scope| scope.as_str() == Some("INSTANT")))
+}
+
+impl Running for Answered {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.learn(entry, context);
+        let restarted = self.life.restarted(self.traffic, entry, context);
+        if restarted || self.traffic.disturbed || outside_influence(entry) {
+            self.asked.clear();
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        if !state.get("actionStates").is_some_and(Value::is_array) || self.asked.is_empty() {
+            return false;
+        }
+        let order = text(state, "orderId").chars().take(512).collect();
+        let order = (order, super::orders::number(state, "orderUpdateId").unwrap_or_default());
+        let before = self.order.replace(order.clone());
+        let renewed = before.is_some_and(|before| before.0 != order.0);
+        let slow = context.time("slow").unwrap_or(Duration::from_secs(5));
+        let limits = (slow, context.time("react").unwrap_or(Duration::from_secs(31)));
+        let now = entry.at().moment;
+        for asked in self.asked.values_mut() {
+            asked.states += 1;
+        }
+        let mut found = Vec::new();
+        self.listed(state, now, entry.seq(), context, limits, &mut found);
+        self.missing(now, entry.seq(), renewed, limits, &mut found);
+        let mine = |finding: &CheckFinding| {
+            finding
+                .requirement
+                .as_ref()
+                .is_some_and(|id| id.as_str() == self.requirement)
+        };
+        findings.extend(found.into_iter().filter(mine));
+        let judged = self.has_subject(context);
+        if renewed {
+            // What has ended may go with the old order, listed ever or not.
+            self.asked.retain(|_, asked| asked.listed);
+        }
+        judged
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::{Trace, merged};
+
+    fn sends(trace: &mut Trace, all: &[(&str, &str)]) {
+        let all: Vec<Value> = all
+            .iter()
+            .map(|(id, kind)| json!({ "actionId": id, "actionType": kind, "blockingType": "NONE" }))
+            .collect();
+        let message = merged(trace.header(), &json!({ "actions": all }));
+        trace.sent("instantActions", &message);
+    }
+
+    fn lists(all: &[(&str, &str)]) -> Value {
+        let all: Vec<Value> = all
+            .iter()
+            .map(|(id, status)| json!({ "actionId": id, "actionStatus": status }))
+            .collect();
+        json!({ "actionStates": all })
+    }
+
+    const ALL: [&str; 4] = [
+        "instant/answered-together",
+        "instant/answered",
+        "instant/begins",
+        "instant/scope",
+    ];
+
+    fn judge(kinds: &[(&str, &str)], shown: &[(&str, &str)], seconds: f64) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({}));
+        sends(&mut trace, kinds);
+        trace.wait(0.2).state(&lists(shown));
+        trace.wait(seconds).state(&lists(shown));
+        ALL.iter().flat_map(|check| trace.judge(check).summary()).collect()
+    }
+
+    #[test]
+    fn actions_that_get_a_state_are_right_and_slow_ones_have_time() {
+        let both = [("a", "stateRequest"), ("b", "dance")];
+        assert!(judge(&both, &[("a", "FINISHED"), ("b", "FAILED")], 60.0).is_empty());
+        assert!(judge(&both, &[], 20.0).is_empty());
+        assert!(judge(&both, &[("a", "RUNNING"), ("b", "WAITING")], 60.0).is_empty());
+    }
+
+    #[test]
+    fn actions_without_a_state_are_found() {
+        let both = [("a", "stateRequest"), ("b", "dance")];
+        assert_eq!(judge(&both, &[("b", "FAILED")], 10.0), ["IACT-07 warning"]);
+        assert_eq!(judge(&both, &[("b", "FAILED")], 40.0), ["IACT-07", "IACT-03"]);
+        assert_eq!(judge(&both[..1], &[], 40.0), ["IACT-03"]);
+    }
+
+    #[test]
+    fn an_action_that_waits_for_nothing_is_found() {
+        let one = [("a", "stateRequest")];
+        assert_eq!(judge(&one, &[("a", "WAITING")], 10.0), ["IACT-05 warning"]);
+        assert_eq!(judge(&one, &[("a", "WAITING")], 40.0), ["IACT-05"]);
+    }
+
+    #[test]
+    fn a_pick_as_an_instant_action_is_found_unless_it_is_offered() {
+        let pick = [("a", "pick")];
+        assert_eq!(judge(&pick, &[("a", "RUNNING")], 1.0), ["ACT-10"]);
+        assert!(judge(&pick, &[("a", "FAILED")], 1.0).is_empty());
+        let mut trace = Trace::subscriber();
+        let offered = json!([{ "actionType": "pick", "actionScopes": ["INSTANT"] }]);
+        trace.message("factsheet", &json!({ "protocolFeatures": { "agvActions": offered } }));
+        trace.state(&json!({}));
+        sends(&mut trace, &pick);
+        trace.state(&lists(&[("a", "RUNNING")]));
+        assert!(trace.judge("instant/scope").findings.is_empty());
+    }
+}

@@ -1,0 +1,212 @@
+//! `instant/requests`: who is asked for a state or a factsheet publishes it, whatever else it does.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::continuity::Continuity;
+use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::Event;
+
+/// How many requests are kept in mind.
+const REQUESTS: usize = 64;
+
+/// See the module.
+pub(super) const REQUESTS_MET: Check = Check {
+    name: "instant/requests",
+    decides: &["ACT-26", "ACT-40"],
+    doc: "The next state comes within time.event of a stateRequest, up to time.eventWarning with a warning, if a state says \
+          that the request was met. A factsheetRequest that is FINISHED is followed, or was preceded since it was sent, by \
+          a factsheet within time.react; from time.slow on it is a warning. Not judged while the harness disturbs the \
+          link, nor over a restart.",
+    arguments: &[],
+    start: |_| Box::new(Requests::default()),
+};
+
+#[derive(Default)]
+struct Requests {
+    traffic: Traffic,
+    life: Continuity,
+    /// When the next state came for each stateRequest, as soon as it did: time it took, and entry.
+    states: BTreeMap<String, (Moment, Option<(Duration, u64)>)>,
+    /// When each factsheetRequest was seen FINISHED, and whether that was remarked on.
+    sheets: BTreeMap<String, Option<(Moment, u64, bool)>>,
+}
+
+impl Requests {
+    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        let Some(message) = to_vehicle("instantActions", entry, context).filter(|_| !self.traffic.disturbed) else {
+            return;
+        };
+        let schema = context.pack.schema("instantActions");
+        if schema.is_some_and(|schema| !schema.findings(message).is_empty()) {
+            return;
+        }
+        for action in actions(message).take(REQUESTS) {
+            let id: String = text(action, "actionId").chars().take(512).collect();
+            match text(action, "actionType") {
+                "stateRequest" if self.states.len() < REQUESTS => {
+                    self.states.entry(id).or_insert((entry.at().moment, None));
+                }
+                "factsheetRequest" if self.sheets.len() < REQUESTS => {
+                    self.sheets.entry(id).or_insert(None);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn state_came(
+        &mut self,
+        state: &Value,
+        entry: &Entry,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) {
+        let now = entry.at().moment;
+        let soft = context.time("event").unwrap_or(Duration::from_secs(1));
+        let hard = context
+            .time("eventWarning")
+            .map_or(Duration::from_secs(5), |hard| hard.max(soft));
+        for (since, came) in self.states.values_mut() {
+            came.get_or_insert((now.since(*since), entry.seq()));
+        }
+        for action in elements(state, "actionStates").take(REQUESTS * 4) {
+            let (id, status) = (text(action, "actionId"), text(action, "actionStatus"));
+            if !matches!(status, "FINISHED" | "FAILED") {
+                continue;
+            }
+            if let Some((_, Some((took, seq)))) = self.states.remove(id)
+                && status == "FINISHED"
+            {
+                let text = format!(
+                    "no state came for {:.1} s after stateRequest {}, which is reported FINISHED",
+                    took.as_secs_f64(),
+                    quote(id)
+                );
+                if took > hard {
+                    findings.push(broken("ACT-26", seq, text));
+                } else if took > soft {
+                    findings.push(remark("ACT-26", seq, text));
+                }
+            }
+            if status == "FAILED" {
+                self.sheets.remove(id);
+            } else if let Some(seen) = self.sheets.get_mut(id) {
+                seen.get_or_insert((now, entry.seq(), false));
+            }
+        }
+    }
+
+    fn overdue(&mut self, now: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        let slow = context.time("slow").unwrap_or(Duration::from_secs(5));
+        let react = context.time("react").unwrap_or(Duration::from_secs(31));
+        let mut given_up = Vec::new();
+        for (id, seen) in &mut self.sheets {
+            let Some((since, seq, remarked)) = seen else { continue };
+            let text = format!(
+                "factsheetRequest {} is FINISHED, and no factsheet has come since it was sent",
+                quote(id)
+            );
+            if now.since(*since) > react {
+                findings.push(broken("ACT-40", *seq, text));
+                given_up.push(id.clone());
+            } else if now.since(*since) > slow && !*remarked {
+                *remarked = true;
+                findings.push(remark("ACT-40", *seq, text));
+            }
+        }
+        for id in given_up {
+            self.sheets.remove(&id);
+        }
+    }
+}
+
+impl Running for Requests {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let restarted = self.life.restarted(self.traffic, entry, context);
+        if restarted || self.traffic.disturbed || outside_influence(entry) {
+            self.states.clear();
+            self.sheets.clear();
+        }
+        self.learn(entry, context);
+        if let Event::Message { topic, .. } = entry.event()
+            && context.topic_name(topic) == Some("factsheet")
+        {
+            self.sheets.clear();
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        let judged = !self.states.is_empty() || !self.sheets.is_empty();
+        self.overdue(entry.at().moment, context, findings);
+        self.state_came(state, entry, context, findings);
+        judged
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::{Trace, merged};
+
+    fn asks(kind: &str) -> Trace {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({}));
+        let action = json!({ "actionId": "x", "actionType": kind, "blockingType": "NONE" });
+        let message = merged(trace.header(), &json!({ "actions": [action] }));
+        trace.sent("instantActions", &message);
+        trace
+    }
+
+    fn ended(status: &str) -> Value {
+        json!({ "actionStates": [{ "actionId": "x", "actionStatus": status }] })
+    }
+
+    #[test]
+    fn a_state_that_was_asked_for_comes_at_once() {
+        let after = |seconds: f64, status: &str| {
+            let mut trace = asks("stateRequest");
+            trace.wait(seconds).state(&ended(status));
+            trace.judge("instant/requests").summary()
+        };
+        assert!(after(0.3, "FINISHED").is_empty());
+        assert_eq!(after(3.0, "FINISHED"), ["ACT-26 warning"]);
+        assert_eq!(after(20.0, "FINISHED"), ["ACT-26"]);
+        assert!(after(20.0, "FAILED").is_empty());
+    }
+
+    #[test]
+    fn a_factsheet_that_is_said_to_be_published_comes() {
+        let after = |seconds: f64, comes: bool| {
+            let mut trace = asks("factsheetRequest");
+            trace.state(&ended("FINISHED"));
+            if comes {
+                trace.message("factsheet", &json!({}));
+            }
+            trace.wait(seconds).state(&ended("FINISHED"));
+            trace.judge("instant/requests").summary()
+        };
+        assert!(after(60.0, true).is_empty());
+        assert!(after(2.0, false).is_empty());
+        assert_eq!(after(10.0, false), ["ACT-40 warning"]);
+        assert_eq!(after(60.0, false), ["ACT-40"]);
+    }
+
+    #[test]
+    fn a_request_that_a_restart_swallowed_is_forgiven() {
+        let mut trace = asks("factsheetRequest");
+        trace
+            .state(&ended("FINISHED"))
+            .connection("ONLINE")
+            .wait(60.0)
+            .state(&json!({}));
+        assert!(trace.judge("instant/requests").findings.is_empty());
+    }
+}

@@ -1,0 +1,206 @@
+//! Named checks: what patterns cannot say.
+//!
+//! A [`Check`] is a small state machine over the journal entries of a run or of a window. Tests and monitors
+//! refer to it by name. It documents the requirements it can decide and never reads a clock.
+//!
+//! One file per topic group; [`REGISTRY`] lists them all. A check is told everything that happened and must
+//! not accuse anybody falsely: states coalesce, links break, wills are old by nature, retained messages are
+//! stale, and tests send broken messages on purpose. Memory is bounded whatever a device sends.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod blocking;
+mod cancel_course;
+mod commands;
+mod connection;
+mod connection_crash;
+mod connection_offline;
+mod continuity;
+mod errors;
+mod errors_blame;
+mod errors_event;
+mod errors_ready;
+mod factsheet;
+mod factsheet_actions;
+mod factsheet_network;
+mod fleet;
+mod fleet_heard;
+mod fleet_orders;
+mod header;
+mod header_id;
+mod instant_answers;
+mod instant_queued;
+mod instant_requests;
+#[cfg(test)]
+mod known_members;
+mod linked_state;
+mod message;
+mod motion;
+mod motion_signs;
+mod mqtt;
+mod orders;
+mod rhythm;
+mod state;
+mod topic;
+mod topic_heard;
+#[cfg(test)]
+mod trace;
+mod traffic;
+mod trajectory;
+mod visualization;
+mod visualization_pose;
+
+use tck_check::Check;
+
+/// Every named check, in the order they are listed and run.
+pub static REGISTRY: &[Check] = &[
+    message::SCHEMA,
+    message::ENCODING,
+    fleet::COMMANDED,
+    fleet_orders::OWN_ORDERS,
+    fleet_heard::EACH_HEARD,
+    header_id::ID_RISES,
+    header::TIMESTAMP,
+    header::IDENTITY,
+    header::VERSION,
+    topic::NAMES,
+    topic::STRUCTURE,
+    topic::OWN_SIDE,
+    topic_heard::HEARD,
+    mqtt::QUALITY,
+    mqtt::CONNECT,
+    connection::ONLINE_AFTER_CONNECT,
+    connection::VALUES,
+    connection_crash::STAYS,
+    connection_offline::SAYS_OFFLINE,
+    state::period::PERIOD,
+    state::period::OWN_LIMITS,
+    state::bursts::BURSTS,
+    state::action_ids::ACTION_IDS,
+    state::actions::TRANSITIONS,
+    state::actions::KEPT,
+    state::order::ORDER_KEPT,
+    state::known::ORDER_KNOWN,
+    state::known::UPDATE_ID_RISES,
+    state::known::NOT_REPLACED,
+    state::predefined::STATUSES,
+    state::predefined::RESULTS,
+    linked_state::LINKED_STATE,
+    cancel_course::COURSE,
+    instant_answers::ANSWERED,
+    instant_answers::TOGETHER,
+    instant_answers::BEGINS,
+    instant_answers::SCOPE,
+    instant_queued::NOT_QUEUED,
+    instant_requests::REQUESTS_MET,
+    state::route::REMAINING_ROUTE,
+    state::route::LAST_NODE,
+    state::node_positions::NODE_POSITIONS,
+    state::node_positions::JOINT_POSITION,
+    state::triggers::TRIGGERS,
+    blocking::BLOCKING,
+    state::paused::PAUSED,
+    state::pause_stands::PAUSE_STANDS,
+    state::place::LAST_NODE_PLACE,
+    state::values::IDLE_EMPTY,
+    state::maps::MAPS,
+    state::map_changes::MAP_CHANGES,
+    state::values::POSITION_RANGE,
+    state::values::IDENTIFIERS,
+    state::driving::DRIVING,
+    state::driving::POSITION_MOVES,
+    trajectory::TRAJECTORY,
+    trajectory::TRAJECTORY_ENDS,
+    trajectory::PLANNED_PATH,
+    state::battery::LEVELS,
+    state::loads::LOADS,
+    visualization::RATE,
+    visualization::PUBLISHED,
+    visualization_pose::POSITION,
+    errors::PERSIST,
+    errors_ready::READY,
+    errors_event::ON_EVENT,
+    errors_blame::BLAME,
+    factsheet::CONSISTENCY,
+    factsheet::LIMITS,
+    factsheet_actions::PREDEFINED,
+    factsheet_network::NETWORK,
+    motion::EDGE_SPEED,
+    motion::EDGE_ROTATION_SPEED,
+    motion::EDGE_ORIENTATION,
+    motion::ROTATION_PLACE,
+    motion::TRAJECTORY,
+    motion::CURVE_ORIENTATION,
+    motion::CORRIDOR,
+    motion::CORRIDOR_POINT,
+    motion::NEXT_CORRIDOR,
+    motion::NODE_TOLERANCE,
+    motion::NODE_THETA,
+    motion::AXES,
+    motion::VELOCITY_SIGN,
+    motion_signs::VELOCITY_AXES,
+    motion_signs::TURN_SIGN,
+    motion::MODE_SPEED,
+    commands::NODES_AND_EDGES,
+    commands::RELEASED,
+    commands::EDGE_ENDS,
+    commands::SEQUENCE,
+    commands::ARRAYS,
+    commands::POSITION,
+    commands::POSITION_RANGE,
+    commands::ZONE_SET,
+    commands::IDENTIFIERS,
+    commands::TOPICS,
+    commands::NODE_IDS,
+    commands::ACTION_IDS,
+    commands::SCOPES,
+    commands::IN_FACTSHEET,
+    commands::LOAD_DEVICE,
+    commands::VALUES,
+    commands::KEYS,
+    commands::MANDATORY,
+    commands::SIZES,
+    commands::ORDER_INTERVAL,
+    commands::OPTIONAL,
+    commands::REQUIRED,
+    commands::TRAJECTORY,
+    commands::ENDS,
+    commands::CORRIDORS,
+    commands::UPDATES,
+    commands::ORDER_IDS,
+    commands::RESENT,
+    commands::BASE_KEPT,
+    commands::START,
+    commands::CANCELLED_ON_NODE,
+    commands::CANCELLED_BETWEEN,
+    commands::AXES,
+    commands::ENABLED,
+    commands::DOWNLOADS,
+    commands::DUPLICATES,
+    commands::ON_BOARD,
+    commands::MODES,
+    commands::NOT_ASKED,
+    commands::ON_INFORMATION,
+    commands::FIRST_PLACE,
+    commands::HEALTH,
+    commands::ALIVE,
+    commands::LISTENS,
+    commands::AWAY,
+    commands::CONTRADICTS,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tck_check::find;
+
+    #[test]
+    fn names_are_unique_and_every_check_documents_what_it_decides() {
+        for (at, check) in REGISTRY.iter().enumerate() {
+            assert!(REGISTRY[at + 1..].iter().all(|other| other.name != check.name));
+            assert!(!check.decides.is_empty() && !check.doc.is_empty(), "{}", check.name);
+            assert!(find(REGISTRY, check.name).is_some());
+        }
+        assert!(find(REGISTRY, "no/such-check").is_none());
+    }
+}

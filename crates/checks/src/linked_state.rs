@@ -1,0 +1,471 @@
+//! `action/linked-state`: what the table of predefined actions links to an action is so in the state that reports its end.
+//!
+//! That the action ends, and well, is left to the tests.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::continuity::Continuity;
+use super::orders::sets_position;
+use super::state::driving::Pose;
+use super::traffic::{Traffic, actions, broken, elements, quote, show, state, text, to_vehicle};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::Event;
+
+/// How many actions are kept in mind.
+const ACTIONS: usize = 1024;
+/// How far a vehicle may be from the pose it was given: metres, and radians.
+const BESIDE: (f64, f64) = (0.5, 0.35);
+/// What a person or a hook has done may hold for so long.
+const INFLUENCE: Duration = Duration::from_secs(120);
+
+/// See the module.
+pub(super) const LINKED_STATE: Check = Check {
+    name: "action/linked-state",
+    decides: &[
+        "ACT-13",
+        "ACT-15",
+        "ACT-19",
+        "ACT-23",
+        "ACT-24",
+        "MAP-24",
+        "ORD-CANCEL-06",
+        "ORD-CANCEL-07",
+        "ORD-CANCEL-11",
+        "STATE-MSG-08",
+    ],
+    doc: "The state that reports an action FINISHED for the first time shows what is linked to it: paused of startPause and \
+          stopPause, batteryState.charging of startCharging and stopCharging, the pose (within half a metre and 20 degrees), \
+          map and last node of initPosition, the one ENABLED version of enableMap; of startPause and cancelOrder also that \
+          the vehicle stands, and of cancelOrder that no node or edge is left and every action of the order is over. Not \
+          judged where another action on the same may have come in between, while the vehicle drives, after a restart, \
+          while an emergency stop, the protective field, a mode or an error may hold it, and for two minutes after what \
+          a person or a hook did to what is linked.",
+    arguments: &[],
+    start: |_| Box::new(Linked::default()),
+};
+
+/// An action that was sent.
+#[derive(Clone)]
+struct Known {
+    kind: String,
+    action: Value,
+    /// The entry it was sent with.
+    seq: u64,
+}
+
+#[derive(Default)]
+struct Linked {
+    traffic: Traffic,
+    life: Continuity,
+    known: BTreeMap<String, Known>,
+    /// Actions of nodes and edges, and the entry with the last order.
+    placed: BTreeSet<String>,
+    ordered: u64,
+    /// Seen FINISHED or FAILED.
+    ended: BTreeSet<String>,
+    /// When a person or a hook last had a hand in something.
+    touched: BTreeMap<&'static str, Moment>,
+    /// orderId of the last state, if there was one since the start or a restart.
+    order: Option<String>,
+}
+
+/// Everything that is looked at.
+const TOPICS: [&str; 5] = ["pause", "charging", "maps", "pose", "order"];
+
+/// What two actions may both change.
+fn topic(kind: &str) -> Option<&'static str> {
+    match kind {
+        "startPause" | "stopPause" => Some("pause"),
+        "startCharging" | "stopCharging" => Some("charging"),
+        "enableMap" | "deleteMap" => Some("maps"),
+        "cancelOrder" => Some("order"),
+        kind if sets_position(kind) => Some("pose"),
+        _ => None,
+    }
+}
+
+/// What a hook may have changed beside the protocol, or a person. Loads, obstacles and triggers are none of it.
+fn touched(entry: &Entry) -> &'static [&'static str] {
+    let Event::Hook { hook, .. } = entry.event() else {
+        let answered = matches!(entry.event(), Event::Answer { .. });
+        return if answered { &TOPICS } else { &[] };
+    };
+    match hook.as_str() {
+        // What these do is seen in the state for as long as it holds, or in a new connection, or is none of it.
+        "place-load"
+        | "remove-load"
+        | "trigger"
+        | "confirm"
+        | "place-obstacle"
+        | "remove-obstacle"
+        | "set-mode"
+        | "emergency-stop"
+        | "release-emergency-stop"
+        | "enter-field"
+        | "leave-field"
+        | "provoke-error"
+        | "clear-error"
+        | "power-cycle"
+        | "shutdown"
+        | "start" => &[],
+        "press-pause" | "release-pause" | "block-pause" | "unblock-pause" => &["pause"],
+        "lock-charger" | "unlock-charger" => &["charging"],
+        "enable-map" => &["maps", "pose"],
+        _ => &TOPICS,
+    }
+}
+
+/// Whether the state shows nothing that may hold the vehicle, or let somebody else act on it.
+fn nothing_holds(state: &Value) -> bool {
+    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
+    matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
+        && safety("eStop").and_then(Value::as_str) == Some("NONE")
+        && safety("fieldViolation") == Some(&Value::Bool(false))
+        && elements(state, "errors").all(|error| text(error, "errorLevel") == "WARNING")
+}
+
+fn parameter<'v>(action: &'v Value, key: &str) -> Option<&'v Value> {
+    elements(action, "actionParameters")
+        .find(|parameter| text(parameter, "key") == key)?
+        .get("value")
+}
+
+impl Linked {
+    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        let instant = to_vehicle("instantActions", entry, context)
+            .into_iter()
+            .flat_map(actions);
+        let order = to_vehicle("order", entry, context);
+        if order.is_some() {
+            self.ordered = entry.seq();
+        }
+        let placed = order
+            .into_iter()
+            .flat_map(|order| elements(order, "nodes").chain(elements(order, "edges")))
+            .flat_map(|element| elements(element, "actions"));
+        let placed: Vec<&Value> = placed.take(ACTIONS).collect();
+        for action in &placed {
+            if self.placed.len() >= ACTIONS {
+                self.placed.clear();
+            }
+            self.placed.insert(text(action, "actionId").chars().take(512).collect());
+        }
+        for action in instant.chain(placed).take(ACTIONS) {
+            let kind = text(action, "actionType");
+            let id: String = text(action, "actionId").chars().take(512).collect();
+            if topic(kind).is_none() || id.is_empty() {
+                continue;
+            }
+            if self.known.len() >= ACTIONS {
+                self.known.clear();
+                self.ended.clear();
+            }
+            let known = Known {
+                kind: kind.to_owned(),
+                action: action.clone(),
+                seq: entry.seq(),
+            };
+            self.known.insert(id, known);
+        }
+    }
+
+    /// Which actions of the order are not over although its cancellation is.
+    fn outlive(&self, cancel: &Known, state: &Value) -> Vec<(&'static str, String)> {
+        // Those of an order that was sent since may wait already.
+        if self.ordered > cancel.seq {
+            return Vec::new();
+        }
+        let placed = |action: &&Value| self.placed.contains(text(action, "actionId"));
+        let open = |action: &&Value| !matches!(text(action, "actionStatus"), "FINISHED" | "FAILED");
+        let waits = |action: &&Value| text(action, "actionStatus") == "WAITING";
+        let left = elements(state, "actionStates")
+            .take(ACTIONS)
+            .filter(placed)
+            .filter(open);
+        // One that runs rather than one that waits.
+        let Some(action) = left.min_by_key(waits) else {
+            return Vec::new();
+        };
+        let what = format!(
+            "action {} of the order is {}",
+            quote(text(action, "actionId")),
+            text(action, "actionStatus")
+        );
+        let still_running = (!waits(&action)).then(|| ("ORD-CANCEL-06", what.clone()));
+        still_running.into_iter().chain([("ORD-CANCEL-07", what)]).collect()
+    }
+
+    /// What is wrong in the state that shows the end of an action.
+    fn contradiction(known: &Known, state: &Value) -> Vec<(&'static str, String)> {
+        let flag = |path: &str| state.pointer(path).and_then(Value::as_bool);
+        let wants = |requirement, path: &str, wanted: bool| {
+            let wrong = flag(path).is_some_and(|flag| flag != wanted);
+            wrong.then(|| (requirement, format!("{} is {}", path[1..].replace('/', "."), !wanted)))
+        };
+        // Who shows a velocity of nothing stands, whatever the flag says; then it is the flag that is wrong.
+        let speed = |name: &str| state.pointer(name).and_then(Value::as_f64);
+        let stands = speed("/velocity/vx") == Some(0.0)
+            && ["/velocity/vy", "/velocity/omega"]
+                .iter()
+                .all(|name| speed(name).is_none_or(|speed| speed == 0.0));
+        let drives = |requirement| {
+            let requirement = if stands { "STATE-MSG-08" } else { requirement };
+            (flag("/driving") == Some(true)).then(|| (requirement, "driving is true".to_owned()))
+        };
+        let left = || {
+            let count = elements(state, "nodeStates")
+                .chain(elements(state, "edgeStates"))
+                .count();
+            (count > 0).then(|| ("ORD-CANCEL-11", format!("{count} node and edge states are left")))
+        };
+        let found = match known.kind.as_str() {
+            "startPause" if flag("/driving") == Some(true) => drives("ACT-15"),
+            "cancelOrder" => return left().into_iter().chain(drives("ORD-CANCEL-07")).collect(),
+            "startPause" => wants("ACT-13", "/paused", true),
+            "stopPause" => wants("ACT-13", "/paused", false),
+            "startCharging" => wants("ACT-19", "/batteryState/charging", true),
+            "stopCharging" => wants("ACT-19", "/batteryState/charging", false),
+            "enableMap" => Self::maps(&known.action, state),
+            _ => return Self::pose(&known.action, state),
+        };
+        found.into_iter().collect()
+    }
+
+    fn maps(action: &Value, state: &Value) -> Option<(&'static str, String)> {
+        let maps = state.get("maps")?.as_array()?;
+        let (map, version) = (
+            parameter(action, "mapId")?.as_str()?,
+            parameter(action, "mapVersion")?.as_str()?,
+        );
+        let of_map = maps.iter().filter(|listed| text(listed, "mapId") == map);
+        let enabled: Vec<&str> = of_map
+            .filter(|listed| text(listed, "mapStatus") == "ENABLED")
+            .map(|listed| text(listed, "mapVersion"))
+            .collect();
+        (enabled != [version]).then(|| {
+            let what = match enabled.first() {
+                Some(other) => format!("version {} of map {} is ENABLED", quote(other), quote(map)),
+                None => format!("no version of map {} is ENABLED", quote(map)),
+            };
+            ("MAP-24", what)
+        })
+    }
+
+    fn pose(action: &Value, state: &Value) -> Vec<(&'static str, String)> {
+        let mut found = Vec::new();
+        let number = |key: &str| parameter(action, key).and_then(Value::as_f64);
+        let given = (
+            number("x"),
+            number("y"),
+            number("theta"),
+            parameter(action, "mapId").and_then(Value::as_str),
+        );
+        if let ((Some(x), Some(y), Some(theta), Some(map)), Some(shown)) = (given, Pose::of(state)) {
+            let given = Pose {
+                map: map.to_owned(),
+                x,
+                y,
+                theta,
+            };
+            let (far, turned) = shown.apart(&given);
+            if shown.map != given.map || far > BESIDE.0 || turned > BESIDE.1 {
+                let text = format!(
+                    "agvPosition is {} and not x {x}, y {y}, theta {theta} on {}",
+                    show(state.get("agvPosition").unwrap_or(&Value::Null)),
+                    quote(map)
+                );
+                found.push(("ACT-23", text));
+            }
+        }
+        let node = parameter(action, "lastNodeId").and_then(Value::as_str);
+        if let Some(node) = node.filter(|node| !node.is_empty() && text(state, "lastNodeId") != *node) {
+            let shown = quote(text(state, "lastNodeId"));
+            found.push(("ACT-24", format!("lastNodeId is {shown} and not {}", quote(node))));
+        }
+        found
+    }
+}
+
+impl Running for Linked {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.learn(entry, context);
+        for topic in touched(entry) {
+            self.touched.insert(topic, entry.at().moment);
+        }
+        if self.life.restarted(self.traffic, entry, context) {
+            self.order = None;
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        let order: String = text(state, "orderId").chars().take(512).collect();
+        let same_order = self.order.as_ref() == Some(&order);
+        let begun = self.order.replace(order).is_some();
+        let now = entry.at().moment;
+        let left_alone = |topic| self.touched.get(topic).is_none_or(|at| now.since(*at) > INFLUENCE);
+        let still = state.get("driving").and_then(Value::as_bool) == Some(false);
+        let listed: Vec<(&str, &str)> = elements(state, "actionStates")
+            .take(ACTIONS)
+            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
+            .filter(|(id, _)| self.known.contains_key(*id))
+            .collect();
+        // What has ended before, or only waits, changes nothing now.
+        let moves = |id: &str, status: &str| status != "WAITING" && !self.ended.contains(id);
+        let changing: Vec<&str> = listed
+            .iter()
+            .filter(|(id, status)| moves(id, status))
+            .map(|(id, _)| *id)
+            .collect();
+        let mut judged = false;
+        for (id, status) in &listed {
+            let Some(known) = self
+                .known
+                .get(*id)
+                .filter(|_| *status == "FINISHED" && changing.contains(id))
+            else {
+                continue;
+            };
+            let rivals = changing.iter().filter(|other| {
+                let other = self.known.get(**other);
+                other.is_some_and(|other| topic(&other.kind) == topic(&known.kind))
+            });
+            let fits = match topic(&known.kind) {
+                Some("pause") => true,
+                // Another order may have come in between.
+                Some("order") => same_order,
+                _ => still,
+            };
+            let free = topic(&known.kind).is_some_and(left_alone);
+            if rivals.count() != 1 || !begun || !free || !fits || !nothing_holds(state) {
+                continue;
+            }
+            judged = true;
+            let outlive = match known.kind.as_str() {
+                "cancelOrder" => self.outlive(known, state),
+                _ => Vec::new(),
+            };
+            for (requirement, text) in Self::contradiction(known, state).into_iter().chain(outlive) {
+                let text = format!("{} {} is FINISHED, and {text}", known.kind, quote(id));
+                findings.push(broken(requirement, entry.seq(), text));
+            }
+        }
+        let over = listed
+            .iter()
+            .filter(|(_, status)| matches!(*status, "FINISHED" | "FAILED"));
+        self.ended.extend(over.map(|(id, _)| (*id).to_owned()));
+        judged
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::{Trace, merged};
+    use tck_journal::event::{Event, Source};
+
+    fn judge(action: &str, parameters: &Value, shown: &Value) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({})).instant(action, "x", parameters);
+        let ended = json!({ "actionStates": [{ "actionId": "x", "actionStatus": "FINISHED" }] });
+        trace.state(&merged(ended, shown));
+        trace.judge("action/linked-state").summary()
+    }
+
+    #[test]
+    fn pause_and_charging_are_shown_with_the_end_of_their_action() {
+        assert!(judge("startPause", &json!([]), &json!({ "paused": true })).is_empty());
+        assert!(judge("startPause", &json!([]), &json!({})).is_empty());
+        assert_eq!(judge("startPause", &json!([]), &json!({ "paused": false })), ["ACT-13"]);
+        assert_eq!(judge("stopPause", &json!([]), &json!({ "paused": true })), ["ACT-13"]);
+        let charging = json!({ "batteryState": { "charging": true } });
+        assert!(judge("startCharging", &json!([]), &charging).is_empty());
+        assert_eq!(judge("stopCharging", &json!([]), &charging), ["ACT-19"]);
+    }
+
+    #[test]
+    fn a_pose_that_was_given_is_shown() {
+        let given = |theta: f64, node: &str| {
+            json!([{ "key": "x", "value": 1.0 }, { "key": "y", "value": 2.0 }, { "key": "theta", "value": theta },
+                { "key": "mapId", "value": "hall" }, { "key": "lastNodeId", "value": node }])
+        };
+        assert!(judge("initPosition", &given(0.5, "n1"), &json!({})).is_empty());
+        assert_eq!(judge("initPosition", &given(1.5, "n1"), &json!({})), ["ACT-23"]);
+        assert_eq!(judge("initPosition", &given(0.4, "n2"), &json!({})), ["ACT-24"]);
+    }
+
+    #[test]
+    fn the_version_that_was_asked_for_is_enabled() {
+        let asked = json!([{ "key": "mapId", "value": "hall" }, { "key": "mapVersion", "value": "2" }]);
+        let version =
+            |version: &str| json!({ "maps": [{ "mapId": "hall", "mapVersion": version, "mapStatus": "ENABLED" }] });
+        assert!(judge("enableMap", &asked, &version("2")).is_empty());
+        assert_eq!(judge("enableMap", &asked, &version("1")), ["MAP-24"]);
+    }
+
+    #[test]
+    fn two_actions_that_end_together_leave_it_open() {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&json!({}))
+            .instant("startPause", "x", &json!([]))
+            .instant("stopPause", "y", &json!([]));
+        let both =
+            json!([{ "actionId": "x", "actionStatus": "FINISHED" }, { "actionId": "y", "actionStatus": "FINISHED" }]);
+        trace.state(&json!({ "actionStates": both, "paused": false }));
+        assert!(trace.judge("action/linked-state").findings.is_empty());
+    }
+
+    /// What is found when a cancellation ends beside an action of the order with this status.
+    fn cancel_beside(status: &str, ordered_since: bool) -> Vec<String> {
+        let order = |update: u64| {
+            json!({ "orderId": "o", "orderUpdateId": update,
+                "nodes": [{ "nodeId": "a", "sequenceId": 0, "released": true, "actions": [] }],
+                "edges": [{ "edgeId": "a-b", "sequenceId": 1, "released": true, "actions": [{ "actionId": "w" }] }] })
+        };
+        let shown = |cancel: &str| {
+            json!({ "orderId": "o", "driving": false, "nodeStates": [], "edgeStates": [], "actionStates": [
+                { "actionId": "x", "actionStatus": cancel }, { "actionId": "w", "actionStatus": status }] })
+        };
+        let mut trace = Trace::subscriber();
+        trace.sent("order", &order(0));
+        trace.state(&shown("WAITING")).instant("cancelOrder", "x", &json!([]));
+        trace.state(&shown("RUNNING"));
+        if ordered_since {
+            trace.sent("order", &order(0));
+        }
+        trace.state(&shown("FINISHED"));
+        trace.judge("action/linked-state").summary()
+    }
+
+    #[test]
+    fn an_action_that_outlives_its_cancellation_is_found() {
+        assert!(cancel_beside("FAILED", false).is_empty());
+        assert!(cancel_beside("FINISHED", false).is_empty());
+        for status in ["RUNNING", "PAUSED", "INITIALIZING"] {
+            assert_eq!(cancel_beside(status, false), ["ORD-CANCEL-06", "ORD-CANCEL-07"]);
+        }
+        assert_eq!(cancel_beside("WAITING", false), ["ORD-CANCEL-07"]);
+        assert!(cancel_beside("WAITING", true).is_empty());
+    }
+
+    #[test]
+    fn a_button_at_the_vehicle_leaves_it_open() {
+        let mut trace = Trace::subscriber();
+        let pressed = Event::Answer {
+            prompt: "Press the button".into(),
+            answer: "done".into(),
+            ok: true,
+        };
+        trace.state(&json!({})).add(Source::Operator, None, pressed);
+        trace.instant("stopPause", "x", &json!([]));
+        trace.state(&json!({ "actionStates": [{ "actionId": "x", "actionStatus": "FINISHED" }], "paused": true }));
+        assert!(trace.judge("action/linked-state").findings.is_empty());
+    }
+}

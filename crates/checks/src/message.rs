@@ -1,0 +1,497 @@
+//! `message/schema`, `message/encoding`: every message by itself.
+//!
+//! Relations between fields and between messages are left to the other checks; so are the fraction digits of
+//! a timestamp and the value of a version, which `header` judges by their own rulings.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::orders::Malformed;
+use super::traffic::{Traffic, broken, quote, remark};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::json::JsonProblem;
+use tck_pack::{Finding, FindingKind, Pack};
+
+/// `message/schema`.
+pub(super) const SCHEMA: Check = Check {
+    name: "message/schema",
+    decides: &[
+        "JSON-10",
+        "JSON-01",
+        "JSON-02",
+        "JSON-06",
+        "JSON-07",
+        "JSON-08",
+        "JSON-09",
+        "HDR-01",
+        "CONN-10",
+        "STATE-01",
+        "STATE-MSG-01",
+        "STATE-MSG-05",
+        "STATE-MSG-13",
+        "STATE-MSG-14",
+        "STATE-MSG-15",
+        "MODE-01",
+        "ERR-02",
+        "ERR-05",
+        "INFO-01",
+        "MAP-12",
+        "FACT-02",
+        "FACT-03",
+        "FACT-04",
+        "FACT-05",
+        "FACT-06",
+        "FACT-07",
+        "FACT-08",
+        "FACT-09",
+        "FACT-10",
+        "VIS-01",
+        "ORD-MSG-01",
+        "ORD-MSG-03",
+        "ORD-MSG-05",
+        "ORD-MSG-15",
+        "ORD-MSG-16",
+        "ORD-MSG-18",
+        "IACT-01",
+    ],
+    doc: "Every message obeys the schema of its topic, written from the field tables of the document. A finding counts \
+          for JSON-10, for the rule on JSON types or literals it breaks, and for the requirement of the field. What \
+          single precision makes of pi is a warning, once. What a state repeats of a malformed order of the harness \
+          is not judged: that it was taken over is the mistake.",
+    arguments: &[],
+    start: |context| Box::new(Schema::new(context)),
+};
+
+/// `message/encoding`.
+pub(super) const ENCODING: Check = Check {
+    name: "message/encoding",
+    decides: &["MQTT-02", "JSON-03", "JSON-08", "JSON-10"],
+    doc: "Every payload is one JSON object in UTF-8 without NaN, Infinity or numbers beyond all limits. A byte order \
+          mark and a member that occurs twice are warnings. Clearing a retained topic with nothing is no finding.",
+    arguments: &[],
+    start: |_| Box::new(Encoding::default()),
+};
+
+struct Schema {
+    traffic: Traffic,
+    /// The member names of each topic's messages.
+    members: BTreeMap<String, Vec<String>>,
+    /// The same of what is inside of messages: topic and path.
+    inner: Vec<(&'static str, &'static [&'static str], Vec<String>)>,
+    malformed: Malformed,
+    /// An angle beyond pi by what single precision does to it was remarked on.
+    rounded: bool,
+}
+
+/// Members of a state that repeat what an order said.
+const OF_ORDER: [&str; 8] = [
+    "orderId",
+    "orderUpdateId",
+    "nodeStates",
+    "edgeStates",
+    "actionStates",
+    "lastNodeId",
+    "lastNodeSequenceId",
+    "zoneSetId",
+];
+
+/// Pi and what single precision, or seven digits, make of it.
+const PI_IN_SINGLE_PRECISION: f64 = std::f64::consts::PI + 5.0e-7;
+
+/// Whether a number is out of range by no more than single precision explains, or is pi as far as it is written: 3.142,
+/// 3.1416.
+fn is_rounded_pi(finding: &Finding, value: &Value) -> bool {
+    let number = value.pointer(&finding.path).and_then(Value::as_f64);
+    finding.kind == FindingKind::Range
+        && number.is_some_and(|number| {
+            let shown = number.abs().to_string();
+            let digits = shown.split_once('.').map_or(0, |(_, digits)| digits.len());
+            let is_written_so = digits >= 3 && format!("{:.digits$}", std::f64::consts::PI) == shown;
+            is_written_so || (3.0..=PI_IN_SINGLE_PRECISION).contains(&number.abs())
+        })
+}
+
+impl Schema {
+    fn new(context: &CheckContext<'_>) -> Self {
+        let names = context.topics.keys();
+        let members = names.filter_map(|name| Some((name.clone(), context.pack.schema(name)?.members(&[]))));
+        let inner = INNER
+            .iter()
+            .filter_map(|(topic, path)| Some((*topic, *path, context.pack.schema(topic)?.members(path))));
+        Self {
+            traffic: Traffic::default(),
+            members: members.collect(),
+            inner: inner.collect(),
+            malformed: Malformed::default(),
+            rounded: false,
+        }
+    }
+
+    /// Members that are known ones but for their spelling.
+    fn misspelled(&self, topic: &str, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
+        if let Some(known) = self.members.get(topic) {
+            odd_members(value, known, topic, seq, findings);
+        }
+        for (_, path, known) in self.inner.iter().filter(|(of, ..)| *of == topic) {
+            let mut inside = vec![value];
+            for name in *path {
+                inside = inside
+                    .into_iter()
+                    .flat_map(|value| inner(value, name))
+                    .take(INSIDE)
+                    .collect();
+            }
+            let before = findings.len();
+            for value in inside {
+                odd_members(value, known, topic, seq, findings);
+            }
+            // The same mistake is made everywhere; once is enough.
+            findings.truncate(before + 1);
+        }
+    }
+}
+
+/// What is inside of messages and has members of its own.
+const INNER: [(&str, &[&str]); 16] = [
+    ("state", &["safetyState"]),
+    ("state", &["batteryState"]),
+    ("state", &["agvPosition"]),
+    ("state", &["velocity"]),
+    ("state", &["errors"]),
+    ("visualization", &["agvPosition"]),
+    ("visualization", &["velocity"]),
+    ("order", &["nodes"]),
+    ("order", &["nodes", "nodePosition"]),
+    ("order", &["nodes", "actions"]),
+    ("order", &["nodes", "actions", "actionParameters"]),
+    ("order", &["edges"]),
+    ("order", &["edges", "actions"]),
+    ("order", &["edges", "corridor"]),
+    ("order", &["edges", "trajectory"]),
+    ("instantActions", &["actions"]),
+];
+/// How many of them are looked at.
+const INSIDE: usize = 512;
+
+fn inner<'v>(value: &'v Value, name: &str) -> Vec<&'v Value> {
+    match value.get(name) {
+        Some(Value::Array(list)) => list.iter().take(INSIDE).collect(),
+        Some(one) => vec![one],
+        None => Vec::new(),
+    }
+}
+
+/// Members that are known ones but for their spelling.
+fn odd_members(value: &Value, known: &[String], topic: &str, seq: u64, findings: &mut Vec<CheckFinding>) {
+    let odd = value.as_object().into_iter().flatten().map(|(name, _)| name);
+    for name in odd.filter(|name| name.len() < 64 && !known.contains(name)).take(16) {
+        if let Some(meant) = known.iter().find(|known| plain(known) == plain(name)) {
+            let text = format!("member {} on {topic} is spelled {meant:?}", quote(name));
+            findings.push(broken("JSON-01", seq, text));
+        }
+    }
+}
+
+fn plain(name: &str) -> String {
+    name.chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|character| character.to_ascii_lowercase())
+        .collect()
+}
+
+impl Running for Schema {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.malformed.note(entry, context);
+        let Some(message) = self.traffic.delivered(entry, context) else {
+            return false;
+        };
+        let (Some(schema), Some(value)) = (context.pack.schema(message.name), entry.json()) else {
+            return false;
+        };
+        if !value.is_object() {
+            return false;
+        }
+        let (topic, seq) = (message.name, entry.seq());
+        let of_order = topic == "state" && self.malformed.is_shown_in(value);
+        for finding in schema.findings(value) {
+            let first = finding.path.split('/').nth(1).unwrap_or_default();
+            if of_order && OF_ORDER.contains(&first) {
+                continue;
+            }
+            if is_rounded_pi(&finding, value) {
+                if !std::mem::replace(&mut self.rounded, true) {
+                    let text = format!("{topic}{}: {}, by rounding", finding.path, finding.message);
+                    findings.push(remark("JSON-10", seq, text));
+                }
+                continue;
+            }
+            let text = format!("{topic}{}: {}", finding.path, finding.message);
+            for id in requirements(context.pack, topic, &finding, value) {
+                findings.push(broken(id, seq, text.clone()));
+            }
+            deep_misspelling(topic, &finding, value, seq, findings);
+        }
+        self.misspelled(topic, value, seq, findings);
+        let physical = value.get("physicalParameters").filter(|_| topic == "factsheet");
+        if physical.is_some_and(|physical| physical.get("heightMin").is_none()) {
+            let text = "factsheet/physicalParameters: `heightMin` is missing, which the document asks for";
+            findings.push(remark("FACT-04", seq, text));
+        }
+        true
+    }
+}
+
+/// A member that is missing further inside, and stands there in another spelling.
+fn deep_misspelling(topic: &str, finding: &Finding, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
+    let Some((inside, name)) = finding.path.rsplit_once('/').filter(|(inside, _)| !inside.is_empty()) else {
+        return;
+    };
+    let path: Vec<&str> = inside
+        .split('/')
+        .skip(1)
+        .filter(|part| part.parse::<u32>().is_err())
+        .collect();
+    // Those are looked through anyway.
+    if finding.kind != FindingKind::Missing || INNER.contains(&(topic, &path[..])) {
+        return;
+    }
+    let members = value.pointer(inside).and_then(Value::as_object);
+    let mut members = members.into_iter().flatten().map(|(member, _)| member);
+    if let Some(other) = members.find(|other| other.len() < 64 && plain(other) == plain(name)) {
+        let text = format!("member {} on {topic} is spelled {name:?}", quote(other));
+        findings.push(broken("JSON-01", seq, text));
+    }
+}
+
+/// Every requirement that a schema finding breaks; none for what another check judges by a milder ruling.
+fn requirements<'p>(pack: &'p Pack, topic: &str, finding: &Finding, value: &Value) -> Vec<&'p str> {
+    let path: Vec<&str> = finding.path.split('/').skip(1).collect();
+    if finding.kind == FindingKind::Pattern && matches!(path[..], ["timestamp" | "version"]) {
+        return Vec::new();
+    }
+    let mut all = vec!["JSON-10"];
+    let found = value.pointer(&finding.path);
+    all.extend(match finding.kind {
+        FindingKind::Enumeration => Some("JSON-02"),
+        FindingKind::Range => Some("JSON-09"),
+        FindingKind::Type if finding.message.ends_with("boolean") || found.is_some_and(Value::is_boolean) => {
+            Some("JSON-07")
+        }
+        FindingKind::Type if found.and_then(Value::as_str).is_some_and(special) => Some("JSON-08"),
+        FindingKind::Type => Some("JSON-06"),
+        FindingKind::Missing | FindingKind::Pattern | FindingKind::Other => None,
+    });
+    all.extend(pack.requirement_of(topic, &path, finding.kind));
+    if topic == "visualization" && !all.contains(&"VIS-01") {
+        all.push("VIS-01");
+    }
+    if topic == "instantActions" && all.ends_with(&["ORD-MSG-15"]) {
+        all.push("IACT-01");
+    }
+    if all.ends_with(&["STATE-MSG-01"]) && finding.kind == FindingKind::Missing {
+        all.push("STATE-01");
+    }
+    all
+}
+
+/// The names IEEE 754 gives to what is no number.
+fn special(text: &str) -> bool {
+    let text = text.trim_start_matches(['+', '-']);
+    ["nan", "inf", "infinity"]
+        .iter()
+        .any(|name| text.eq_ignore_ascii_case(name))
+}
+
+#[derive(Default)]
+struct Encoding {
+    traffic: Traffic,
+}
+
+impl Running for Encoding {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let Some(message) = self.traffic.published(entry, context) else {
+            return false;
+        };
+        let (Some(parsed), Some(payload)) = (entry.parsed(), entry.payload()) else {
+            return false;
+        };
+        let (topic, seq) = (message.name, entry.seq());
+        let mut judged = true;
+        for problem in parsed.problems().iter().take(8) {
+            let text = format!("{topic}: {}", quote(&problem.to_string()));
+            match problem {
+                // Too big to be kept and too deep to be parsed are limits of ours.
+                JsonProblem::TooBig { .. } | JsonProblem::TooDeep => judged = false,
+                // Nothing, retained, clears a topic; a subscriber does not see which it was.
+                JsonProblem::Empty if message.retain.unwrap_or(matches!(topic, "connection" | "factsheet")) => {
+                    judged = false;
+                }
+                JsonProblem::Empty | JsonProblem::NotAnObject => findings.push(broken("MQTT-02", seq, text)),
+                JsonProblem::NotUtf8 { .. } => {
+                    findings.push(broken("JSON-03", seq, text.clone()));
+                    findings.push(broken("MQTT-02", seq, text));
+                }
+                JsonProblem::ByteOrderMark => findings.push(remark("JSON-03", seq, text)),
+                JsonProblem::DuplicateMember(_) => findings.push(remark("JSON-10", seq, text)),
+                JsonProblem::Syntax(reason) => {
+                    if reason.contains("number out of range") || names_no_number(payload.bytes()) {
+                        findings.push(broken("JSON-08", seq, text.clone()));
+                    }
+                    findings.push(broken("MQTT-02", seq, text));
+                }
+            }
+        }
+        judged
+    }
+}
+
+/// Whether NaN or Infinity stands somewhere outside of a string.
+fn names_no_number(bytes: &[u8]) -> bool {
+    let (mut quoted, mut escaped) = (false, false);
+    for (at, byte) in bytes.iter().enumerate() {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' if quoted => escaped = true,
+            b'"' => quoted = !quoted,
+            b'N' | b'I' if !quoted => {
+                let rest = &bytes[at..];
+                if rest.starts_with(b"NaN") || rest.starts_with(b"Infinity") {
+                    return true;
+                }
+            }
+            _ => {}
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::trace::Trace;
+
+    fn state(over: &Value) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(over);
+        trace.judge("message/schema").summary()
+    }
+
+    #[test]
+    fn a_complete_state_with_extra_members_is_right() {
+        assert_eq!(
+            state(&json!({ "vendorExtra": { "anything": 1 } })),
+            Vec::<String>::new()
+        );
+    }
+
+    #[test]
+    fn each_kind_of_violation_names_its_requirements() {
+        let cases = [
+            (json!({ "headerId": null }), vec!["JSON-10", "HDR-01"]),
+            (
+                json!({ "nodeStates": null }),
+                vec!["JSON-10", "STATE-MSG-01", "STATE-01"],
+            ),
+            (
+                json!({ "operatingMode": "automatic" }),
+                vec!["JSON-10", "JSON-02", "MODE-01"],
+            ),
+            (
+                json!({ "driving": "false" }),
+                vec!["JSON-10", "JSON-07", "STATE-MSG-01"],
+            ),
+            (
+                json!({ "orderUpdateId": -1 }),
+                vec!["JSON-10", "JSON-09", "STATE-MSG-01"],
+            ),
+            (
+                json!({ "agvPosition": { "x": "1" } }),
+                vec!["JSON-10", "JSON-06", "STATE-MSG-05"],
+            ),
+            (
+                json!({ "agvPosition": { "x": "NaN" } }),
+                vec!["JSON-10", "JSON-08", "STATE-MSG-05"],
+            ),
+            (json!({ "errors": [{ "errorType": "x" }] }), vec!["JSON-10", "ERR-02"]),
+            (
+                json!({ "errors": [{ "errorType": "x", "errorLevel": "WARNING",
+                    "errorReferences": [{ "referenceKey": "nodeId", "referenceValue": 5 }] }] }),
+                vec!["JSON-10", "JSON-06", "ERR-05"],
+            ),
+            (
+                json!({ "actionStates": [{ "actionId": "a", "actionStatus": "DONE" }] }),
+                vec!["JSON-10", "JSON-02", "STATE-MSG-14"],
+            ),
+            (
+                json!({ "maps": [{ "mapId": "a", "mapStatus": "ENABLED" }] }),
+                vec!["JSON-10", "MAP-12"],
+            ),
+        ];
+        for (over, expected) in cases {
+            assert_eq!(state(&over), expected, "{over}");
+        }
+    }
+
+    #[test]
+    fn a_known_member_in_other_spelling_is_found() {
+        let found = state(&json!({ "driving": null, "Driving": false }));
+        assert_eq!(found, ["JSON-10", "STATE-MSG-01", "STATE-01", "JSON-01"]);
+    }
+
+    #[test]
+    fn forms_that_other_checks_judge_are_left_to_them() {
+        assert!(state(&json!({ "timestamp": "yesterday", "version": "two" })).is_empty());
+    }
+
+    #[test]
+    fn other_topics_have_their_own_requirements() {
+        let mut trace = Trace::subscriber();
+        trace.connection("connected");
+        assert_eq!(
+            trace.judge("message/schema").summary(),
+            ["JSON-10", "JSON-02", "CONN-10"]
+        );
+        let mut trace = Trace::subscriber();
+        let header = trace.header();
+        trace.message("factsheet", &header);
+        let found = trace.judge("message/schema").summary();
+        assert_eq!(found.iter().filter(|id| *id == "FACT-02").count(), 6);
+    }
+
+    fn encoded(bytes: &[u8]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.bytes("state", bytes);
+        trace.judge("message/encoding").summary()
+    }
+
+    #[test]
+    fn one_object_in_utf8_is_right() {
+        assert!(encoded("{\"x\":\"Nürnberg NaN\"}".as_bytes()).is_empty());
+    }
+
+    #[test]
+    fn what_is_no_json_object_in_utf8_is_found() {
+        assert_eq!(encoded(b""), ["MQTT-02"]);
+        assert_eq!(encoded(b"[1]"), ["MQTT-02"]);
+        assert_eq!(encoded(b"{\"a\":1} {}"), ["MQTT-02"]);
+        assert_eq!(encoded(b"{\"a\":\"\xff\"}"), ["JSON-03", "MQTT-02"]);
+        assert_eq!(encoded(b"\xef\xbb\xbf{}"), ["JSON-03 warning"]);
+        assert_eq!(encoded(b"{\"a\":1,\"a\":2}"), ["JSON-10 warning"]);
+        assert_eq!(encoded(b"{\"a\":NaN}"), ["JSON-08", "MQTT-02"]);
+        assert_eq!(encoded(b"{\"a\":-Infinity}"), ["JSON-08", "MQTT-02"]);
+        assert_eq!(encoded(b"{\"a\":1e999}"), ["JSON-08", "MQTT-02"]);
+    }
+
+    #[test]
+    fn clearing_a_retained_topic_is_no_finding() {
+        let mut trace = Trace::subscriber();
+        trace.bytes("connection", b"");
+        let outcome = trace.judge("message/encoding");
+        assert!(outcome.findings.is_empty() && outcome.judged == 0);
+    }
+}

@@ -1,0 +1,95 @@
+//! `motion/node-tolerance`: where the vehicle is when it reports a node traversed.
+
+use super::softly;
+use super::way::{self, View};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// `motion/node-tolerance`.
+pub(crate) const NODE_TOLERANCE: Check = Check {
+    name: "motion/node-tolerance",
+    decides: &["NODE-01", "ORD-MSG-13"],
+    doc: "When a node with allowedDeviationXY is reported traversed, the reported position is within it; with 0, within \
+          the usual tolerance of the vendor, 0.1 m unless `tolerance` says otherwise. Judged by the first state that \
+          shows the node: with a margin for the way since the state before, but at the end of the base only for 0.2 s of \
+          late reports. Not judged on nodes with actions, which may move the \
+          vehicle. Always a warning.",
+    arguments: &["tolerance"],
+    start: |context| {
+        let stated = context.with.get("tolerance").and_then(serde_json::Value::as_f64);
+        Box::new(NodeTolerance {
+            usual: stated.unwrap_or(0.1),
+        })
+    },
+};
+
+/// How far a position may be wrong, in metres.
+const SLACK: f64 = 0.05;
+/// How late what a state shows may be, in seconds.
+const LATE: f64 = 0.2;
+
+struct NodeTolerance {
+    /// Tolerance of the vendor, in metres.
+    usual: f64,
+}
+
+/// How far the vehicle may have come between passing the node and this state; `None` when nobody can know.
+pub(super) fn margin(now: &View, before: &View, speed: impl Fn(&View) -> Option<f64>) -> Option<f64> {
+    if now.base_done {
+        // It had nowhere else to go: it can only be still on its way to the node.
+        return if now.stands() {
+            Some(0.0)
+        } else {
+            Some(speed(now)?.abs() * LATE)
+        };
+    }
+    let fastest = speed(now)?.abs().max(speed(before)?.abs());
+    Some(fastest * (now.time_since(before).as_secs_f64() + LATE))
+}
+
+impl Running for NodeTolerance {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(step) = way::step(entry, context) else {
+            return false;
+        };
+        let now = &step.now;
+        // Only what was seen to be traversed; where an order begins is another matter.
+        let Some(before) = step
+            .before
+            .as_ref()
+            .filter(|before| before.node.sequence < now.node.sequence)
+        else {
+            return false;
+        };
+        let Some((pose, place)) = now
+            .pose
+            .as_ref()
+            .zip(now.node.place.as_ref())
+            .filter(|_| !now.node.acts)
+        else {
+            return false;
+        };
+        let Some(allowed) = place.deviation.filter(|_| pose.map == place.map) else {
+            return false;
+        };
+        let limit = allowed.max(self.usual) + SLACK;
+        let distance = place.distance(pose.x, pose.y);
+        if distance <= limit {
+            return true;
+        }
+        let Some(margin) = margin(now, before, |view| view.velocity.speed()) else {
+            return false;
+        };
+        if distance <= limit + margin {
+            return false;
+        }
+        findings.push(softly(
+            now.seq,
+            format!(
+                "the node is reported traversed {distance:.2} m away from it; {:.2} m are allowed",
+                allowed.max(self.usual)
+            ),
+        ));
+        true
+    }
+}

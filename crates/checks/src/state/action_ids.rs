@@ -1,0 +1,120 @@
+//! `state/action-ids`: the vehicle names its actions as they were sent.
+//!
+//! Which actions are listed is left to `state_actions` and to the tests.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use crate::traffic::{Traffic, actions, broken, elements, quote, state, text, to_vehicle};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// How many actionIds are kept in mind, and how many of one message are looked at.
+const IDS: usize = 8192;
+/// A shorter beginning may be a name of its own.
+const BEGINNING: usize = 8;
+
+/// See the module.
+pub(crate) const ACTION_IDS: Check = Check {
+    name: "state/action-ids",
+    decides: &["STATE-MSG-14"],
+    doc: "actionStates list no actionId that was never sent and is the beginning, of at least eight characters, of one that \
+          was: it was cut off. Judged only as long as all actionIds of the run are kept in mind; what was listed before \
+          anything was sent is of an earlier run.",
+    arguments: &[],
+    start: |_| Box::new(ActionIds::default()),
+};
+
+#[derive(Default)]
+struct ActionIds {
+    traffic: Traffic,
+    sent: BTreeSet<String>,
+    /// What a vehicle listed before any of this was sent may be of an earlier run.
+    old: BTreeSet<String>,
+    unknown: bool,
+    told: bool,
+}
+
+impl ActionIds {
+    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        let read = |action: &Value| text(action, "actionId").chars().take(1024).collect::<String>();
+        if let Some(order) = to_vehicle("order", entry, context) {
+            let all = elements(order, "nodes").chain(elements(order, "edges"));
+            let ids = all.flat_map(|element| elements(element, "actions")).map(read);
+            self.sent.extend(ids.take(IDS));
+        }
+        if let Some(message) = to_vehicle("instantActions", entry, context) {
+            self.sent.extend(actions(message).map(read).take(IDS));
+        }
+        self.unknown |= self.sent.len() > IDS;
+    }
+
+    /// The actionId that was sent and of which this one is only the beginning.
+    fn whole(&self, id: &str) -> Option<&String> {
+        let from = self.sent.range(id.to_owned()..);
+        from.take(1).find(|sent| sent.starts_with(id) && sent.as_str() != id)
+    }
+}
+
+impl Running for ActionIds {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.learn(entry, context);
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        let ids = elements(state, "actionStates").take(IDS);
+        let ids: Vec<&str> = ids.map(|action| text(action, "actionId")).collect();
+        if self.sent.is_empty() {
+            self.old = ids.into_iter().map(str::to_owned).collect();
+            return false;
+        }
+        let mut judged = false;
+        for id in ids.into_iter().filter(|id| id.len() >= BEGINNING && id.len() < 1024) {
+            if self.unknown || self.old.contains(id) {
+                continue;
+            }
+            judged = true;
+            let Some(whole) = self
+                .whole(id)
+                .filter(|_| !self.sent.contains(id))
+                .filter(|_| !self.told)
+            else {
+                continue;
+            };
+            let text = format!("actionStates lists {}, and {} was sent", quote(id), quote(whole));
+            findings.push(broken("STATE-MSG-14", entry.seq(), text));
+            self.told = true;
+        }
+        judged
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use crate::trace::Trace;
+
+    fn listed(id: &str) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({}));
+        trace.instant("stateRequest", "12345678-abcdef", &json!([]));
+        trace.state(&json!({ "actionStates": [{ "actionId": id, "actionStatus": "FINISHED" }] }));
+        trace.state(&json!({ "actionStates": [{ "actionId": id, "actionStatus": "FINISHED" }] }));
+        trace.judge("state/action-ids").summary()
+    }
+
+    #[test]
+    fn ids_as_they_were_sent_and_ids_of_others_are_right() {
+        assert!(listed("12345678-abcdef").is_empty());
+        assert!(listed("12345679").is_empty());
+        assert!(listed("123").is_empty());
+    }
+
+    #[test]
+    fn an_id_that_is_cut_off_is_found_once() {
+        assert_eq!(listed("12345678-abc"), ["STATE-MSG-14"]);
+    }
+}

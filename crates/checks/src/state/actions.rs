@@ -1,0 +1,389 @@
+//! `state/action-transitions`, `state/action-states-kept`: the life of every action in `actionStates`.
+//!
+//! When an action has to start or end is left to the tests.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+
+use serde_json::Value;
+
+use crate::continuity::Continuity;
+use crate::orders::number;
+use crate::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_pack::Pack;
+
+/// How many actions are kept in mind; a state that lists more is judged on the first ones.
+const ACTIONS: usize = 4096;
+
+/// `state/action-transitions`.
+pub(crate) const TRANSITIONS: Check = Check {
+    name: "state/action-transitions",
+    decides: &["ASTATE-05", "ASTATE-06", "STATE-MSG-09"],
+    doc: "actionStatus moves only along the legal graph, where statuses may be skipped because states coalesce; \
+          FINISHED and FAILED are never left; no actionId is listed twice.",
+    arguments: &[],
+    start: |context| {
+        Box::new(Transitions {
+            graph: Graph::of(context.pack),
+            ..Transitions::default()
+        })
+    },
+};
+
+/// `state/action-states-kept`.
+pub(crate) const KEPT: Check = Check {
+    name: "state/action-states-kept",
+    decides: &["STATE-MSG-10", "ORD-CANCEL-12", "STATE-MSG-09"],
+    doc: "Action states stay listed until a new order is accepted, also after a cancellation. Where the factsheet \
+          limits the array and it was full, leaving out finished ones is a warning.",
+    arguments: &[],
+    start: |context| {
+        Box::new(Kept {
+            graph: Graph::of(context.pack),
+            ..Kept::default()
+        })
+    },
+};
+
+/// The statuses of the protocol version, and which may be seen after which.
+#[derive(Default)]
+struct Graph(BTreeMap<String, BTreeSet<String>>);
+
+impl Graph {
+    /// Every status that some path of transitions leads to: those in between may have been missed.
+    ///
+    /// The transitions that only other clauses imply count as well. On states that coalesce they cannot be
+    /// told from legal ones anyway.
+    fn of(pack: &Pack) -> Self {
+        let mut graph: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        for kind in ["legal", "implied"] {
+            let edges = pack.vocabulary().pointer(&format!("/transition/{kind}"));
+            for (from, to) in edges.and_then(Value::as_object).into_iter().flatten() {
+                let to = to.as_array().into_iter().flatten().filter_map(Value::as_str);
+                graph.entry(from.clone()).or_default().extend(to.map(str::to_owned));
+            }
+        }
+        for _ in 0..graph.len() {
+            let known = graph.clone();
+            for reached in graph.values_mut() {
+                let further = reached.iter().filter_map(|status| known.get(status)).flatten();
+                let further: Vec<String> = further.cloned().collect();
+                reached.extend(further);
+            }
+        }
+        Self(graph)
+    }
+
+    fn reachable(&self, from: &str, to: &str) -> bool {
+        from == to || self.0.get(from).is_none_or(|reached| reached.contains(to))
+    }
+
+    /// Whether nothing leads out of this status.
+    fn terminal(&self, status: &str) -> bool {
+        self.0.get(status).is_some_and(BTreeSet::is_empty)
+    }
+
+    /// Id and status of every action state; statuses that do not exist are another check's business.
+    fn statuses<'v>(&self, state: &'v Value) -> impl Iterator<Item = (&'v str, &'v str)> {
+        elements(state, "actionStates")
+            .take(ACTIONS)
+            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
+            .filter(|(id, status)| !id.is_empty() && id.len() <= 512 && self.0.contains_key(*status))
+    }
+}
+
+#[derive(Default)]
+struct Transitions {
+    graph: Graph,
+    traffic: Traffic,
+    last: HashMap<String, String>,
+}
+
+impl Running for Transitions {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if outside_influence(entry) {
+            self.last.clear();
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        let seq = entry.seq();
+        let mut now = HashMap::new();
+        for (id, status) in self.graph.statuses(state) {
+            if now.insert(id.to_owned(), status.to_owned()).is_some() {
+                let text = format!("actionStates lists {} more than once", quote(id));
+                findings.push(broken("STATE-MSG-09", seq, text));
+                continue;
+            }
+            let Some(before) = self.last.get(id) else { continue };
+            if !self.graph.reachable(before, status) {
+                let requirement = if self.graph.terminal(before) {
+                    "ASTATE-06"
+                } else {
+                    "ASTATE-05"
+                };
+                let text = format!("action {} goes from {before} to {status}", quote(id));
+                findings.push(broken(requirement, seq, text));
+            }
+        }
+        // What is not listed any more is forgotten, which also bounds what is remembered.
+        let judged = !now.is_empty();
+        self.last = now;
+        judged
+    }
+}
+
+#[derive(Default)]
+struct Kept {
+    graph: Graph,
+    traffic: Traffic,
+    life: Continuity,
+    order: Option<(String, u64)>,
+    listed: HashMap<String, String>,
+    /// actionIds of cancelOrder actions seen on their way to the vehicle.
+    cancels: Vec<String>,
+    /// actionIds of all instant actions: they are none of a cancelled order's.
+    instant: VecDeque<String>,
+    /// The limit of the factsheet; zero is none.
+    limit: usize,
+}
+
+impl Running for Kept {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        // A restarted vehicle may have forgotten everything; what it keeps over a restart is not ruled.
+        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+            self.listed.clear();
+        }
+        if let Some(message) = to_vehicle("instantActions", entry, context) {
+            let all = actions(message).map(|action| text(action, "actionId").to_owned());
+            self.instant.extend(all.take(ACTIONS));
+            let excess = self.instant.len().saturating_sub(ACTIONS);
+            self.instant.drain(..excess);
+            let cancels = actions(message).filter(|action| text(action, "actionType") == "cancelOrder");
+            self.cancels
+                .extend(cancels.map(|action| text(action, "actionId").to_owned()));
+            let excess = self.cancels.len().saturating_sub(64);
+            self.cancels.drain(..excess);
+        }
+        if let Some(limit) = self.factsheet_limit(entry, context) {
+            self.limit = limit;
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        if !state.get("actionStates").is_some_and(Value::is_array) {
+            return false;
+        }
+        let order = (
+            text(state, "orderId").to_owned(),
+            number(state, "orderUpdateId").unwrap_or_default(),
+        );
+        let now: HashMap<String, String> = self
+            .graph
+            .statuses(state)
+            .map(|(id, status)| (id.to_owned(), status.to_owned()))
+            .collect();
+        let complete = elements(state, "actionStates").count() == now.len();
+        let before = self.order.replace(order.clone());
+        let listed = std::mem::take(&mut self.listed);
+        let same_order = before
+            .as_ref()
+            .is_some_and(|before| before.0 == order.0 && before.1 <= order.1);
+        let updated = before.as_ref().is_some_and(|before| before.1 != order.1);
+        if same_order && complete {
+            let cancelled = listed.keys().chain(now.keys()).any(|id| self.cancels.contains(id));
+            for (id, status) in listed.iter().filter(|(id, _)| !now.contains_key(*id)) {
+                self.judge(id, status, (cancelled, updated, listed.len()), entry, findings);
+            }
+        }
+        self.listed = now;
+        same_order
+    }
+}
+
+impl Kept {
+    fn judge(
+        &self,
+        id: &str,
+        status: &str,
+        (cancelled, updated, count): (bool, bool, usize),
+        entry: &Entry,
+        findings: &mut Vec<CheckFinding>,
+    ) {
+        let seq = entry.seq();
+        let text = format!(
+            "action {} was {status} and is gone, although no new order was accepted",
+            quote(id)
+        );
+        if !self.graph.terminal(status) && updated {
+            // An update may delete a horizon and its actions with it.
+            return;
+        }
+        if self.limit > 0 && count >= self.limit {
+            let text = format!("{text}; the factsheet allows {} of them", self.limit);
+            findings.push(remark("STATE-MSG-10", seq, text));
+            return;
+        }
+        if cancelled && !self.instant.iter().any(|instant| instant == id) {
+            findings.push(broken("ORD-CANCEL-12", seq, text.clone()));
+        }
+        if !self.graph.terminal(status) {
+            findings.push(broken("STATE-MSG-09", seq, text.clone()));
+        }
+        findings.push(broken("STATE-MSG-10", seq, text));
+    }
+
+    fn factsheet_limit(&self, entry: &Entry, context: &CheckContext<'_>) -> Option<usize> {
+        let message = self.traffic.delivered(entry, context)?;
+        let value = (message.name == "factsheet").then(|| entry.json()).flatten()?;
+        let limits = value.pointer("/protocolLimits/maxArrayLens")?;
+        let limit = number(limits, "state.actionStates").unwrap_or_default();
+        usize::try_from(limit).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use crate::trace::Trace;
+
+    fn actions(all: &[(&str, &str)]) -> Value {
+        let states: Vec<Value> = all
+            .iter()
+            .map(|(id, status)| json!({ "actionId": id, "actionStatus": status }))
+            .collect();
+        json!({ "orderId": "o", "actionStates": states })
+    }
+
+    fn walk(statuses: &[&str]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        for status in statuses {
+            trace.state(&actions(&[("a", status)]));
+        }
+        trace.judge("state/action-transitions").summary()
+    }
+
+    #[test]
+    fn legal_walks_with_and_without_missed_statuses_are_right() {
+        assert!(
+            walk(&[
+                "WAITING",
+                "INITIALIZING",
+                "RUNNING",
+                "PAUSED",
+                "RUNNING",
+                "FINISHED",
+                "FINISHED"
+            ])
+            .is_empty()
+        );
+        assert!(walk(&["WAITING", "FINISHED"]).is_empty());
+        assert!(walk(&["PAUSED", "FAILED"]).is_empty());
+        assert!(walk(&["FAILED"]).is_empty());
+    }
+
+    #[test]
+    fn going_back_and_leaving_the_end_are_found() {
+        assert_eq!(walk(&["RUNNING", "WAITING"]), ["ASTATE-05"]);
+        assert_eq!(walk(&["FINISHED", "FAILED"]), ["ASTATE-06"]);
+        assert_eq!(walk(&["FAILED", "RUNNING", "FINISHED"]), ["ASTATE-06"]);
+    }
+
+    #[test]
+    fn an_action_listed_twice_is_found() {
+        let mut trace = Trace::subscriber();
+        trace.state(&actions(&[("a", "RUNNING"), ("a", "RUNNING")]));
+        assert_eq!(trace.judge("state/action-transitions").summary(), ["STATE-MSG-09"]);
+    }
+
+    #[test]
+    fn an_id_that_returns_after_a_new_order_is_a_new_action() {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&actions(&[("a", "FINISHED")]))
+            .state(&actions(&[]))
+            .state(&actions(&[("a", "WAITING")]));
+        assert!(trace.judge("state/action-transitions").findings.is_empty());
+    }
+
+    #[test]
+    fn action_states_may_go_with_a_new_order_a_restart_or_a_shorter_horizon() {
+        let mut trace = Trace::tap();
+        trace.state(&actions(&[("a", "FINISHED")]));
+        trace.state(&json!({ "orderId": "p" }));
+        trace
+            .state(&actions(&[("b", "FINISHED")]))
+            .connected(2)
+            .state(&actions(&[]));
+        trace.state(&actions(&[("c", "WAITING")]));
+        trace.state(&json!({ "orderId": "o", "orderUpdateId": 1 }));
+        assert!(trace.judge("state/action-states-kept").findings.is_empty());
+    }
+
+    #[test]
+    fn without_the_tap_a_new_online_counts_as_a_possible_restart() {
+        let mut trace = Trace::subscriber();
+        trace.state(&actions(&[("a", "FINISHED")]));
+        trace.connection("ONLINE").state(&actions(&[]));
+        assert!(trace.judge("state/action-states-kept").findings.is_empty());
+    }
+
+    #[test]
+    fn action_states_that_vanish_are_found() {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&actions(&[("a", "FINISHED"), ("b", "RUNNING")]))
+            .state(&actions(&[("b", "RUNNING")]))
+            .state(&actions(&[]));
+        assert_eq!(
+            trace.judge("state/action-states-kept").summary(),
+            ["STATE-MSG-10", "STATE-MSG-09", "STATE-MSG-10"]
+        );
+    }
+
+    #[test]
+    fn action_states_that_vanish_with_a_cancellation_are_found() {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&actions(&[("a", "RUNNING")]))
+            .instant("cancelOrder", "x", &json!([]))
+            .state(&actions(&[("a", "FAILED"), ("x", "FINISHED")]))
+            .state(&actions(&[("x", "FINISHED")]));
+        assert_eq!(
+            trace.judge("state/action-states-kept").summary(),
+            ["ORD-CANCEL-12", "STATE-MSG-10"]
+        );
+    }
+
+    #[test]
+    fn an_instant_action_that_vanishes_is_none_of_the_cancelled_order() {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&actions(&[("a", "RUNNING")]))
+            .instant("stopPause", "p", &json!([]))
+            .instant("cancelOrder", "x", &json!([]))
+            .state(&actions(&[("a", "FAILED"), ("p", "FINISHED"), ("x", "FINISHED")]))
+            .state(&actions(&[("a", "FAILED"), ("x", "FINISHED")]));
+        assert_eq!(trace.judge("state/action-states-kept").summary(), ["STATE-MSG-10"]);
+    }
+
+    #[test]
+    fn a_full_array_makes_it_a_remark() {
+        let mut trace = Trace::subscriber();
+        trace.message(
+            "factsheet",
+            &json!({ "protocolLimits": { "maxArrayLens": { "state.actionStates": 1 } } }),
+        );
+        trace
+            .state(&actions(&[("a", "FINISHED")]))
+            .state(&actions(&[("b", "RUNNING")]));
+        assert_eq!(
+            trace.judge("state/action-states-kept").summary(),
+            ["STATE-MSG-10 warning"]
+        );
+    }
+}

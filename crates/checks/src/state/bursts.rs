@@ -1,0 +1,135 @@
+//! `state/bursts`: states that say the same, one right after the other.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::traffic::{HEADER, Traffic, broken, is_to_vehicle, lag, outside_influence, state, text};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// See the module.
+pub(crate) const BURSTS: Check = Check {
+    name: "state/bursts",
+    decides: &["STATE-11"],
+    doc: "No more than four states within a quarter of a second say the same but for header, position, velocity and \
+          battery. Messages to the vehicle, hooks and a disturbed link begin the count anew, and states that only \
+          arrived together by their timestamps do not count.",
+    arguments: &[],
+    start: |_| Box::new(Bursts::default()),
+};
+
+/// This many equal states are a burst …
+const BURST: usize = 5;
+/// … if they come within this time.
+const WITHIN: Duration = Duration::from_millis(250);
+/// What changes without being an event.
+const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
+
+#[derive(Default)]
+struct Bursts {
+    traffic: Traffic,
+    last: Option<Value>,
+    /// Arrival and timestamp of the states equal to the last one.
+    equal: VecDeque<(Moment, Option<jiff::Timestamp>)>,
+}
+
+/// A state without what changes all the time.
+fn essence(state: &Value) -> Value {
+    let mut rest = state.clone();
+    if let Some(members) = rest.as_object_mut() {
+        members.retain(|name, _| !HEADER.contains(&name.as_str()) && !SILENT.contains(&name.as_str()));
+    }
+    rest
+}
+
+impl Running for Bursts {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let asked = ["order", "instantActions"]
+            .iter()
+            .any(|name| is_to_vehicle(name, entry, context));
+        if asked || outside_influence(entry) || lag(entry).is_some() || self.traffic.disturbed {
+            self.equal.clear();
+        }
+        let Some(state) = state(self.traffic, entry, context).filter(|_| !self.traffic.disturbed) else {
+            return false;
+        };
+        let now = essence(state);
+        if self.last.as_ref() != Some(&now) {
+            self.equal.clear();
+            self.last = Some(now);
+        }
+        let stamped: Option<jiff::Timestamp> = text(state, "timestamp").parse().ok();
+        self.equal.push_back((entry.at().moment, stamped));
+        if self.equal.len() < BURST {
+            return true;
+        }
+        let first = self.equal.pop_front();
+        let Some((arrived, then)) = first else { return true };
+        let sent = stamped
+            .zip(then)
+            .and_then(|(now, then)| Duration::try_from(now.duration_since(then)).ok());
+        let span = entry.at().moment.since(arrived).max(sent.unwrap_or_default());
+        if span <= WITHIN {
+            let text = format!("{BURST} states within {:.3} s say the same", span.as_secs_f64());
+            findings.push(broken("STATE-11", entry.seq(), text));
+            self.equal.clear();
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use crate::trace::Trace;
+
+    fn states(gap: f64, changing: bool) -> Trace {
+        let mut trace = Trace::subscriber();
+        for number in 0..8 {
+            let speed = f64::from(number);
+            let order = if changing { format!("o{number}") } else { "o".to_owned() };
+            trace
+                .wait(gap)
+                .state(&json!({ "orderId": order, "velocity": { "vx": speed } }));
+        }
+        trace
+    }
+
+    #[test]
+    fn equal_states_in_a_burst_are_found() {
+        assert_eq!(states(0.01, false).judge("state/bursts").summary(), ["STATE-11"]);
+    }
+
+    #[test]
+    fn states_that_say_something_or_take_their_time_are_right() {
+        assert!(states(0.01, true).judge("state/bursts").summary().is_empty());
+        assert!(states(0.1, false).judge("state/bursts").summary().is_empty());
+    }
+
+    #[test]
+    fn what_waited_for_the_harness_is_no_burst() {
+        let mut trace = Trace::subscriber();
+        for _ in 0..3 {
+            trace.late(0.3);
+            for _ in 0..4 {
+                trace.state(&json!({}));
+            }
+        }
+        assert!(trace.judge("state/bursts").summary().is_empty());
+    }
+
+    #[test]
+    fn what_is_asked_for_is_no_burst() {
+        let mut trace = Trace::subscriber();
+        for number in 0..8 {
+            trace.instant("stateRequest", &format!("r{number}"), &json!([]));
+            trace.state(&json!({}));
+        }
+        assert!(trace.judge("state/bursts").summary().is_empty());
+    }
+}

@@ -1,0 +1,422 @@
+//! `state/driving`, `state/position-moves`: what a state says of movement, against how the vehicle moves.
+//!
+//! Which way it has to move is left to `motion`.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::orders::{last_node, sets_position};
+use crate::traffic::{Traffic, actions, broken, elements, outside_influence, quote, show, state, text, to_vehicle};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::{Event, Packet};
+
+/// Faster than this in a state without `driving` is no measuring noise, in metres and radians per second.
+const MOVING: f64 = 0.2;
+/// More than this from one state to the next is no measuring noise, in metres and radians.
+const MOVED: f64 = 0.1;
+/// Less than this is standing still.
+const STILL: f64 = 0.01;
+/// States further apart may leave out a stop, or a drive, between them.
+const CLOSE: Duration = Duration::from_secs(2);
+/// States closer together than this may be of one cycle of the vehicle, and prove as little as one alone.
+const ONE_CYCLE: Duration = Duration::from_millis(200);
+/// Faster than this no vehicle drives, in metres per second: it has found out that it is elsewhere.
+const JUMP: f64 = 20.0;
+/// So long a vehicle may say that it drives while it stands and has nowhere to go.
+const COMING_TO_REST: Duration = Duration::from_secs(10);
+/// Nodes that lie less far apart say nothing of a position, in metres.
+const APART: f64 = 1.0;
+/// How many positions of nodes are kept in mind.
+const NODES: usize = 1024;
+
+/// `state/driving`.
+pub(crate) const DRIVING: Check = Check {
+    name: "state/driving",
+    decides: &["STATE-MSG-08"],
+    doc: "A state that reports a velocity well above zero reports driving true; judged only when two states in a row \
+          say the same, since velocity and flag may be taken at slightly different times. Whose position or direction \
+          changes from state to state, three close states in a row, drives as well; whose does not for ten seconds, with \
+          nothing released ahead and nothing under way, does not.",
+    arguments: &[],
+    start: |_| Box::new(Driving::default()),
+};
+
+/// `state/position-moves`.
+pub(crate) const POSITION_MOVES: Check = Check {
+    name: "state/position-moves",
+    decides: &["MAP-01"],
+    doc: "The position of a vehicle that has come from one node to another, more than a metre away by the positions in \
+          its orders, is another one. Judged when it did not change twice in a row, and not for nodes that count as \
+          reached from more than a metre away.",
+    arguments: &[],
+    start: |_| Box::new(PositionMoves::default()),
+};
+
+/// Where a vehicle says it is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Pose {
+    pub map: String,
+    pub x: f64,
+    pub y: f64,
+    pub theta: f64,
+}
+
+impl Pose {
+    /// The pose of a state or a visualization, where the vehicle knows it.
+    pub(crate) fn of(message: &Value) -> Option<Self> {
+        let position = message.get("agvPosition")?;
+        if position.get("positionInitialized").and_then(Value::as_bool) == Some(false) {
+            return None;
+        }
+        let number = |name| position.get(name).and_then(Value::as_f64);
+        Some(Self {
+            map: text(position, "mapId").chars().take(512).collect(),
+            x: number("x")?,
+            y: number("y")?,
+            theta: number("theta")?,
+        })
+    }
+
+    /// How far apart two are: in metres, and in radians.
+    pub(crate) fn apart(&self, other: &Self) -> (f64, f64) {
+        let turned = (self.theta - other.theta).rem_euclid(std::f64::consts::TAU);
+        let turned = turned.min(std::f64::consts::TAU - turned);
+        ((self.x - other.x).hypot(self.y - other.y), turned)
+    }
+
+    fn moved(&self, other: &Self) -> bool {
+        let (far, turned) = self.apart(other);
+        self.map == other.map && (far > MOVED || turned > MOVED)
+    }
+
+    pub(crate) fn stays(&self, other: &Self) -> bool {
+        let (far, turned) = self.apart(other);
+        self.map == other.map && far < STILL && turned < STILL
+    }
+}
+
+/// Whether something else than driving may have changed the position: a person, a hook, another localization.
+pub(crate) fn is_displaced(entry: &Entry, context: &CheckContext<'_>) -> bool {
+    let told = to_vehicle("instantActions", entry, context)
+        .is_some_and(|message| actions(message).any(|action| sets_position(text(action, "actionType"))));
+    let placed = to_vehicle("order", entry, context).is_some_and(|order| {
+        let nodes = elements(order, "nodes").flat_map(|node| elements(node, "actions"));
+        nodes
+            .take(NODES)
+            .any(|action| sets_position(text(action, "actionType")))
+    });
+    let connects = matches!(
+        entry.event(),
+        Event::Packet {
+            packet: Packet::Connect { .. },
+            ..
+        }
+    );
+    told || placed || connects || outside_influence(entry)
+}
+
+/// Whether the vehicle is in command of itself and nothing holds it.
+fn is_free(state: &Value) -> bool {
+    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
+    matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
+        && state.get("paused") != Some(&Value::Bool(true))
+        && safety("eStop").is_none_or(|stop| stop.as_str() == Some("NONE"))
+        && safety("fieldViolation") != Some(&Value::Bool(true))
+}
+
+/// Whether nothing is left for it to drive to, and no action may move it.
+fn has_nowhere_to_go(state: &Value) -> bool {
+    let released = |element: &Value| element.get("released") != Some(&Value::Bool(false));
+    let over = |action: &Value| matches!(text(action, "actionStatus"), "FINISHED" | "FAILED");
+    !elements(state, "nodeStates").any(released) && elements(state, "actionStates").all(over)
+}
+
+#[derive(Default)]
+struct Driving {
+    traffic: Traffic,
+    /// Since when each state shows a velocity without `driving`.
+    suspicious: Option<Moment>,
+    /// When something else than driving last set the position.
+    displaced: Option<Moment>,
+    /// The last states that said they stand: time and pose, and how often it moved from one to the next.
+    standing: Option<(Moment, Pose)>,
+    moves: u32,
+    /// Since when it says that it drives, stands, and has nowhere to go; and how many states say so.
+    resting: Option<(Moment, Pose, u32)>,
+}
+
+impl Driving {
+    fn by_position(&mut self, state: &Value, entry: &Entry, findings: &mut Vec<CheckFinding>) {
+        let now = entry.at().moment;
+        let driving = state.get("driving").and_then(Value::as_bool);
+        let Some(pose) = Pose::of(state).filter(|_| is_free(state) && driving.is_some()) else {
+            self.forget();
+            return;
+        };
+        if driving == Some(true) {
+            self.standing = None;
+            self.moves = 0;
+            self.at_rest(pose, state, entry, findings);
+            return;
+        }
+        self.resting = None;
+        let before = self.standing.replace((now, pose.clone()));
+        let moved = before.is_some_and(|(at, before)| {
+            let apart = now.since(at);
+            let jumped = before.apart(&pose).0 > JUMP * apart.as_secs_f64().max(ONE_CYCLE.as_secs_f64());
+            apart <= CLOSE && !jumped && before.moved(&pose)
+        });
+        self.moves = if moved { self.moves + 1 } else { 0 };
+        if self.moves >= 2 {
+            self.moves = 0;
+            let text = "driving is false, while the position changes from state to state";
+            findings.push(broken("STATE-MSG-08", entry.seq(), text));
+        }
+    }
+
+    fn at_rest(&mut self, pose: Pose, state: &Value, entry: &Entry, findings: &mut Vec<CheckFinding>) {
+        let now = entry.at().moment;
+        let nowhere = has_nowhere_to_go(state);
+        match &mut self.resting {
+            Some((since, at, count)) if nowhere && at.stays(&pose) => {
+                *count += 1;
+                if now.since(*since) > COMING_TO_REST && *count > 2 {
+                    let text = "driving is true, while the vehicle stands and has nowhere to go";
+                    findings.push(broken("STATE-MSG-08", entry.seq(), text));
+                    self.resting = None;
+                }
+            }
+            resting => *resting = nowhere.then_some((now, pose, 1)),
+        }
+    }
+
+    fn forget(&mut self) {
+        self.standing = None;
+        self.moves = 0;
+        self.resting = None;
+    }
+}
+
+impl Running for Driving {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let now = entry.at().moment;
+        if is_displaced(entry, context) {
+            self.forget();
+            self.displaced = Some(now);
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        // A vehicle may be slow to take a new place over.
+        let patience = context.time("react").unwrap_or(COMING_TO_REST);
+        if self.displaced.is_some_and(|since| now.since(since) < patience) {
+            self.forget();
+            return false;
+        }
+        self.by_position(state, entry, findings);
+        let Some(velocity) = state.get("velocity") else {
+            return Pose::of(state).is_some();
+        };
+        let speed = |name| velocity.get(name).and_then(Value::as_f64).unwrap_or_default().abs();
+        let moving = ["vx", "vy", "omega"].into_iter().any(|name| speed(name) > MOVING);
+        let suspicious = moving && state.get("driving") == Some(&Value::Bool(false));
+        match self.suspicious {
+            Some(since) if suspicious && now.since(since) >= ONE_CYCLE => {
+                let text = format!("driving is false at velocity {}", show(velocity));
+                findings.push(broken("STATE-MSG-08", entry.seq(), text));
+            }
+            Some(_) if suspicious => {}
+            _ => self.suspicious = suspicious.then_some(now),
+        }
+        true
+    }
+}
+
+#[derive(Default)]
+struct PositionMoves {
+    traffic: Traffic,
+    /// Where orders say their nodes are: map, x and y.
+    nodes: BTreeMap<String, (String, f64, f64)>,
+    /// The last node, and the pose when it was reached, if that was seen.
+    before: Option<(String, Option<Pose>)>,
+    /// When something else than driving last set the position.
+    displaced: Option<Moment>,
+    stuck: u32,
+}
+
+impl PositionMoves {
+    fn learn(&mut self, order: &Value) {
+        for node in elements(order, "nodes").take(NODES) {
+            let Some(position) = node.get("nodePosition") else {
+                continue;
+            };
+            let number = |name| position.get(name).and_then(Value::as_f64);
+            let (Some(x), Some(y)) = (number("x"), number("y")) else {
+                continue;
+            };
+            // Who is counted as on a node from afar need not come to it.
+            if number("allowedDeviationXY").is_some_and(|range| range > APART) {
+                self.nodes.remove(text(node, "nodeId"));
+            } else if self.nodes.len() < NODES {
+                let place = (text(position, "mapId").chars().take(512).collect(), x, y);
+                self.nodes
+                    .insert(text(node, "nodeId").chars().take(512).collect(), place);
+            }
+        }
+    }
+}
+
+impl Running for PositionMoves {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if is_displaced(entry, context) {
+            self.before = None;
+            self.stuck = 0;
+            self.displaced = Some(entry.at().moment);
+        }
+        if let Some(order) = to_vehicle("order", entry, context) {
+            self.learn(order);
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        let (Some(pose), Some((node, _))) = (Pose::of(state), last_node(state)) else {
+            self.before = None;
+            return false;
+        };
+        // A vehicle may be slow to take a new place over.
+        let patience = context.time("react").unwrap_or(COMING_TO_REST);
+        if self
+            .displaced
+            .is_some_and(|since| entry.at().moment.since(since) < patience)
+        {
+            self.before = None;
+            return false;
+        }
+        // Under way it is not any more where it reached its last node.
+        let rests = state.get("driving").and_then(Value::as_bool) == Some(false)
+            && elements(state, "nodeStates").next().is_none();
+        if let Some((_, was)) = self.before.as_mut().filter(|(last, _)| *last == node) {
+            if rests {
+                was.get_or_insert(pose);
+            }
+            return false;
+        }
+        let reached = (self.before.is_some() || rests).then(|| pose.clone());
+        let Some((last, Some(was))) = self.before.replace((node.clone(), reached)) else {
+            return false;
+        };
+        let (Some(from), Some(to)) = (self.nodes.get(&last), self.nodes.get(&node)) else {
+            return false;
+        };
+        if from.0 != to.0 || pose.map != was.map || (from.1 - to.1).hypot(from.2 - to.2) < APART {
+            return false;
+        }
+        self.stuck = if was.apart(&pose).0 < STILL { self.stuck + 1 } else { 0 };
+        if self.stuck == 2 {
+            let text = format!(
+                "the vehicle has come from {} to {}, and its position has not changed",
+                quote(&last),
+                quote(&node)
+            );
+            findings.push(broken("MAP-01", entry.seq(), text));
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use crate::trace::Trace;
+
+    fn at(x: f64, theta: f64, driving: bool) -> Value {
+        json!({ "driving": driving, "agvPosition": { "x": x, "y": 0.0, "theta": theta, "mapId": "m", "positionInitialized": true } })
+    }
+
+    fn driving(states: &[Value], every: f64) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        for state in states {
+            trace.wait(every).state(state);
+        }
+        let outcome = trace.judge("state/driving");
+        assert!(outcome.judged > 0);
+        outcome.summary()
+    }
+
+    #[test]
+    fn moving_without_driving_is_found_when_it_lasts() {
+        let moving = json!({ "velocity": { "vx": 0.8, "vy": 0.0, "omega": 0.0 } });
+        let drives = json!({ "driving": true, "velocity": { "vx": 0.8, "vy": 0.0, "omega": 0.0 } });
+        let creeping = json!({ "velocity": { "vx": 0.01, "vy": 0.0, "omega": 0.0 } });
+        assert!(driving(&[moving.clone(), drives, moving.clone(), creeping], 1.0).is_empty());
+        assert_eq!(driving(&[moving.clone(), moving], 1.0), ["STATE-MSG-08"]);
+    }
+
+    #[test]
+    fn turning_without_driving_is_found_when_it_lasts() {
+        let turning = [at(1.0, 0.0, false), at(1.0, 0.5, false), at(1.0, 1.0, false)];
+        assert_eq!(driving(&turning, 0.5), ["STATE-MSG-08"]);
+        assert!(
+            driving(&turning, 5.0).is_empty(),
+            "it may have driven and stopped between them"
+        );
+        assert!(driving(&turning[..2], 0.5).is_empty(), "once may be a matter of timing");
+        assert!(driving(&[at(1.0, 3.1, false), at(1.0, -3.1, false), at(1.0, 3.1, false)], 0.5).is_empty());
+    }
+
+    #[test]
+    fn a_vehicle_that_stands_and_drives_all_the_time_is_found() {
+        let states = vec![at(1.0, 0.0, true); 8];
+        assert_eq!(driving(&states, 2.0), ["STATE-MSG-08"]);
+        assert!(driving(&states[..4], 2.0).is_empty());
+        let mut waits = at(1.0, 0.0, true);
+        waits["nodeStates"] = json!([{ "nodeId": "b", "sequenceId": 2, "released": true }]);
+        assert!(driving(&vec![waits; 8], 2.0).is_empty(), "something may be in its way");
+    }
+
+    fn moves(positions: &[f64]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        let node = |id: &str, x: f64| json!({ "nodeId": id, "nodePosition": { "x": x, "y": 0.0, "mapId": "m" } });
+        let nodes = [node("a", 0.0), node("b", 2.0), node("c", 4.0)];
+        trace.sent("order", &json!({ "orderId": "o", "nodes": nodes }));
+        for (id, x) in ["a", "b", "c"].into_iter().zip(positions) {
+            let mut state = at(*x, 0.0, id != "a");
+            state["lastNodeId"] = json!(id);
+            state["lastNodeSequenceId"] = json!(0);
+            trace.wait(3.0).state(&state);
+        }
+        trace.judge("state/position-moves").summary()
+    }
+
+    #[test]
+    fn a_position_that_never_moves_is_found() {
+        assert!(moves(&[0.0, 2.0, 4.0]).is_empty());
+        assert!(moves(&[0.0, 0.0, 4.0]).is_empty());
+        assert_eq!(moves(&[0.0, 0.0, 0.0]), ["MAP-01"]);
+    }
+
+    #[test]
+    fn where_a_node_was_reached_is_not_known_of_a_vehicle_that_is_under_way_already() {
+        let mut trace = Trace::subscriber();
+        let node = |id: &str, x: f64| json!({ "nodeId": id, "nodePosition": { "x": x, "y": 0.0, "mapId": "m" } });
+        let nodes = [node("a", 0.0), node("b", 2.0)];
+        trace.sent("order", &json!({ "orderId": "o", "nodes": nodes }));
+        for _ in 0..3 {
+            trace.hook().wait(40.0);
+            for (id, ahead) in [("a", json!([{ "nodeId": "b", "sequenceId": 2 }])), ("b", json!([]))] {
+                let mut state = at(2.0, 0.0, false);
+                state["lastNodeId"] = json!(id);
+                state["nodeStates"] = ahead;
+                trace.wait(1.0).state(&state);
+            }
+        }
+        assert!(trace.judge("state/position-moves").summary().is_empty());
+    }
+}

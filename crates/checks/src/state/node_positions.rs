@@ -1,0 +1,245 @@
+//! `state/node-positions`, `state/joint-position`: where a state says that the nodes ahead are, against the orders.
+
+use std::collections::{BTreeSet, VecDeque};
+
+use serde_json::Value;
+
+use super::route::Shown;
+use crate::orders::number;
+use crate::traffic::{broken, elements, quote, remark, text, to_vehicle};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// How many order messages, and nodes of one, are kept in mind.
+const MESSAGES: usize = 64;
+const NODES: usize = 1024;
+/// A node may be known so much better than its order says, in metres.
+const BESIDE: f64 = 0.1;
+
+/// `state/node-positions`.
+pub(crate) const NODE_POSITIONS: Check = Check {
+    name: "state/node-positions",
+    decides: &["ORD-FLOW-06"],
+    doc: "Where nodeStates give a nodePosition, x, y and mapId are those of the order, but for ten centimetres. A vehicle that \
+          reports places of its own throughout is not judged, nor a node that was sent twice.",
+    arguments: &[],
+    start: |_| Box::new(NodePositions::default()),
+};
+
+/// `state/joint-position`.
+pub(crate) const JOINT_POSITION: Check = Check {
+    name: "state/joint-position",
+    decides: &["ORD-UPD-07"],
+    doc: "A node that was sent twice, at different places, keeps the place of its first transmission where nodeStates give a \
+          nodePosition: a warning, as to list a place is not to use it. Judged when states have shown the order the first \
+          one came with.",
+    arguments: &[],
+    start: |_| {
+        Box::new(NodePositions {
+            joint: true,
+            ..NodePositions::default()
+        })
+    },
+};
+
+/// nodePosition: mapId, x and y.
+type Place = (String, f64, f64);
+
+struct Plan {
+    order: String,
+    update: u64,
+    /// nodeId, sequenceId and place.
+    nodes: Vec<(String, u64, Place)>,
+}
+
+#[derive(Default)]
+struct NodePositions {
+    /// Whether nodes are judged that were sent twice, or the others.
+    joint: bool,
+    shown: Shown,
+    plans: VecDeque<Plan>,
+    /// orderUpdateIds of the present order that states have shown.
+    adopted: BTreeSet<u64>,
+    of: String,
+    /// Whether a place was ever the one in the order, so that it is where the vehicle takes it from.
+    follows: bool,
+    /// Visits that were told of.
+    told: BTreeSet<(String, u64)>,
+}
+
+fn place(node: &Value) -> Option<Place> {
+    let position = node.get("nodePosition")?;
+    let member = |name: &str| position.get(name).and_then(Value::as_f64);
+    let map = text(position, "mapId").chars().take(512).collect();
+    Some((map, member("x")?, member("y")?))
+}
+
+fn same(one: &Place, other: &Place) -> bool {
+    one.0 == other.0 && (one.1 - other.1).hypot(one.2 - other.2) <= BESIDE
+}
+
+impl NodePositions {
+    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+        let Some(order) = to_vehicle("order", entry, context) else {
+            return;
+        };
+        let Some(update) = number(order, "orderUpdateId") else {
+            return;
+        };
+        let node = |node: &Value| {
+            let id = text(node, "nodeId").chars().take(512).collect();
+            Some((id, number(node, "sequenceId")?, place(node)?))
+        };
+        if self.plans.len() == MESSAGES {
+            self.plans.pop_front();
+        }
+        self.plans.push_back(Plan {
+            order: text(order, "orderId").chars().take(512).collect(),
+            update,
+            nodes: elements(order, "nodes").take(NODES).filter_map(node).collect(),
+        });
+    }
+
+    /// The places that messages of the present order give a visit, and whether each was taken over.
+    fn sent(&self, id: &str, sequence: u64, update: u64) -> Vec<(&Place, bool)> {
+        let plans = self
+            .plans
+            .iter()
+            .filter(|plan| plan.order == self.of && plan.update <= update);
+        let all = plans.flat_map(|plan| {
+            let visit = plan.nodes.iter().filter(|node| node.0 == id && node.1 == sequence);
+            visit.map(|node| (&node.2, self.adopted.contains(&plan.update)))
+        });
+        all.collect()
+    }
+}
+
+impl Running for NodePositions {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.learn(entry, context);
+        let Some(state) = self.shown.state(entry, context) else {
+            return false;
+        };
+        let Some(update) = number(state, "orderUpdateId") else {
+            return false;
+        };
+        let order = text(state, "orderId");
+        if self.of != order {
+            self.of = order.chars().take(512).collect();
+            self.adopted.clear();
+            self.told.clear();
+        }
+        if self.adopted.len() < NODES {
+            self.adopted.insert(update);
+        }
+        let sound = self.shown.orders.of(order).all(|sent| sent.sound);
+        let mut judged = false;
+        for node in elements(state, "nodeStates").take(NODES).filter(|_| sound) {
+            let (Some(shown), Some(sequence)) = (place(node), number(node, "sequenceId")) else {
+                continue;
+            };
+            let id = text(node, "nodeId");
+            let sent = self.sent(id, sequence, update);
+            let Some((first, known)) = sent.first().copied() else {
+                continue;
+            };
+            let follows = same(first, &shown);
+            let trusted = self.follows || follows;
+            let requirement = if self.joint {
+                // One that was refused may have come first.
+                let twice = sent.iter().skip(1).find(|(place, _)| !same(place, first));
+                let Some((later, _)) = twice.filter(|_| known) else {
+                    continue;
+                };
+                judged = true;
+                same(later, &shown).then_some("ORD-UPD-07")
+            } else {
+                judged |= sent.len() == 1;
+                (sent.len() == 1 && !follows && trusted).then_some("ORD-FLOW-06")
+            };
+            let text = format!(
+                "node {} with sequenceId {sequence} is at ({}, {}) in the state and was sent at ({}, {})",
+                quote(id),
+                shown.1,
+                shown.2,
+                first.1,
+                first.2
+            );
+            self.follows = trusted;
+            let Some(requirement) = requirement else { continue };
+            if self.told.len() < NODES && self.told.insert((id.to_owned(), sequence)) {
+                let found = if self.joint { remark } else { broken };
+                findings.push(found(requirement, entry.seq(), text));
+            }
+        }
+        judged
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use crate::trace::Trace;
+
+    fn node(id: &str, sequence: u64, x: f64) -> Value {
+        json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [],
+            "nodePosition": { "x": x, "y": 0.0, "mapId": "hall" } })
+    }
+
+    fn edge(sequence: u64) -> Value {
+        json!({ "edgeId": format!("e{sequence}"), "sequenceId": sequence, "released": true, "actions": [] })
+    }
+
+    /// What is found when b stands at 5 m in an order, at `second` in its update, and is shown at these places.
+    fn shown(second: f64, before: f64, after: f64) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({}));
+        let order = |update: u64, nodes: &Value, edges: &Value| json!({ "orderId": "o", "orderUpdateId": update, "nodes": nodes, "edges": edges });
+        let state = |update: u64, nodes: Value| json!({ "orderId": "o", "orderUpdateId": update, "nodeStates": nodes });
+        trace.sent(
+            "order",
+            &order(0, &json!([node("n1", 0, 0.0), node("b", 2, 5.0)]), &json!([edge(1)])),
+        );
+        trace.state(&state(0, json!([node("b", 2, before)])));
+        trace.sent(
+            "order",
+            &order(1, &json!([node("b", 2, second), node("c", 4, 9.0)]), &json!([edge(3)])),
+        );
+        trace.state(&state(1, json!([node("b", 2, after), node("c", 4, 9.0)])));
+        trace.judge("state/joint-position").summary()
+    }
+
+    #[test]
+    fn the_place_that_was_sent_first_is_right() {
+        assert!(shown(5.0, 5.0, 5.0).is_empty());
+        assert!(shown(6.0, 5.0, 5.02).is_empty());
+    }
+
+    #[test]
+    fn the_place_of_the_update_is_found() {
+        assert_eq!(shown(6.0, 5.0, 6.0), ["ORD-UPD-07 warning"]);
+    }
+
+    #[test]
+    fn another_place_is_found_in_a_vehicle_that_goes_by_orders_otherwise() {
+        let mut trace = Trace::subscriber();
+        let nodes = json!([node("n1", 0, 0.0), node("b", 2, 5.0), node("c", 4, 9.0)]);
+        trace.state(&json!({}));
+        trace.sent(
+            "order",
+            &json!({ "orderId": "o", "orderUpdateId": 0, "nodes": nodes, "edges": [edge(1), edge(3)] }),
+        );
+        let ahead = json!([node("b", 2, 5.0), node("c", 4, 10.0)]);
+        trace.state(&json!({ "orderId": "o", "nodeStates": ahead }));
+        assert_eq!(trace.judge("state/node-positions").summary(), ["ORD-FLOW-06"]);
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({}));
+        trace.sent(
+            "order",
+            &json!({ "orderId": "o", "orderUpdateId": 0, "nodes": nodes, "edges": [edge(1), edge(3)] }),
+        );
+        trace.state(&json!({ "orderId": "o", "nodeStates": [node("b", 2, 5.5), node("c", 4, 9.5)] }));
+        assert!(trace.judge("state/node-positions").findings.is_empty());
+    }
+}

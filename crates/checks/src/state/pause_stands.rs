@@ -1,0 +1,91 @@
+//! `state/pause-stands`: a vehicle that is paused comes to rest and stays there.
+
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::driving::is_displaced;
+use crate::traffic::{Traffic, broken, state, text};
+use tck_base::clock::Moment;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// So long a vehicle may take to come to rest.
+const COMING_TO_REST: Duration = Duration::from_secs(10);
+
+/// See the module.
+pub(crate) const PAUSE_STANDS: Check = Check {
+    name: "state/pause-stands",
+    decides: &["ACT-12"],
+    doc: "A vehicle that reports paused reports driving false at the latest ten seconds later, and from then on until the \
+          pause ends. Judged in modes in which master control is in command, and not after what a person or a hook did \
+          during the pause.",
+    arguments: &[],
+    start: |_| Box::new(PauseStands::default()),
+};
+
+#[derive(Default)]
+struct PauseStands {
+    traffic: Traffic,
+    /// Since when states say that it is paused.
+    since: Option<Moment>,
+    /// Whether it drove in the last state after it had time to come to rest.
+    drove: bool,
+    told: bool,
+}
+
+impl Running for PauseStands {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if is_displaced(entry, context) {
+            self.since = None;
+        }
+        let Some(state) = state(self.traffic, entry, context) else {
+            return false;
+        };
+        let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
+        if state.get("paused") != Some(&Value::Bool(true)) || !in_command {
+            self.since = None;
+            self.drove = false;
+            self.told = false;
+            return false;
+        }
+        let now = entry.at().moment;
+        let since = *self.since.get_or_insert(now);
+        let drives = state.get("driving") == Some(&Value::Bool(true)) && now.since(since) > COMING_TO_REST;
+        // One state alone may have been on its way when the pause began anew.
+        if drives && self.drove && !self.told {
+            self.told = true;
+            let text = format!(
+                "driving is true, and paused has been true for {:.0} s",
+                now.since(since).as_secs_f64()
+            );
+            findings.push(broken("ACT-12", entry.seq(), text));
+        }
+        self.drove = drives;
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use crate::trace::Trace;
+
+    fn judge(driving: [bool; 4]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        for driving in driving {
+            trace.state(&json!({ "paused": true, "driving": driving })).wait(6.0);
+        }
+        trace.judge("state/pause-stands").summary()
+    }
+
+    #[test]
+    fn a_vehicle_that_comes_to_rest_is_right_and_one_that_drives_on_is_found() {
+        assert!(judge([true, true, false, false]).is_empty());
+        assert!(judge([false, false, true, false]).is_empty());
+        assert_eq!(judge([true, true, true, true]), ["ACT-12"]);
+        assert_eq!(judge([false, false, true, true]), ["ACT-12"]);
+    }
+}

@@ -1,0 +1,417 @@
+//! `state/remaining-route`, `state/last-node`: what a state says about the way, against the order it names.
+//!
+//! Which order had to be accepted is left to the tests: a state is held against the order whose ids it shows.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use crate::orders::{
+    Element, Orders, SentOrder, fatal_errors, last_node, may_abandon_beside, number, read_elements, sets_position,
+};
+use crate::traffic::{Traffic, actions, broken, outside_influence, quote, remark, state, text, to_vehicle};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+
+/// `state/remaining-route`.
+pub(crate) const REMAINING_ROUTE: Check = Check {
+    name: "state/remaining-route",
+    decides: &["STATE-12", "STATE-MSG-13", "NODE-03", "ORD-FLOW-09"],
+    doc: "nodeStates and edgeStates list, in sequence, exactly what the vehicle has still to traverse of the order \
+          whose ids the state shows, horizon included, released as in the order. The first node may be listed or \
+          not. None stands there twice behind an update. Not judged after a cancelOrder, a change of mode, a fatal error or a failed action.",
+    arguments: &[],
+    start: |_| Box::new(RemainingRoute::default()),
+};
+
+/// `state/last-node`.
+pub(crate) const LAST_NODE: Check = Check {
+    name: "state/last-node",
+    decides: &["STATE-MSG-04", "ORD-01", "ORD-07"],
+    doc: "lastNodeId and lastNodeSequenceId move along the order in its sequence, and never onto a node that was not \
+          released.",
+    arguments: &[],
+    start: |_| Box::new(LastNode::default()),
+};
+
+/// The order a vehicle shows in its states, and whether it can still be held against it.
+#[derive(Default)]
+pub(crate) struct Shown {
+    traffic: Traffic,
+    pub orders: Orders,
+    /// orderId of the last state.
+    order: Option<String>,
+    /// orderId of an order that was cancelled or may have been abandoned.
+    abandoned: Option<String>,
+    /// Last node of the state before the order changed: not yet progress in the new one.
+    pub carried: Option<(String, u64)>,
+    pub last: Option<(String, u64)>,
+    /// FATAL errors of the last state.
+    fatal: Vec<Value>,
+    /// Those among them with which the vehicle has taken the present order over all the same: they do not hold it.
+    borne: Vec<Value>,
+}
+
+/// How many FATAL errors are kept in mind.
+const ERRORS: usize = 16;
+
+impl Shown {
+    /// Learns from an entry; gives back a state that can be held against its order.
+    pub fn state<'e>(&mut self, entry: &'e Entry, context: &CheckContext<'_>) -> Option<&'e Value> {
+        self.traffic.note(entry);
+        self.orders.note(entry, context);
+        let moved = to_vehicle("instantActions", entry, context).is_some_and(|message| {
+            actions(message).any(|action| {
+                let name = text(action, "actionType");
+                name == "cancelOrder" || sets_position(name)
+            })
+        });
+        if moved || outside_influence(entry) {
+            self.abandoned.clone_from(&self.order);
+        }
+        let state = state(self.traffic, entry, context)?;
+        let order = state.get("orderId")?.as_str()?;
+        let last = last_node(state)?;
+        if self.order.as_deref() != Some(order) {
+            self.carried = self.last.take();
+            self.order = Some(order.chars().take(512).collect());
+            self.abandoned = None;
+            self.borne = fatal_errors(state)
+                .filter(|error| self.fatal.contains(error))
+                .cloned()
+                .collect();
+        }
+        self.fatal = fatal_errors(state).take(ERRORS).cloned().collect();
+        if self.carried.as_ref().is_some_and(|carried| *carried != last) {
+            self.carried = None;
+        }
+        self.last = Some(last);
+        if may_abandon_beside(state, &self.borne) {
+            self.abandoned.clone_from(&self.order);
+        }
+        self.abandoned.is_none().then_some(state)
+    }
+}
+
+#[derive(Default)]
+struct RemainingRoute {
+    shown: Shown,
+    /// orderUpdateIds of the present order that states have shown.
+    adopted: BTreeSet<u64>,
+    /// The next node was gone before it was the last node: its sequenceId, and what to say if it stays so.
+    early: Option<(u64, Vec<CheckFinding>)>,
+    of: Option<String>,
+}
+
+/// What is right to list at some progress.
+struct Remainder<'o> {
+    required: Vec<&'o Element>,
+    tolerated: Vec<&'o Element>,
+}
+
+impl Running for RemainingRoute {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(state) = self.shown.state(entry, context) else {
+            return false;
+        };
+        let (Some(update), Some(nodes), Some(edges)) = (
+            number(state, "orderUpdateId"),
+            read_elements(state, "nodeStates", "nodeId"),
+            read_elements(state, "edgeStates", "edgeId"),
+        ) else {
+            return false;
+        };
+        if self.of != self.shown.order {
+            self.of.clone_from(&self.shown.order);
+            self.adopted.clear();
+        }
+        if self.adopted.len() < 1024 {
+            self.adopted.insert(update);
+        }
+        let order = text(state, "orderId");
+        let candidates: Vec<&SentOrder> = self.shown.orders.candidates(order, update).collect();
+        // A vehicle that adopts an order it should have refused is the business of the tests.
+        if candidates.is_empty() || candidates.iter().any(|sent| !sent.sound) {
+            return false;
+        }
+        let seq = entry.seq();
+        let best = candidates
+            .into_iter()
+            .map(|sent| (self.held_against(sent, &nodes, &edges, seq), sent))
+            .min_by_key(|(found, _)| found.len());
+        let Some((mut found, sent)) = best else { return false };
+        let mut progress = self.progress(sent);
+        // The new order may name the very node and sequenceId the last one ended with: then an equal last node
+        // may be left over, or be progress already. What the lists say decides.
+        let reached = self
+            .reached(sent)
+            .filter(|_| self.shown.carried.is_some() && !found.is_empty());
+        let arrived = reached.is_some_and(|reached| self.held_at(sent, Some(reached), &nodes, &edges, seq).is_empty());
+        if arrived {
+            found.clear();
+            progress = reached;
+        }
+        if let Some((next, said)) = self.early.take() {
+            if progress.is_some_and(|progress| progress >= next) {
+                let text = "a node is removed in one state and becomes the last node in another";
+                findings.push(remark("NODE-03", seq, text));
+            } else {
+                findings.extend(said);
+            }
+        }
+        // Everything as if the next node had been reached already: perhaps the next state says so.
+        let next = self
+            .remainder(sent, progress, |order| &order.nodes)
+            .required
+            .iter()
+            .map(|node| node.sequence)
+            .min();
+        match next.filter(|_| !found.is_empty() && progress.is_some()) {
+            Some(next) if self.held_at(sent, Some(next), &nodes, &edges, seq).is_empty() => {
+                self.early = Some((next, found));
+            }
+            _ => findings.extend(found),
+        }
+        if arrived {
+            self.shown.carried = None;
+        }
+        true
+    }
+}
+
+impl RemainingRoute {
+    fn held_against(&self, sent: &SentOrder, nodes: &[Element], edges: &[Element], seq: u64) -> Vec<CheckFinding> {
+        self.held_at(sent, self.progress(sent), nodes, edges, seq)
+    }
+
+    fn held_at(
+        &self,
+        sent: &SentOrder,
+        progress: Option<u64>,
+        nodes: &[Element],
+        edges: &[Element],
+        seq: u64,
+    ) -> Vec<CheckFinding> {
+        let mut found = Vec::new();
+        let remainder = self.remainder(sent, progress, |order| &order.nodes);
+        compare("nodeStates", "node", &remainder, nodes, (progress, seq), &mut found);
+        self.twice(sent, nodes, seq, &mut found);
+        let remainder = self.remainder(sent, progress, |order| &order.edges);
+        compare("edgeStates", "edge", &remainder, edges, (progress, seq), &mut found);
+        found
+    }
+
+    /// What more is broken where an update made the vehicle list a visit twice.
+    fn twice(&self, sent: &SentOrder, listed: &[Element], seq: u64, found: &mut Vec<CheckFinding>) {
+        if found.is_empty() {
+            return;
+        }
+        let twice = listed
+            .iter()
+            .enumerate()
+            .find(|(at, element)| listed[..*at].iter().any(|other| other.sequence == element.sequence));
+        if let Some((_, element)) =
+            twice.filter(|_| self.adopted.len() > 1 && self.adopted.last() == Some(&sent.update))
+        {
+            let text = format!("after an update, nodeStates lists node {} twice", quote(&element.id));
+            found.insert(0, broken("ORD-FLOW-09", seq, text));
+        }
+    }
+
+    /// The sequenceId the vehicle has reached in the order; `None` while it has not begun.
+    fn progress(&self, sent: &SentOrder) -> Option<u64> {
+        let (node, sequence) = self.shown.last.as_ref()?;
+        let is_last = |element: &&Element| element.id == *node && element.sequence == *sequence;
+        if self.shown.carried.is_some() {
+            return sent.nodes.first().filter(is_last).map(|first| first.sequence);
+        }
+        self.reached(sent)
+    }
+
+    /// The sequenceId of the last node in the order, wherever it comes from.
+    fn reached(&self, sent: &SentOrder) -> Option<u64> {
+        let (node, sequence) = self.shown.last.as_ref()?;
+        let is_last = |element: &&Element| element.id == *node && element.sequence == *sequence;
+        let mut known = self
+            .shown
+            .orders
+            .of(&sent.order)
+            .filter(|other| other.update <= sent.update);
+        known
+            .find_map(|other| other.nodes.iter().find(is_last))
+            .map(|element| element.sequence)
+    }
+
+    fn remainder<'o>(
+        &'o self,
+        sent: &'o SentOrder,
+        progress: Option<u64>,
+        list: impl Fn(&'o SentOrder) -> &'o Vec<Element>,
+    ) -> Remainder<'o> {
+        let first = sent.first();
+        let mut all = Remainder {
+            required: Vec::new(),
+            tolerated: Vec::new(),
+        };
+        for earlier in self.shown.orders.of(&sent.order) {
+            if earlier.update >= sent.update {
+                continue;
+            }
+            let alone = self.shown.orders.candidates(&sent.order, earlier.update).count() == 1;
+            let certain = alone && earlier.sound && self.adopted.contains(&earlier.update);
+            for element in list(earlier)
+                .iter()
+                .filter(|element| element.released && element.sequence < first)
+            {
+                let ahead = progress.is_some_and(|progress| element.sequence > progress);
+                if certain && ahead && !all.required.contains(&element) {
+                    all.required.push(element);
+                } else if progress.is_none() || ahead {
+                    all.tolerated.push(element);
+                }
+            }
+        }
+        for element in list(sent) {
+            match progress {
+                Some(progress) if element.sequence > progress => all.required.push(element),
+                // The first node is reached already; whether it is listed is open.
+                _ if element.sequence == first => all.tolerated.push(element),
+                // The edge just left may go one state later.
+                Some(progress) if element.sequence + 1 == progress => all.tolerated.push(element),
+                Some(_) => {}
+                None => all.required.push(element),
+            }
+        }
+        all
+    }
+}
+
+fn compare(
+    name: &str,
+    kind: &str,
+    right: &Remainder<'_>,
+    listed: &[Element],
+    (progress, seq): (Option<u64>, u64),
+    found: &mut Vec<CheckFinding>,
+) {
+    if !listed.windows(2).all(|pair| pair[0].sequence < pair[1].sequence) {
+        found.push(broken(
+            "STATE-12",
+            seq,
+            format!("{name} is not in the sequence of the order"),
+        ));
+    }
+    let same = |a: &Element, b: &Element| a.id == b.id && a.sequence == b.sequence;
+    for element in listed {
+        let label = format!("{kind} {} with sequenceId {}", quote(&element.id), element.sequence);
+        let mut known = right.required.iter().chain(&right.tolerated);
+        match known.find(|other| same(other, element)) {
+            Some(other) if other.released != element.released => {
+                let text = format!(
+                    "{label} is listed with released {}, unlike in the order",
+                    element.released
+                );
+                found.push(broken("STATE-MSG-13", seq, text));
+            }
+            Some(_) => {}
+            None if kind == "node" && progress == Some(element.sequence) => {
+                let text = format!("{label} is the last node already and still listed");
+                found.push(remark("NODE-03", seq, text));
+            }
+            None => {
+                let text = format!("{name} lists {label}, which is not left to traverse");
+                found.push(broken("STATE-12", seq, text));
+            }
+        }
+    }
+    for element in &right.required {
+        if !listed.iter().any(|other| same(other, element)) {
+            let text = format!(
+                "{name} lacks {kind} {} with sequenceId {}, which is still to be traversed",
+                quote(&element.id),
+                element.sequence
+            );
+            found.push(broken("STATE-12", seq, text));
+        }
+    }
+    // One state tells one story; the first lines of it are enough.
+    found.truncate(4);
+}
+
+#[derive(Default)]
+struct LastNode {
+    shown: Shown,
+    before: Option<(String, String, u64)>,
+    /// Sequence ids the state before still had to reach.
+    ahead: Vec<u64>,
+}
+
+impl Running for LastNode {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let seq = entry.seq();
+        let Some(state) = self.shown.state(entry, context) else {
+            if crate::traffic::state(self.shown.traffic, entry, context).is_some() {
+                self.before = None;
+            }
+            return false;
+        };
+        let (Some(order), Some((node, sequence))) = (self.shown.order.clone(), self.shown.last.clone()) else {
+            return false;
+        };
+        if node.is_empty() && sequence != 0 {
+            let text = format!("lastNodeSequenceId is {sequence} although there is no last node");
+            findings.push(broken("STATE-MSG-04", seq, text));
+        }
+        let before = self.before.replace((order.clone(), node.clone(), sequence));
+        let ahead = read_elements(state, "nodeStates", "nodeId");
+        let ahead = ahead.iter().flatten().map(|element| element.sequence).collect();
+        let ahead_before = std::mem::replace(&mut self.ahead, ahead);
+        let Some((_, node_before, sequence_before)) = before.filter(|before| before.0 == order) else {
+            return false;
+        };
+        if (&node_before, sequence_before) == (&node, sequence) || text(state, "orderId").is_empty() {
+            return true;
+        }
+        let sent: Vec<&SentOrder> = self.shown.orders.of(&order).collect();
+        if sent.is_empty() || sent.iter().any(|sent| !sent.sound || sent.places) {
+            return false;
+        }
+        let nodes = || sent.iter().flat_map(|sent| &sent.nodes);
+        let place = format!("node {} with sequenceId {sequence}", quote(&node));
+        let visits: Vec<&Element> = nodes()
+            .filter(|element| element.id == node && element.sequence == sequence)
+            .collect();
+        if visits.is_empty() {
+            let text = format!("the last node is {place}, which is not part of the order");
+            // A vehicle may know nodes on its way that the order leaves out.
+            findings.push(if nodes().any(|element| element.id == node) {
+                broken("STATE-MSG-04", seq, text)
+            } else {
+                remark("STATE-MSG-04", seq, text)
+            });
+            return true;
+        }
+        if visits.iter().all(|element| !element.released) {
+            findings.push(broken(
+                "ORD-07",
+                seq,
+                format!("the vehicle reached {place}, which was not released"),
+            ));
+        }
+        let was_in_order = nodes().any(|element| element.id == node_before && element.sequence == sequence_before);
+        if was_in_order && self.shown.carried.is_none() && sequence < sequence_before {
+            // The node before the order began may carry a higher number of an older order, which may even be the number
+            // of the same node in this order; but then this order still has to reach it.
+            let begun = nodes().any(|element| element.sequence == sequence_before && element.released)
+                && !ahead_before.contains(&sequence_before);
+            if begun {
+                let text = format!("the last node goes back from sequenceId {sequence_before} to {sequence}");
+                findings.push(broken("ORD-01", seq, text));
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,453 @@
+//! `topic/names`, `topic/structure`, `topic/own-side`: on which topics the device publishes.
+//!
+//! QoS and RETAIN are left to `mqtt`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::header::serial_character;
+use super::traffic::{Traffic, broken, quote, remark};
+use tck_base::clock::Moment;
+use tck_base::pattern::whole;
+use tck_check::device_publish;
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Entry;
+use tck_journal::event::{Event, Packet};
+use tck_pack::Role;
+
+/// How many different topics are remembered; a device that invents more is judged on the first ones.
+const TOPICS: usize = 64;
+/// How many order messages are remembered.
+const ORDERS: usize = 1024;
+
+/// `topic/names`.
+pub(super) const NAMES: Check = Check {
+    name: "topic/names",
+    decides: &["TOPIC-01", "TOPIC-02", "TOPIC-03"],
+    doc: "The last level of a protocol topic is spelled exactly as defined. Topics whose last level is no variant of \
+          a defined name are the vendor's own and not judged, unless what belongs on a defined one is published there \
+          and, for thirty seconds, never where it belongs. An order of a master control belongs on its topic by its \
+          orderId and orderUpdateId, an instant action by its actionId. Where only the levels before the name differ, that is a warning.",
+    arguments: &[],
+    start: |_| Box::new(Names::default()),
+};
+
+/// `topic/structure`.
+pub(super) const STRUCTURE: Check = Check {
+    name: "topic/structure",
+    decides: &["TOPIC-02", "TOPIC-03", "TOPIC-05", "TOPIC-07"],
+    doc: "Topics have five levels: interface, major version, manufacturer, serial number, name. The structure is only \
+          suggested: anything else is a warning, and so is a level that contradicts the version of its message, except characters that a serial number must not hold.",
+    arguments: &[],
+    start: |_| Box::new(Structure::default()),
+};
+
+/// `topic/own-side`.
+pub(super) const OWN_SIDE: Check = Check {
+    name: "topic/own-side",
+    decides: &["TOPIC-15"],
+    doc: "The device publishes only on the topics of its own side, and has no last will on one of the other side. Only the \
+          tap knows who published.",
+    arguments: &[],
+    start: |_| Box::new(OwnSide::default()),
+};
+
+/// Topics seen before, bounded.
+#[derive(Default)]
+struct Seen(BTreeSet<String>);
+
+impl Seen {
+    /// Whether the topic is new and worth a look.
+    fn first(&mut self, topic: &str) -> bool {
+        self.0.len() < TOPICS && topic.len() <= 1024 && self.0.insert(topic.to_owned())
+    }
+}
+
+#[derive(Default)]
+struct Names {
+    traffic: Traffic,
+    seen: Seen,
+    /// Names of topics the device has published on as it must.
+    proper: BTreeSet<String>,
+    /// What looks like a message of ours on a topic of another name: by name, where, entry, time, and how often.
+    astray: BTreeMap<&'static str, (String, u64, Moment, u32)>,
+    /// What a master control has published where it belongs.
+    orders: BTreeSet<Sent>,
+    /// What it has published elsewhere below the levels of the vehicle only: where, entry, time.
+    strays: BTreeMap<Sent, (String, u64, Moment)>,
+}
+
+/// What tells a message of a master control wherever it is published.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Sent {
+    /// orderId and orderUpdateId.
+    Order(String, u64),
+    /// The actionId of its first instant action.
+    Instant(String),
+}
+
+impl Sent {
+    fn read(message: &Value) -> Option<Self> {
+        let short = |value: &Value| -> Option<String> { Some(value.as_str()?.chars().take(256).collect()) };
+        if message.get("nodes").is_some_and(Value::is_array) {
+            let update = message.get("orderUpdateId").and_then(whole)?;
+            return Some(Self::Order(short(message.get("orderId")?)?, update));
+        }
+        let action = message.get("actions")?.as_array()?.first()?;
+        let kind = action.get("actionType").is_some_and(Value::is_string);
+        Some(Self::Instant(short(action.get("actionId")?)?)).filter(|_| kind && message.get("headerId").is_some())
+    }
+
+    /// The topic where it belongs.
+    fn topic(&self) -> &'static str {
+        match self {
+            Self::Order(..) => "order",
+            Self::Instant(_) => "instantActions",
+        }
+    }
+}
+
+/// Members that tell a message of a vehicle wherever it is published.
+const LOOKS: [(&str, [&str; 2]); 3] = [
+    ("state", ["actionStates", "operatingMode"]),
+    ("factsheet", ["typeSpecification", "protocolLimits"]),
+    ("connection", ["connectionState", "headerId"]),
+];
+/// So long a device may publish elsewhere before it does on the topic of the name.
+const ELSEWHERE: Duration = Duration::from_secs(30);
+
+/// The name of the topic on which such a message belongs.
+pub(super) fn looks_like(message: &Value) -> Option<&'static str> {
+    let mut looks = LOOKS.into_iter();
+    looks
+        .find(|(_, members)| members.iter().all(|member| message.get(member).is_some()))
+        .map(|(name, _)| name)
+}
+
+/// A topic whose last level is spelled almost as that of the visualization, which has no members of its own to be told by.
+fn almost(topic: &str) -> Option<&'static str> {
+    const NAME: &str = "visualization";
+    let last = plain(topic.rsplit('/').next().unwrap_or_default());
+    let same = |pairs: &mut dyn Iterator<Item = (char, char)>| pairs.take_while(|(one, other)| one == other).count();
+    let front = same(&mut last.chars().zip(NAME.chars()));
+    let back = same(&mut last.chars().rev().zip(NAME.chars().rev()));
+    (last != NAME && last.len().abs_diff(NAME.len()) <= 2 && front + back + 2 >= NAME.len()).then_some(NAME)
+}
+
+impl Names {
+    /// Notes where the device publishes what.
+    fn note(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
+        if topic.len() > 1024 {
+            return;
+        }
+        if context.role == Role::MasterControl {
+            self.note_order(topic, entry, context);
+            return;
+        }
+        if let Some(name) = context.topic_name(topic) {
+            self.proper.insert(name.to_owned());
+            return;
+        }
+        let Some(name) = entry.json().and_then(looks_like).or_else(|| almost(topic)) else {
+            return;
+        };
+        let first = || (topic.to_owned(), entry.seq(), entry.at().moment, 0);
+        self.astray.entry(name).or_insert_with(first).3 += 1;
+    }
+
+    /// Notes where a master control publishes its orders and instant actions.
+    fn note_order(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
+        let Some(key) = entry.json().and_then(Sent::read) else {
+            return;
+        };
+        let belongs = key.topic();
+        if context.topic_name(topic) == Some(belongs) {
+            self.strays.remove(&key);
+            if self.orders.len() == ORDERS {
+                self.orders.pop_first();
+            }
+            self.orders.insert(key);
+            return;
+        }
+        let above = |topic: &str| topic.rsplit_once('/').map(|(above, _)| above.to_owned());
+        let beside = context
+            .topics
+            .get(belongs)
+            .is_some_and(|usual| above(usual) == above(topic));
+        if beside && context.topic_name(topic).is_none() && !self.orders.contains(&key) && self.strays.len() < ORDERS {
+            let place = (topic.to_owned(), entry.seq(), entry.at().moment);
+            self.strays.entry(key).or_insert(place);
+        }
+    }
+
+    /// What came on a topic beside its own, and on its own never.
+    fn strayed(&mut self, now: Moment, patience: Duration, findings: &mut Vec<CheckFinding>) {
+        let due = |since: &Moment| now.since(*since) >= patience;
+        let late: Vec<_> = self.strays.iter().filter(|(_, (.., since))| due(since)).collect();
+        let late: Vec<_> = late.into_iter().map(|(key, _)| key.clone()).collect();
+        for key in late {
+            let Some((topic, seq, _)) = self.strays.remove(&key) else {
+                continue;
+            };
+            if self.seen.first(&topic) {
+                let what = match &key {
+                    Sent::Order(id, update) => format!("order {}, orderUpdateId {update},", quote(id)),
+                    Sent::Instant(id) => format!("the instant action {}", quote(id)),
+                };
+                let (topic, belongs) = (quote(&topic), key.topic());
+                let text = format!("{what} is published on {topic}, which is no topic name, and not as {belongs}");
+                findings.push(broken("TOPIC-01", seq, text));
+            }
+        }
+    }
+
+    /// Messages that come on another topic, and never on their own.
+    fn astray(&mut self, now: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        let due: Vec<&'static str> = self
+            .astray
+            .iter()
+            .filter(|(name, (_, _, since, _))| !self.proper.contains(**name) && now.since(*since) > ELSEWHERE)
+            .map(|(name, _)| *name)
+            .collect();
+        for name in due {
+            let Some((topic, seq, _, times)) = self.astray.remove(name) else {
+                continue;
+            };
+            let Some(usual) = context
+                .topics
+                .get(name)
+                .filter(|_| times > 0 && self.seen.first(&topic))
+            else {
+                continue;
+            };
+            let text = format!("{name} is published on {} and never on {}", quote(&topic), quote(usual));
+            let level = |of: &str, at: usize| of.split('/').nth(at).map(str::to_owned);
+            findings.push(if topic.rsplit('/').next() != Some(name) {
+                broken("TOPIC-01", seq, text)
+            } else if level(&topic, 1) != level(usual, 1) {
+                remark("TOPIC-03", seq, text)
+            } else {
+                remark("TOPIC-02", seq, text)
+            });
+        }
+    }
+}
+
+impl Running for Names {
+    fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        self.astray(end, context, findings);
+        // What came at the very last may still be on its way to the other topic.
+        self.strayed(end, Duration::from_secs(2), findings);
+    }
+
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        self.astray(entry.at().moment, context, findings);
+        self.strayed(entry.at().moment, ELSEWHERE, findings);
+        let topic = match entry.event() {
+            Event::Message {
+                topic, retain: false, ..
+            } if !self.traffic.tap => topic,
+            _ => match device_publish(entry) {
+                Some((_, topic, ..)) => topic,
+                None => return false,
+            },
+        };
+        self.note(topic, entry, context);
+        if context.topic_name(topic).is_some() {
+            return true;
+        }
+        let last = topic.rsplit('/').next().unwrap_or_default();
+        let Some(name) = context.topics.keys().find(|name| plain(name) == plain(last)) else {
+            return false;
+        };
+        // A master control has topics of its own for other things than vehicles.
+        if context.role == Role::MasterControl && !names_vehicle(topic, context) {
+            return false;
+        }
+        if last != name && self.seen.first(topic) {
+            let text = format!("the last level of {} is no topic name; meant is {name:?}", quote(topic));
+            findings.push(broken("TOPIC-01", entry.seq(), text));
+        }
+        last != name
+    }
+}
+
+/// Whether a topic is about the vehicle, or about one of the same manufacturer.
+fn names_vehicle(topic: &str, context: &CheckContext<'_>) -> bool {
+    let (manufacturer, serial) = context.identity;
+    topic.split('/').any(|level| {
+        let level = level.trim_matches('$');
+        level == manufacturer || level == serial
+    })
+}
+
+/// A name without what people vary: case, underscores, hyphens.
+fn plain(name: &str) -> String {
+    name.chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|character| character.to_ascii_lowercase())
+        .collect()
+}
+
+#[derive(Default)]
+struct Structure {
+    traffic: Traffic,
+    seen: Seen,
+}
+
+impl Running for Structure {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        if let Some((_, topic, ..)) = device_publish(entry) {
+            return self.elsewhere(topic, entry, context, findings);
+        }
+        if self.traffic.delivered(entry, context).is_none() {
+            return false;
+        }
+        let Event::Message { topic, .. } = entry.event() else {
+            return false;
+        };
+        if !self.seen.first(topic) {
+            return false;
+        }
+        let seq = entry.seq();
+        if topic.contains('$') {
+            findings.push(remark("TOPIC-07", seq, format!("{} holds a dollar sign", quote(topic))));
+        }
+        let levels: Vec<&str> = topic.split('/').collect();
+        let [_, version, _, serial, _] = levels[..] else {
+            let text = format!("{} has {} levels instead of five", quote(topic), levels.len());
+            findings.push(remark("TOPIC-02", seq, text));
+            return true;
+        };
+        let expected = format!("v{}", context.pack.version.major);
+        if version != expected {
+            let text = format!("the second level of {} is not {expected:?}", quote(topic));
+            findings.push(remark("TOPIC-03", seq, text));
+        }
+        if serial == context.identity.1 && !serial.bytes().all(serial_character) {
+            let text = format!(
+                "the serial number in {} holds characters that are not allowed",
+                quote(topic)
+            );
+            findings.push(broken("TOPIC-05", seq, text));
+        }
+        true
+    }
+}
+
+impl Structure {
+    /// A topic of the device that is not the configured one, but names the device: below a major version that the
+    /// message itself does not speak. A device may well speak two versions side by side.
+    fn elsewhere(
+        &mut self,
+        topic: &str,
+        entry: &Entry,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let levels: Vec<&str> = topic.split('/').collect();
+        if context.role == Role::MasterControl {
+            return self.command_elsewhere(topic, &levels, entry, context, findings);
+        }
+        let [_, level, manufacturer, serial, name] = levels[..] else {
+            return false;
+        };
+        let own = (manufacturer, serial) == context.identity && context.topics.contains_key(name);
+        let spoken = entry.json().and_then(|value| value.get("version")?.as_str());
+        let (Some(major), Some(spoken)) = (level.strip_prefix('v'), spoken.and_then(|text| text.split('.').next()))
+        else {
+            return false;
+        };
+        let judged = own && context.topic_name(topic).is_none() && major.bytes().all(|byte| byte.is_ascii_digit());
+        if judged && major != spoken && self.seen.first(topic) {
+            let text = format!("{} carries messages of version {}", quote(topic), quote(spoken));
+            findings.push(remark("TOPIC-03", entry.seq(), text));
+        }
+        judged
+    }
+
+    /// An order or instant action for the vehicle on another topic than its own, which nobody listens to.
+    fn command_elsewhere(
+        &mut self,
+        topic: &str,
+        levels: &[&str],
+        entry: &Entry,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let name = levels.last().copied().unwrap_or_default().trim_matches('$');
+        let commands = context
+            .pack
+            .topic(name)
+            .is_some_and(|rule| rule.publisher == Role::MasterControl);
+        let known = context.topic_name(topic).is_some();
+        if known || !commands || !names_vehicle(topic, context) || !self.seen.first(topic) {
+            return false;
+        }
+        let (shown, seq) = (quote(topic), entry.seq());
+        if topic.contains('$') {
+            findings.push(remark("TOPIC-07", seq, format!("{shown} holds a dollar sign")));
+        }
+        let usual = context
+            .topics
+            .get(name)
+            .map(|usual| usual.split('/').collect::<Vec<_>>());
+        let Some(usual) = usual.filter(|usual| usual.len() == 5) else {
+            return true;
+        };
+        if levels.len() != usual.len() {
+            let text = format!("{shown} has {} levels instead of five", levels.len());
+            findings.push(remark("TOPIC-02", seq, text));
+        } else if levels[1] != usual[1] && levels[2..4] == usual[2..4] {
+            let text = format!("the second level of {shown} is not {:?}", usual[1]);
+            findings.push(remark("TOPIC-03", seq, text));
+        }
+        true
+    }
+}
+
+#[derive(Default)]
+struct OwnSide {
+    traffic: Traffic,
+}
+
+impl Running for OwnSide {
+    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.traffic.note(entry);
+        let owner = match context.role {
+            Role::Agv => "master control",
+            Role::MasterControl => "the vehicle",
+        };
+        if let Event::Packet {
+            packet: Packet::Connect { will: Some(will), .. },
+            ..
+        } = entry.event()
+        {
+            let name = context.topic_name(&will.topic);
+            let rule = name.and_then(|name| context.pack.topic(name));
+            if let Some(name) = name.filter(|_| rule.is_some_and(|rule| rule.publisher != context.role)) {
+                let text = format!("the device has a last will on {name}, which belongs to {owner}");
+                findings.push(broken("TOPIC-15", entry.seq(), text));
+            }
+            return name.is_some();
+        }
+        let Some((_, topic, ..)) = device_publish(entry) else {
+            return false;
+        };
+        let Some(name) = context.topic_name(topic) else {
+            return false;
+        };
+        if self.traffic.published(entry, context).is_none() {
+            let text = format!("the device publishes on {name}, which belongs to {owner}");
+            findings.push(broken("TOPIC-15", entry.seq(), text));
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;

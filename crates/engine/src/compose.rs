@@ -1,0 +1,312 @@
+//! Makes the messages of the harness: header, order, instant actions, and what breaks them.
+//!
+//! Types are for what we send; what is sent wrong on purpose is made right first and then patched.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value, json};
+
+use super::ids::IdForm;
+use super::route::{RouteBuilder, SentOrders};
+use super::unmade::ComposeError;
+use tck_base::clock::Stamp;
+use tck_base::pattern::Bindings;
+use tck_judge::Ground;
+use tck_net::bench::Outgoing;
+use tck_suite::model::{Patch, Raw, Send, SendAction};
+
+/// A finished message and the actionIds in it, by the names given with `as`.
+#[derive(Debug)]
+pub struct Composed {
+    /// The message.
+    pub message: Outgoing,
+    /// Name and actionId.
+    pub actions: Vec<(String, String)>,
+}
+
+/// Makes messages; counts headerId per topic and actionIds per run.
+#[derive(Debug)]
+pub struct Composer {
+    run: String,
+    header_ids: BTreeMap<String, u32>,
+    action_count: u64,
+    ids: IdForm,
+    orders: SentOrders,
+}
+
+impl Composer {
+    /// `run` makes ids unique over runs.
+    pub fn new(run: impl Into<String>) -> Self {
+        Self {
+            run: run.into(),
+            header_ids: BTreeMap::new(),
+            action_count: 0,
+            ids: IdForm::default(),
+            orders: SentOrders::default(),
+        }
+    }
+
+    /// Forgets the orders of the test before.
+    pub fn begin_test(&mut self) {
+        self.orders = SentOrders::default();
+    }
+
+    /// A fresh actionId, as the factsheet of the vehicle wants ids as far as it is known.
+    pub fn action_id(&mut self) -> String {
+        self.action_count += 1;
+        self.ids.of_action(&self.run, self.action_count)
+    }
+
+    /// Makes the message of a `send` step.
+    pub fn compose(
+        &mut self,
+        send: &Send,
+        bindings: &Bindings,
+        ground: &Ground,
+        now: Stamp,
+    ) -> Result<Composed, ComposeError> {
+        let topic = ground
+            .topics
+            .get(&send.topic)
+            .cloned()
+            .ok_or_else(|| ComposeError::Topic(send.topic.clone()))?;
+        self.ids = IdForm::of(bindings.get("device.factsheet.protocolLimits.maxStringLens"));
+        let rule = ground.pack.topic(&send.topic);
+        let qos = send.qos.unwrap_or_else(|| rule.map_or(0, |rule| rule.qos));
+        let mut actions = Vec::new();
+        let payload = if let Some(raw) = &send.raw {
+            match raw {
+                Raw::Bytes(bytes) => bytes.clone(),
+                Raw::Text(term) => match term.bind(bindings)? {
+                    Value::String(text) => text.into_bytes(),
+                    other => other.to_string().into_bytes(),
+                },
+            }
+        } else {
+            let message = self.message(send, bindings, ground, now, &mut actions)?;
+            message.to_string().into_bytes()
+        };
+        Ok(Composed {
+            message: Outgoing {
+                topic,
+                payload: payload.into(),
+                qos,
+                retain: send.retain,
+            },
+            actions,
+        })
+    }
+
+    /// A message with nothing but its header and these members, for the harness's own use.
+    pub fn plain(
+        &mut self,
+        topic: &str,
+        members: Value,
+        ground: &Ground,
+        now: Stamp,
+    ) -> Result<Outgoing, ComposeError> {
+        let full = ground
+            .topics
+            .get(topic)
+            .cloned()
+            .ok_or_else(|| ComposeError::Topic(topic.to_owned()))?;
+        let mut message = self.header(topic, ground, now);
+        if let Value::Object(members) = members {
+            message.extend(members);
+        }
+        Ok(Outgoing {
+            topic: full,
+            payload: Value::Object(message).to_string().into_bytes().into(),
+            qos: ground.pack.topic(topic).map_or(0, |rule| rule.qos),
+            retain: false,
+        })
+    }
+
+    fn message(
+        &mut self,
+        send: &Send,
+        bindings: &Bindings,
+        ground: &Ground,
+        now: Stamp,
+        actions: &mut Vec<(String, String)>,
+    ) -> Result<Value, ComposeError> {
+        let mut message = self.header(&send.topic, ground, now);
+        let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
+        if !send.actions.is_empty() {
+            let list = self.actions(&send.actions, true, bindings, actions)?;
+            message.insert("actions".to_owned(), Value::Array(list));
+        }
+        if let Some(route) = &send.route {
+            let said = payload
+                .as_ref()
+                .and_then(|payload| payload.get("orderId"))
+                .and_then(Value::as_str);
+            let own = bindings.get("run.order").and_then(Value::as_str);
+            let order = said.or(own).unwrap_or_default().to_owned();
+            message.insert("orderId".to_owned(), json!(order));
+            message.insert("orderUpdateId".to_owned(), json!(0));
+            let mut placed = BTreeMap::new();
+            for (at, (place, list)) in route.actions.iter().enumerate() {
+                placed.insert(at, (place.clone(), self.actions(list, false, bindings, actions)?));
+            }
+            let builder = RouteBuilder {
+                course: bindings.get("course"),
+                route,
+                actions: placed.into_values().collect(),
+            };
+            let (nodes, edges) = builder.build(&order, &mut self.orders)?;
+            message.insert("nodes".to_owned(), nodes);
+            message.insert("edges".to_owned(), edges);
+        }
+        let mut message = Value::Object(message);
+        if let Some(payload) = payload {
+            json_patch::merge(&mut message, &payload);
+        }
+        match &send.patch {
+            None => {}
+            Some(Patch::Merge(term)) => json_patch::merge(&mut message, &term.bind(bindings)?),
+            Some(Patch::Operations(term)) => {
+                let Value::Array(operations) = term.bind(bindings)? else {
+                    return Err(ComposeError::Patch("it is no list of operations".to_owned()));
+                };
+                for operation in operations {
+                    operate(&mut message, operation)?;
+                }
+            }
+        }
+        Ok(message)
+    }
+
+    fn actions(
+        &mut self,
+        list: &[SendAction],
+        instant: bool,
+        bindings: &Bindings,
+        named: &mut Vec<(String, String)>,
+    ) -> Result<Vec<Value>, ComposeError> {
+        let mut all = Vec::new();
+        for action in list {
+            let known = action
+                .name
+                .as_ref()
+                .and_then(|name| bindings.get(&format!("{name}.id"))?.as_str().map(str::to_owned));
+            let fresh = known.is_none();
+            let id = known.unwrap_or_else(|| self.action_id());
+            let mut parameters = Vec::new();
+            if let Some(term) = &action.with_all
+                && let Value::Object(members) = term.bind(bindings)?
+            {
+                parameters.extend(
+                    members
+                        .into_iter()
+                        .map(|(key, value)| json!({ "key": key, "value": value })),
+                );
+            }
+            for (key, term) in &action.with {
+                parameters.push(json!({ "key": key, "value": term.bind(bindings)? }));
+            }
+            let action_type = action.action.bind(bindings)?;
+            let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
+            let blocking = match blocking {
+                Some(said) if !instant => said,
+                // How an instant action blocks is nothing a test is about.
+                said => usual_blocking(&action_type, said.unwrap_or_else(|| json!("HARD")), bindings),
+            };
+            all.push(json!({
+                "actionType": action_type,
+                "actionId": id,
+                "blockingType": blocking,
+                "actionParameters": parameters,
+            }));
+            if let (Some(name), true) = (&action.name, fresh) {
+                named.push((name.clone(), id));
+            }
+        }
+        Ok(all)
+    }
+
+    fn header(&mut self, topic: &str, ground: &Ground, now: Stamp) -> Map<String, Value> {
+        let id = self.header_ids.entry(topic.to_owned()).or_default();
+        let header = json!({
+            "headerId": *id,
+            "timestamp": timestamp(now),
+            "version": ground.pack.version.to_string(),
+            "manufacturer": ground.identity.0,
+            "serialNumber": ground.identity.1,
+        });
+        *id = id.wrapping_add(1);
+        match header {
+            Value::Object(members) => members,
+            _ => Map::new(),
+        }
+    }
+}
+
+/// One operation of JSON Patch, or `as-text`: the value that stands there is put in quotes.
+fn operate(message: &mut Value, operation: Value) -> Result<(), ComposeError> {
+    if operation.get("op").and_then(Value::as_str) == Some("as-text") {
+        let path = operation.get("path").and_then(Value::as_str).unwrap_or_default();
+        let place = message
+            .pointer_mut(path)
+            .ok_or_else(|| ComposeError::Patch(format!("there is nothing at {path}")))?;
+        let text = match place.take() {
+            Value::String(text) => text,
+            other => other.to_string(),
+        };
+        *place = Value::String(text);
+        return Ok(());
+    }
+    let operations = serde_json::from_value(Value::Array(vec![operation]));
+    let operations: json_patch::Patch = operations.map_err(|error| ComposeError::Patch(error.to_string()))?;
+    json_patch::patch(message, &operations).map_err(|error| ComposeError::Patch(error.to_string()))
+}
+
+/// ISO 8601 in UTC with two fraction digits (HDR-03).
+fn timestamp(now: Stamp) -> String {
+    format!("{:.2}", now.utc)
+}
+
+/// How an action blocks where a test does not care: the usual way, or the first type its factsheet lists when the usual
+/// one is not among them (FACT-15).
+fn usual_blocking(action_type: &Value, usual: Value, bindings: &Bindings) -> Value {
+    let listed = bindings
+        .get("device.factsheet.protocolFeatures.agvActions")
+        .and_then(Value::as_array);
+    let own = listed
+        .into_iter()
+        .flatten()
+        .find(|action| action.get("actionType") == Some(action_type))
+        .and_then(|action| action.get("blockingTypes")?.as_array());
+    match own {
+        Some(types) if !types.contains(&usual) => types.first().cloned().unwrap_or(usual),
+        _ => usual,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tck_base::clock::Moment;
+
+    #[test]
+    fn a_value_is_put_in_quotes_where_it_stands() {
+        let mut message = json!({ "list": [{ "a": 5, "b": true }] });
+        for path in ["/list/0/a", "/list/0/b"] {
+            operate(&mut message, json!({ "op": "as-text", "path": path })).expect("there");
+        }
+        operate(&mut message, json!({ "op": "add", "path": "/list/0/c", "value": null })).expect("there");
+        assert_eq!(message, json!({ "list": [{ "a": "5", "b": "true", "c": null }] }));
+        let nowhere = operate(&mut message, json!({ "op": "as-text", "path": "/list/1" }));
+        assert!(nowhere.is_err());
+    }
+
+    #[test]
+    fn the_timestamp_has_two_fraction_digits_and_a_z() {
+        let utc = "2026-11-21T09:16:24.129Z".parse().expect("timestamp");
+        let stamp = Stamp {
+            moment: Moment::START,
+            utc,
+        };
+        assert_eq!(timestamp(stamp), "2026-11-21T09:16:24.12Z");
+    }
+}

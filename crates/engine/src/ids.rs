@@ -1,0 +1,116 @@
+//! What the ids of the harness look like.
+//!
+//! They are readable, so that a person finds the test in a capture, unless the factsheet of the vehicle wants them short
+//! or of digits: FACT-12 binds the harness, too, while it plays the master control.
+
+use serde_json::Value;
+
+use tck_base::pattern::whole;
+
+/// A vehicle that takes ids of this length takes the readable ones.
+const READABLE: u64 = 64;
+/// Digits of an id: six for the run, four for the test, two for the name.
+const DIGITS: usize = 12;
+
+/// How ids are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum IdForm {
+    /// Run, number and name.
+    #[default]
+    Readable,
+    /// So many digits, at most.
+    Digits(usize),
+}
+
+impl IdForm {
+    /// What `protocolLimits.maxStringLens` of a factsheet asks for.
+    #[must_use]
+    pub fn of(lengths: Option<&Value>) -> Self {
+        let member = |name: &str| lengths.and_then(|lengths| lengths.get(name));
+        let longest = member("idLen").and_then(whole).filter(|longest| *longest > 0);
+        let numerical = member("idNumericalOnly").and_then(Value::as_bool) == Some(true);
+        match longest.filter(|longest| *longest < READABLE) {
+            Some(longest) => Self::Digits(usize::try_from(longest).unwrap_or(DIGITS).min(DIGITS)),
+            None if numerical => Self::Digits(DIGITS),
+            None => Self::Readable,
+        }
+    }
+
+    /// The id behind `${run.NAME}` in the test of this number; `place` tells the names of a test apart.
+    #[must_use]
+    pub fn of_name(self, run: &str, number: usize, name: &str, place: usize) -> String {
+        match self {
+            Self::Readable => format!("{run}-{number}-{name}"),
+            Self::Digits(length) => last(
+                &format!("{:06}{:04}{:02}", digits(run), number % 10_000, place % 100),
+                length,
+            ),
+        }
+    }
+
+    /// The actionId of this number.
+    #[must_use]
+    pub fn of_action(self, run: &str, number: u64) -> String {
+        match self {
+            Self::Readable => format!("{run}-action-{number}"),
+            Self::Digits(length) => last(&format!("{:06}{:06}", digits(run), number % 1_000_000), length),
+        }
+    }
+}
+
+/// Six digits that stand for a run; the first one is no zero.
+fn digits(run: &str) -> u32 {
+    let sum = run.bytes().fold(2_166_136_261_u32, |sum, byte| {
+        (sum ^ u32::from(byte)).wrapping_mul(16_777_619)
+    });
+    100_000 + sum % 900_000
+}
+
+/// What tells ids apart stands at their ends.
+fn last(id: &str, length: usize) -> String {
+    id.get(id.len().saturating_sub(length)..).unwrap_or(id).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn ids_are_readable_unless_the_factsheet_wants_them_otherwise() {
+        for lengths in [
+            None,
+            Some(json!({})),
+            Some(json!({ "idLen": 0 })),
+            Some(json!({ "idLen": 64 })),
+        ] {
+            assert_eq!(IdForm::of(lengths.as_ref()), IdForm::Readable);
+        }
+        assert_eq!(IdForm::Readable.of_name("seed3", 7, "order", 0), "seed3-7-order");
+        assert_eq!(IdForm::Readable.of_action("seed3", 9), "seed3-action-9");
+    }
+
+    #[test]
+    fn short_ids_and_ids_of_digits_differ_from_each_other() {
+        let forms = [
+            json!({ "idLen": 36 }),
+            json!({ "idNumericalOnly": true }),
+            json!({ "idLen": 8, "idNumericalOnly": true }),
+            json!({ "idLen": 8.0 }),
+        ];
+        for (lengths, length) in forms.iter().zip([12, 12, 8, 8]) {
+            let form = IdForm::of(Some(lengths));
+            let ids = [
+                form.of_name("seed3", 7, "order", 0),
+                form.of_name("seed3", 7, "next", 1),
+                form.of_name("seed3", 8, "order", 0),
+                form.of_action("seed3", 9),
+            ];
+            for (place, id) in ids.iter().enumerate() {
+                assert_eq!(id.len(), length, "{id}");
+                assert!(id.bytes().all(|byte| byte.is_ascii_digit()), "{id}");
+                assert!(!ids[..place].contains(id), "{id}");
+            }
+        }
+    }
+}

@@ -1,0 +1,474 @@
+//! Performs the steps of a test over a link.
+//!
+//! The engine sends, moves the mark, and waits for exactly as long as the judge says it makes sense. It
+//! decides nothing: every occurrence and everything it does itself goes into the journal, and the verdict
+//! comes from there. The only async logic of a test is here.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod compose;
+mod flood;
+mod hands;
+mod ids;
+mod map_file;
+mod operator;
+mod recorder;
+mod route;
+mod unmade;
+pub mod vehicle;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::{Map, Value, json};
+
+pub use compose::Composer;
+pub use ids::IdForm;
+pub use operator::{HookOutcome, Operator};
+pub use recorder::{RecordError, Recorder};
+pub use unmade::ComposeError;
+
+use tck_base::clock::Moment;
+use tck_journal::event::{Event, Occurrence, Payload, StepEnd};
+use tck_judge::{JudgeError, Progress, TestJudge};
+use tck_net::bench::{LinkError, Offer, Outgoing};
+use tck_net::link::Link;
+use tck_suite::model::{Section, Step, Test, Verb};
+
+/// More time than this is not left between two orders.
+const LONGEST_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Why a run cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    /// The link broke.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The journal cannot be written or judged.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+impl From<JudgeError> for EngineError {
+    fn from(error: JudgeError) -> Self {
+        Self::Record(RecordError::Judge(error))
+    }
+}
+
+/// Tells what is being waited for; the terminal shows it.
+pub trait Watcher {
+    /// A step has begun to wait.
+    fn waiting(&mut self, step: &Step);
+}
+
+/// Performs tests.
+pub struct Engine<L, O> {
+    /// The bench.
+    pub link: L,
+    /// Hooks and people.
+    pub operator: O,
+    /// Journal and judge.
+    pub recorder: Recorder,
+    /// Makes messages.
+    pub composer: Composer,
+    /// Whether the postamble of a test tries to cancel what the test has left. Set to false once the device
+    /// is known not to obey and there is another way to get it back.
+    pub cancels: bool,
+    /// Map files the device can read; without one, ours are served.
+    pub map_files: Vec<bytes::Bytes>,
+    /// Which time a test is run, where tests are repeated.
+    pub repetition: Option<u32>,
+    /// When the last order was sent.
+    last_order: Option<Moment>,
+    interrupt: tokio::sync::watch::Receiver<bool>,
+}
+
+impl<L: Link, O: Operator> Engine<L, O> {
+    /// An engine that stops at the next step when `interrupt` turns true.
+    pub fn new(
+        link: L,
+        operator: O,
+        recorder: Recorder,
+        composer: Composer,
+        interrupt: tokio::sync::watch::Receiver<bool>,
+    ) -> Self {
+        Self {
+            link,
+            operator,
+            recorder,
+            composer,
+            cancels: true,
+            map_files: Vec::new(),
+            repetition: None,
+            last_order: None,
+            interrupt,
+        }
+    }
+
+    /// Whether the user has asked to stop, or the device floods the harness.
+    pub fn interrupted(&self) -> bool {
+        *self.interrupt.borrow() || self.recorder.flood().is_some()
+    }
+
+    /// Records something the harness itself did or found.
+    pub fn note(&mut self, event: Event) -> Result<u64, EngineError> {
+        let occurrence = Occurrence::harness(self.link.now(), event);
+        Ok(self.recorder.record(occurrence)?.seq())
+    }
+
+    /// Records everything that has already happened. A device that talks without end does not hold it up: what comes
+    /// meanwhile is left for later.
+    pub async fn drain(&mut self) -> Result<(), EngineError> {
+        let now = self.link.now().moment;
+        while let Some(occurrence) = self.link.next(now).await? {
+            let later = occurrence.at.moment > now;
+            self.recorder.record(occurrence)?;
+            if later {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Records what happens until `done` says so, or until `until`. Returns whether `done` said so.
+    pub async fn watch(&mut self, until: Moment, mut done: impl FnMut(&Recorder) -> bool) -> Result<bool, EngineError> {
+        loop {
+            if done(&self.recorder) {
+                return Ok(true);
+            }
+            if self.interrupted() {
+                return Ok(false);
+            }
+            let happened = tokio::select! {
+                biased;
+                happened = self.link.next(until) => happened?,
+                _ = self.interrupt.changed() => continue,
+            };
+            match happened {
+                Some(occurrence) => {
+                    let later = occurrence.at.moment > until;
+                    self.recorder.record(occurrence)?;
+                    if later {
+                        return Ok(done(&self.recorder));
+                    }
+                }
+                None => return Ok(done(&self.recorder)),
+            }
+        }
+    }
+
+    /// Runs one test. `own` are the variables of this test: `course`, `run`.
+    pub async fn run_test(
+        &mut self,
+        test: &Arc<Test>,
+        own: Map<String, Value>,
+        watcher: &mut dyn Watcher,
+    ) -> Result<(), EngineError> {
+        self.drain().await?;
+        self.composer.begin_test();
+        self.note(Event::TestBegun {
+            test: test.id.clone(),
+            bindings: Value::Object(own),
+            repetition: self.repetition,
+        })?;
+        let outcome = self.sections(test, watcher).await;
+        self.note(Event::TestEnded { test: test.id.clone() })?;
+        outcome
+    }
+
+    async fn sections(&mut self, test: &Arc<Test>, watcher: &mut dyn Watcher) -> Result<(), EngineError> {
+        let version = self.recorder.judge().ground().pack.version;
+        let mut outcome = Ok(());
+        let begun = self.last_seq();
+        for (section, steps) in test.sections() {
+            let mut spared = None;
+            for step in steps {
+                if step.spec.as_ref().is_some_and(|spec| !spec.contains(version)) {
+                    continue;
+                }
+                if section == Section::Finally
+                    && ((is_cancelling(step) && *spared.get_or_insert_with(|| self.spares_cancelling(begun)))
+                        || (is_calling_off(step) && *spared.get_or_insert_with(|| self.spares_calling_off(begun)))
+                        || (is_driving_on(step) && self.device_is_gone()))
+                {
+                    continue;
+                }
+                let goes_on = self
+                    .recorder
+                    .judge()
+                    .current()
+                    .is_some_and(|judge| judge.goes_on(section));
+                let stop = section != Section::Finally && self.interrupted();
+                if !goes_on || stop || (outcome.is_err() && section != Section::Finally) {
+                    break;
+                }
+                watcher.waiting(step);
+                if let Err(error) = self.step(step, section).await {
+                    // The postamble is still tried: a device must not be left driving.
+                    outcome = outcome.and(Err(error));
+                    break;
+                }
+            }
+        }
+        outcome
+    }
+
+    fn last_seq(&self) -> u64 {
+        self.recorder.journal().entries().last().map_or(0, |entry| entry.seq())
+    }
+
+    /// Whether nothing would come of cancelling: the device is gone, is known not to obey, or has said since the last
+    /// message of this test that it has nothing to do. A device that leaves a cancelOrder without an order unanswered
+    /// would otherwise cost a time limit after every test.
+    fn spares_cancelling(&self, begun: u64) -> bool {
+        let judge = self.recorder.judge();
+        let entries = self.recorder.journal().entries();
+        let sent = entries
+            .iter()
+            .rev()
+            .find(|entry| matches!(entry.event(), Event::Sent { .. }));
+        let since = sent.map_or(begun, |entry| entry.seq().max(begun));
+        !self.cancels || self.device_is_gone() || vehicle::is_idle_since(judge, since)
+    }
+
+    /// Whether the master control has nothing left to call off: the vehicle is idle, was not told to be awkward, which
+    /// may have kept it from what the master control still wants, and an order has come since the last thing asked for.
+    fn spares_calling_off(&self, begun: u64) -> bool {
+        let judge = self.recorder.judge();
+        let entries = self.recorder.journal().entries();
+        let mut own = entries.iter().rev().take_while(|entry| entry.seq() > begun);
+        let answered = judge.timeline().of("order").last().map_or(0, |order| order.seq());
+        let open = own.any(|entry| match entry.event() {
+            Event::Vehicle { .. } => true,
+            Event::Hook { .. } => entry.seq() > answered,
+            _ => false,
+        });
+        !open && vehicle::has_nothing_to_do(judge)
+    }
+
+    /// Whether the tap has seen the device go.
+    fn device_is_gone(&self) -> bool {
+        let judge = self.recorder.judge();
+        let has_tap = !judge.timeline().of("mqtt/connect").is_empty();
+        has_tap && !vehicle::has_open_connection(judge)
+    }
+
+    async fn step(&mut self, step: &Step, section: Section) -> Result<(), EngineError> {
+        self.drain().await?;
+        tracing::debug!(step = step.path, "begins");
+        self.note(Event::StepBegun {
+            path: step.path.clone(),
+        })?;
+        let done = self.perform(step, section).await;
+        let end = match &done {
+            Ok(end) => end.clone(),
+            Err(error) => StepEnd::Broken(error.to_string()),
+        };
+        if let Err(error) = &done {
+            self.note(Event::Trouble {
+                text: error.to_string(),
+            })?;
+        }
+        self.note(Event::StepEnded {
+            path: step.path.clone(),
+            end,
+        })?;
+        done.map(|_| ())
+    }
+
+    async fn perform(&mut self, step: &Step, section: Section) -> Result<StepEnd, EngineError> {
+        match &step.verb {
+            Verb::Send(send) => {
+                if send.topic == "order" {
+                    self.space_orders().await?;
+                }
+                let version = self.recorder.judge().ground();
+                let composed = match self.recorder.judge().current() {
+                    Some(test) => self.composer.compose(send, test.bindings(), version, self.link.now()),
+                    None => return Ok(StepEnd::Broken("no test is running".to_owned())),
+                };
+                let composed = match composed {
+                    Ok(composed) => composed,
+                    Err(error) => return Ok(StepEnd::Broken(error.to_string())),
+                };
+                let mark = self.mark(step)?;
+                for (name, id) in composed.actions {
+                    self.bind(&name, json!({ "id": id, "sent": mark }))?;
+                }
+                self.publish(composed.message).await?;
+                Ok(StepEnd::Decided)
+            }
+            Verb::Link(link) => {
+                self.mark(step)?;
+                self.note(Event::Fault {
+                    fault: link.fault.clone(),
+                })?;
+                self.link.fault(link.fault.clone()).await?;
+                Ok(StepEnd::Decided)
+            }
+            Verb::Serve(serve) => self.serve(serve).await,
+            Verb::Operator(operator) => {
+                self.mark(step)?;
+                self.operate(operator, section).await
+            }
+            Verb::Vehicle(vehicle) => self.vehicle_step(vehicle, step).await,
+            Verb::Retained(retained) => {
+                let topic = self.recorder.judge().ground().topics.get(&retained.topic).cloned();
+                let Some(topic) = topic else {
+                    return Ok(StepEnd::Broken(format!("there is no topic {}", retained.topic)));
+                };
+                self.link.fresh_subscriber(&topic).await?;
+                self.wait(section).await
+            }
+            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) => self.wait(section).await,
+        }
+    }
+
+    pub(crate) fn mark(&mut self, step: &Step) -> Result<u64, EngineError> {
+        self.note(Event::Mark {
+            path: step.path.clone(),
+        })
+    }
+
+    pub(crate) fn bind(&mut self, name: &str, value: Value) -> Result<(), EngineError> {
+        self.note(Event::Bound {
+            name: name.to_owned(),
+            value,
+        })?;
+        Ok(())
+    }
+
+    /// Waits until the vehicle may be sent another order: its factsheet says how much time it needs between two
+    /// (`minOrderInterval`, FACT-13). One that asks for more than [`LONGEST_INTERVAL`] is not given more.
+    async fn space_orders(&mut self) -> Result<(), EngineError> {
+        let bindings = &self.recorder.judge().ground().bindings;
+        let stated = bindings.get("device").and_then(|device| {
+            let seconds = device.pointer("/factsheet/protocolLimits/timing/minOrderInterval")?;
+            Duration::try_from_secs_f64(seconds.as_f64()?).ok()
+        });
+        let (Some(interval), Some(last)) = (stated, self.last_order) else {
+            return Ok(());
+        };
+        let until = last + interval.min(LONGEST_INTERVAL);
+        if until > self.link.now().moment {
+            self.watch(until, |_| false).await?;
+        }
+        Ok(())
+    }
+
+    /// Publishes a message of the harness, journal first.
+    pub async fn publish(&mut self, message: Outgoing) -> Result<(), EngineError> {
+        let is_order = self.recorder.judge().ground().topics.get("order") == Some(&message.topic);
+        if is_order {
+            self.space_orders().await?;
+            self.last_order = Some(self.link.now().moment);
+        }
+        self.note(Event::Sent {
+            topic: message.topic.clone(),
+            qos: message.qos,
+            retain: message.retain,
+            payload: Payload::keep(message.payload.clone()),
+        })?;
+        self.link.publish(message).await?;
+        Ok(())
+    }
+
+    /// Waits for what the judge says, and no longer.
+    async fn wait(&mut self, section: Section) -> Result<StepEnd, EngineError> {
+        let mut probed = false;
+        loop {
+            let Some(test) = self.recorder.judge().current() else {
+                return Ok(StepEnd::Broken("no test is running".to_owned()));
+            };
+            let Some(until) = time_for(test, probed) else {
+                return Ok(StepEnd::Decided);
+            };
+            let probing = matches!(test.progress(), Progress::NeedsProbe(_)) && !probed;
+            // The postamble runs even when the user has asked to stop: a device must not be left driving.
+            if self.recorder.flood().is_some() || (section != Section::Finally && self.interrupted()) {
+                return Ok(StepEnd::Interrupted);
+            }
+            let happened = tokio::select! {
+                biased;
+                happened = self.link.next(until) => happened?,
+                changed = self.interrupt.changed(), if section != Section::Finally => {
+                    if changed.is_err() {
+                        return Ok(StepEnd::Interrupted);
+                    }
+                    continue;
+                }
+            };
+            if let Some(occurrence) = happened {
+                let now = occurrence.at.moment;
+                self.recorder.record(occurrence)?;
+                // The time is up even if a device never stops talking.
+                let test = self.recorder.judge().current();
+                if test.is_some_and(|test| time_for(test, probed).is_none_or(|until| now <= until)) {
+                    continue;
+                }
+            }
+            if !probing {
+                return Ok(StepEnd::Deadline);
+            }
+            probed = true;
+            let probe = self.link.probe().await?;
+            self.note(Event::ProbeSent { probe })?;
+        }
+    }
+
+    async fn serve(&mut self, serve: &tck_suite::model::Serve) -> Result<StepEnd, EngineError> {
+        let bindings = self
+            .recorder
+            .judge()
+            .current()
+            .map(|test| test.bindings().clone())
+            .unwrap_or_default();
+        let body = match map_file::content(serve, &bindings, &self.map_files) {
+            Ok(body) => body,
+            Err(why) => return Ok(StepEnd::Broken(why)),
+        };
+        let sha256 = map_file::sha256(&body);
+        let offer = Offer {
+            name: serve.name.clone(),
+            body,
+            behaviour: serve.behaviour,
+        };
+        let url = self.link.serve(offer).await?;
+        self.note(Event::Served {
+            name: serve.name.clone(),
+            url: url.clone(),
+            behaviour: serve.behaviour.word().to_owned(),
+        })?;
+        self.bind(
+            &format!("serve.{}", serve.name),
+            json!({ "url": url, "sha256": sha256 }),
+        )?;
+        Ok(StepEnd::Decided)
+    }
+}
+
+/// Whether a step of a postamble comes from the state that cancels whatever is left.
+/// Until when a step has to be waited for; `None` when it is decided.
+fn time_for(test: &TestJudge, probed: bool) -> Option<Moment> {
+    match test.progress() {
+        Progress::Decided => None,
+        Progress::Pending(until) => Some(until),
+        Progress::NeedsProbe(ends) if !probed => Some(ends),
+        Progress::NeedsProbe(ends) => Some(test.probe_until().unwrap_or(ends)),
+    }
+}
+
+fn is_cancelling(step: &Step) -> bool {
+    step.path.contains("/cancel-order[")
+}
+
+/// Whether a step of a postamble comes from the state in which a master control calls off what it still wants. The
+/// pause in it is kept: a master control has to hear that the vehicle is done before somebody moves it.
+fn is_calling_off(step: &Step) -> bool {
+    step.path.contains("/called-off[") && !step.path.contains("/settled[")
+}
+
+/// Whether a step of a postamble waits for the vehicle to drive what was released to it.
+fn is_driving_on(step: &Step) -> bool {
+    step.path.contains("/base-done[")
+}

@@ -1,0 +1,120 @@
+//! Journal, file and judge as one: what is recorded is judged.
+
+use std::sync::Arc;
+
+use super::flood::FloodGuard;
+use tck_journal::event::{Event, Occurrence};
+use tck_journal::file::JournalWriter;
+use tck_journal::{Entry, Journal};
+use tck_judge::{JudgeError, Rules, RunJudge, judged};
+
+/// Why something could not be recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be written.
+    #[error("cannot write the journal: {0}")]
+    Write(#[from] std::io::Error),
+    /// The judge refuses the journal.
+    #[error(transparent)]
+    Judge(#[from] JudgeError),
+}
+
+/// Records and judges.
+pub struct Recorder {
+    journal: Journal,
+    writer: Option<JournalWriter>,
+    judge: RunJudge,
+    guard: FloodGuard,
+    /// Whether what others do was left out once; it is said once.
+    leaves_out: bool,
+}
+
+impl Recorder {
+    /// Begins with `RunBegun`; after the records of a run that broke off, where there is one.
+    pub fn begin(
+        rules: &Rules,
+        mut writer: Option<JournalWriter>,
+        earlier: Option<Journal>,
+        first: Occurrence,
+    ) -> Result<Self, RecordError> {
+        let mut journal = earlier.unwrap_or_default();
+        let before = match journal.entries() {
+            [] => None,
+            entries => Some(judged(rules, entries)?),
+        };
+        let mut guard = FloodGuard::default();
+        for entry in journal.entries() {
+            guard.observe_earlier(entry);
+        }
+        let entry = journal.append(first);
+        if let Some(writer) = &mut writer {
+            writer.write(&entry.record)?;
+        }
+        let mut judge = match before {
+            Some(before) => before.resumed(&entry)?,
+            None => RunJudge::begin(rules, &entry)?,
+        };
+        judge.observe(&entry)?;
+        guard.observe(&entry);
+        Ok(Self {
+            journal,
+            writer,
+            judge,
+            guard,
+            leaves_out: false,
+        })
+    }
+
+    /// Records one occurrence: file first, then the judge. Of clients that are not the device only so much is recorded; what
+    /// is left out comes back with the number of the last record.
+    pub fn record(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
+        if self.guard.is_beset(occurrence.at.moment) && self.judge.can_do_without(&occurrence) {
+            let last = self.journal.entries().last().map_or(0, |entry| entry.seq());
+            if !std::mem::replace(&mut self.leaves_out, true) {
+                let text = "clients that are not the device do more than is recorded; until they do less, what has nothing to do \
+                            with the device is left out"
+                    .to_owned();
+                self.append(Occurrence::harness(occurrence.at, Event::Note { text }))?;
+            }
+            return Ok(Entry::new(occurrence.numbered(last)));
+        }
+        self.append(occurrence)
+    }
+
+    fn append(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
+        let entry = self.journal.append(occurrence);
+        if let Some(writer) = &mut self.writer {
+            writer.write(&entry.record)?;
+        }
+        self.judge.observe(&entry)?;
+        if self.judge.has_left_out() {
+            self.guard.observe_other(&entry);
+        } else {
+            self.guard.observe(&entry);
+        }
+        Ok(entry)
+    }
+
+    /// Why the run has to end, when the device sends more than can be kept.
+    pub fn flood(&self) -> Option<&str> {
+        self.guard.over()
+    }
+
+    /// The judge of this run.
+    pub fn judge(&self) -> &RunJudge {
+        &self.judge
+    }
+
+    /// The records so far.
+    pub fn journal(&self) -> &Journal {
+        &self.journal
+    }
+
+    /// Makes sure the file is on the disk.
+    pub fn sync(&self) -> Result<(), RecordError> {
+        self.writer
+            .as_ref()
+            .map_or(Ok(()), JournalWriter::sync)
+            .map_err(RecordError::Write)
+    }
+}

@@ -1,0 +1,184 @@
+//! The append-only record of everything that happened in a run; the only input of the judge.
+//!
+//! [`event`] says what can be recorded, [`Journal`] keeps the records in order in memory, [`file`] writes
+//! them through as JSON Lines and reads them back. What the records *mean* is left to the judge.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod direction;
+pub mod event;
+mod fault;
+pub mod file;
+pub mod json;
+mod packet;
+mod payload;
+pub mod place;
+mod plan;
+mod read;
+mod serving;
+mod vantage;
+mod waiver;
+
+use std::borrow::Cow;
+use std::sync::{Arc, OnceLock};
+
+use serde_json::Value;
+use tck_view::{MessageView, Names, Topic};
+
+pub use event::{Direction, Event, Packet, Payload, Record, Source, Will};
+pub use json::Parsed;
+pub use plan::tool;
+use read::Read;
+pub use serving::ServeBehaviour;
+pub use vantage::Vantage;
+
+use tck_base::clock::Stamp;
+
+/// One record together with the one parse and the one reading of its payload.
+#[derive(Debug)]
+pub struct Entry {
+    /// The record as it stands in the journal.
+    pub record: Record,
+    read: OnceLock<Arc<Read>>,
+    picture: OnceLock<Value>,
+}
+
+impl Entry {
+    /// Wraps a record; the payload is parsed when it is first asked for.
+    #[must_use]
+    pub fn new(record: Record) -> Arc<Self> {
+        Arc::new(Self {
+            record,
+            read: OnceLock::new(),
+            picture: OnceLock::new(),
+        })
+    }
+
+    /// Wraps another record of the same payload, which is not parsed or read again.
+    #[must_use]
+    pub fn beside(other: &Self, record: Record) -> Arc<Self> {
+        let entry = Self::new(record);
+        if let Some(read) = other.shared() {
+            // It is empty: nobody else has seen it yet.
+            let _ = entry.read.set(Arc::clone(read));
+        }
+        entry
+    }
+
+    /// The number of the record.
+    #[must_use]
+    pub fn seq(&self) -> u64 {
+        self.record.seq
+    }
+
+    /// When it happened.
+    #[must_use]
+    pub fn at(&self) -> Stamp {
+        self.record.at
+    }
+
+    /// What happened.
+    #[must_use]
+    pub fn event(&self) -> &Event {
+        &self.record.event
+    }
+
+    /// The MQTT application message this record carries, if it carries one: delivered to the harness,
+    /// sent by the harness, delivered to a fresh subscriber, or seen as PUBLISH at the tap.
+    #[must_use]
+    pub fn payload(&self) -> Option<&Payload> {
+        match &self.record.event {
+            Event::Message { payload, .. }
+            | Event::Sent { payload, .. }
+            | Event::Retained { payload, .. }
+            | Event::Packet {
+                packet: Packet::Publish { payload, .. },
+                ..
+            } => Some(payload),
+            _ => None,
+        }
+    }
+
+    /// The payload parsed as JSON, once.
+    #[must_use]
+    pub fn parsed(&self) -> Option<&Parsed> {
+        self.shared().map(|read| &read.parsed)
+    }
+
+    /// About how many bytes of memory its payload takes: its bytes, and the value they are parsed to, unless another record
+    /// has that already.
+    #[must_use]
+    pub fn held(&self) -> u64 {
+        let bytes = self.payload().map_or(0, |payload| payload.bytes().len() as u64);
+        let own = self.shared().filter(|read| Arc::strong_count(read) == 1);
+        bytes + own.map_or(0, |read| read.parsed.weight())
+    }
+
+    fn shared(&self) -> Option<&Arc<Read>> {
+        let payload = self.payload()?;
+        Some(self.read.get_or_init(|| Arc::new(Read::of(payload))))
+    }
+
+    /// The payload as a message of a topic, read once for a version's names of members; `None` when there is none or it is
+    /// not JSON.
+    #[must_use]
+    pub fn view(&self, topic: Topic, names: &Names) -> Option<&MessageView> {
+        self.shared()?.view(topic, names)
+    }
+
+    /// The payload as a JSON value; `None` when there is none or it is not JSON.
+    #[must_use]
+    pub fn json(&self) -> Option<&Value> {
+        self.parsed()?.value()
+    }
+
+    /// What patterns match against: the JSON payload of a message, or the JSON picture of a packet,
+    /// a map download or any other event.
+    #[must_use]
+    pub fn subject(&self) -> Option<Cow<'_, Value>> {
+        match &self.record.event {
+            Event::Message { .. } | Event::Sent { .. } | Event::Retained { .. } => self.json().map(Cow::Borrowed),
+            event => Some(Cow::Borrowed(self.picture.get_or_init(|| event.picture()))),
+        }
+    }
+}
+
+/// The records of a run, in order.
+#[derive(Clone, Debug, Default)]
+pub struct Journal {
+    entries: Vec<Arc<Entry>>,
+}
+
+impl Journal {
+    /// An empty journal.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Appends what happened, giving it the next number (counted from 1).
+    pub fn append(&mut self, occurrence: event::Occurrence) -> Arc<Entry> {
+        let seq = self.entries.len() as u64 + 1;
+        let entry = Entry::new(occurrence.numbered(seq));
+        self.entries.push(Arc::clone(&entry));
+        entry
+    }
+
+    /// Takes over a record that already has its number, when reading a journal back.
+    pub fn restore(&mut self, record: Record) {
+        self.entries.push(Entry::new(record));
+    }
+
+    /// All records so far.
+    #[must_use]
+    pub fn entries(&self) -> &[Arc<Entry>] {
+        &self.entries
+    }
+
+    /// The record with a number.
+    #[must_use]
+    pub fn get(&self, seq: u64) -> Option<&Arc<Entry>> {
+        let at = self.entries.binary_search_by_key(&seq, |entry| entry.seq()).ok()?;
+        self.entries.get(at)
+    }
+}

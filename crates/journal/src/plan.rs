@@ -1,0 +1,124 @@
+//! What a run is about, and what it is going to do.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// One effective setting and where it came from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Setting {
+    /// Name, such as `time.react`.
+    pub name: String,
+    /// Value as text.
+    pub value: String,
+    /// `flag`, `environment`, a file name, or `default`.
+    pub origin: String,
+}
+
+/// Name and version of this program.
+#[must_use]
+pub fn tool() -> String {
+    concat!("vda5050-tck ", env!("CARGO_PKG_VERSION")).to_owned()
+}
+
+/// What the run is about; the first record of every journal.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub struct RunHeader {
+    /// `vda5050-tck.journal/1`.
+    pub format: String,
+    /// Name and version of the tool.
+    pub tool: String,
+    /// Identifier of the run.
+    pub run: String,
+    /// `certify` when nothing was left to choose; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
+    /// `agv` or `master-control`.
+    pub role: String,
+    /// Protocol version the device is judged by, such as `2.1.0`.
+    pub protocol: String,
+    /// Manufacturer of the device.
+    pub manufacturer: String,
+    /// Serial number of the device.
+    pub serial_number: String,
+    /// Full topic by topic name; of the first vehicle when a master control is tested.
+    pub topics: std::collections::BTreeMap<String, String>,
+    /// The mock AGVs of the harness, first the one that tests talk about. Empty when an AGV is tested.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub vehicles: Vec<MockVehicle>,
+    /// `tap` or `subscriber`.
+    pub vantage: String,
+    /// SHA-256 over suites, schemas and requirements.
+    pub suites: String,
+    /// Whether suites were replaced by `--suites`.
+    pub modified: bool,
+    /// Values that are the same for every test: `time.*`, `device.*`.
+    pub bindings: Map<String, Value>,
+    /// Effective settings: name, value, origin.
+    pub settings: Vec<Setting>,
+    /// The command line as typed, passwords left out.
+    pub command: Vec<String>,
+}
+
+/// A mock AGV that a master control is tested with.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub struct MockVehicle {
+    /// Manufacturer, as in its topics and headers.
+    pub manufacturer: String,
+    /// Serial number, as in its topics and headers.
+    pub serial_number: String,
+    /// Full topic by topic name.
+    pub topics: std::collections::BTreeMap<String, String>,
+}
+
+/// What a run is going to do, and why it leaves things out.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub struct Plan {
+    /// The selected tests, in the order they will run.
+    pub tests: Vec<PlannedTest>,
+    /// What the device can do, and who says so.
+    pub capabilities: Vec<Capability>,
+    /// What restricts the statement, one sentence each.
+    pub limits: Vec<String>,
+    /// Deviations the profile declares: requirement id to reason.
+    pub deviations: std::collections::BTreeMap<String, String>,
+    /// Series name of the factsheet.
+    pub series_name: Option<String>,
+    /// Whether every test of the suites was selected.
+    pub complete: bool,
+}
+
+/// One test of a plan.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct PlannedTest {
+    /// Id.
+    pub test: String,
+    /// What becomes of it.
+    pub gate: Gate,
+}
+
+/// Whether a test runs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gate {
+    /// It runs.
+    Runs,
+    /// The device declares that it lacks what the test needs.
+    NotApplicable(String),
+    /// The bench, the profile or the device leaves open what the test needs.
+    Unobservable(String),
+}
+
+/// A capability and its source.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Capability {
+    /// Name, such as `action downloadMap INSTANT`.
+    pub name: String,
+    /// `yes`, `no`, or a value.
+    pub value: String,
+    /// `factsheet`, `profile`, or both when they contradict each other.
+    pub source: String,
+}

@@ -1,0 +1,159 @@
+//! One client on the tap, and what it looks like.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use tck_journal::Entry;
+use tck_journal::event::Packet;
+
+/// How many entries of a bystander are kept, in case it turns out to be the device.
+const HELD: usize = 16;
+/// How many topics of a stranger are named.
+const TOPICS: usize = 4;
+
+/// Whose a connection is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Who {
+    /// The device's, as far as is known.
+    Device,
+    /// Somebody's who does nothing the device does.
+    Bystander,
+    /// Somebody's who does what only the device, or only its master control, may.
+    Stranger,
+}
+
+/// What a CONNECT says of the program behind it. Two connections of one program look alike.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Look {
+    level: u8,
+    keep_alive: u16,
+    clean_session: bool,
+    username: Option<String>,
+    /// The topic of its will.
+    pub will: Option<String>,
+}
+
+impl Look {
+    /// Of a CONNECT packet.
+    pub fn of(packet: &Packet) -> Self {
+        let Packet::Connect {
+            level,
+            keep_alive,
+            clean_session,
+            username,
+            will,
+            ..
+        } = packet
+        else {
+            return Self::default();
+        };
+        Self {
+            level: *level,
+            keep_alive: *keep_alive,
+            clean_session: *clean_session,
+            username: username.clone(),
+            will: will.as_ref().map(|will| will.topic.clone()),
+        }
+    }
+}
+
+/// An open connection.
+#[derive(Debug)]
+pub(super) struct Client {
+    pub id: String,
+    pub peer: String,
+    pub look: Look,
+    pub who: Who,
+    /// The topics of the device it publishes on.
+    pub publishes: BTreeSet<String>,
+    /// Whether it subscribes to just what is sent to the device.
+    pub listens: bool,
+    /// The journal number of its CONNECT.
+    pub seq: u64,
+    /// What was left out of it.
+    pub held: Vec<Arc<Entry>>,
+}
+
+impl Client {
+    pub fn new(id: &str, peer: String, look: Look, who: Who, seq: u64) -> Self {
+        Self {
+            id: id.to_owned(),
+            peer,
+            look,
+            who,
+            publishes: BTreeSet::new(),
+            listens: false,
+            seq,
+            held: Vec::new(),
+        }
+    }
+
+    /// Keeps what is left out.
+    pub fn hold(&mut self, entry: &Arc<Entry>) {
+        if self.who == Who::Bystander && self.held.len() < HELD {
+            self.held.push(Arc::clone(entry));
+        }
+    }
+}
+
+/// Somebody who is not the device.
+#[derive(Debug)]
+pub(super) struct Stranger {
+    peer: String,
+    first: u64,
+    messages: u64,
+    topics: BTreeSet<String>,
+    pub takeovers: u64,
+}
+
+impl Stranger {
+    /// First seen at an address, with this journal number.
+    pub fn new(peer: &str, first: u64) -> Self {
+        Self {
+            peer: peer.to_owned(),
+            first,
+            messages: 0,
+            topics: BTreeSet::new(),
+            takeovers: 0,
+        }
+    }
+
+    /// It has published on a topic.
+    pub fn publishes(&mut self, topic: &str) {
+        self.messages += 1;
+        if self.topics.len() < TOPICS {
+            self.topics.insert(topic.to_owned());
+        }
+    }
+
+    /// Whether it did what may show in the findings.
+    pub fn is_busy(&self) -> bool {
+        self.messages > 0 || self.takeovers > 0
+    }
+
+    /// The limit that it sets to the statement.
+    pub fn in_words(&self, id: &str) -> String {
+        let mut did = Vec::new();
+        if self.takeovers > 0 {
+            did.push(format!(
+                "took the client id of the device, which was thrown out, {} time(s)",
+                self.takeovers
+            ));
+        }
+        if self.messages > 0 {
+            let topics: Vec<&str> = self.topics.iter().map(String::as_str).collect();
+            did.push(format!(
+                "published {} message(s) on {}",
+                self.messages,
+                topics.join(", ")
+            ));
+        }
+        format!(
+            "The client {id:?} at {}, which is not the device, {} (from #{} on). What it sent was not judged, and what it may \
+             have caused is held against nobody.",
+            self.peer,
+            did.join(", and "),
+            self.first
+        )
+    }
+}

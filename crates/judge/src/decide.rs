@@ -1,0 +1,53 @@
+//! From "it holds or it does not" to a verdict.
+//!
+//! `shall` broken is a fail, `should` broken a warning; a ruling of the catalogue, or coming late, is a
+//! warning; what could not be observed is inconclusive. A requirement the protocol version does not have
+//! is not judged at all.
+
+use tck_base::diagnostic::Diagnostic;
+use tck_base::verdict::Verdict;
+use tck_pack::{Catalogue, Mood, Pack, Requirement};
+use tck_result::{Decision, Waited};
+
+use super::step::{Clause, Holds};
+
+/// The mood of a requirement in this version; `None` when the version does not have it.
+pub(super) fn mood<'a>(catalogue: &'a Catalogue, pack: &Pack, id: &str) -> Option<(&'a Requirement, Mood)> {
+    let requirement = catalogue.get(id)?;
+    let note = requirement.in_version(pack)?;
+    Some((requirement, note.mood))
+}
+
+/// Turns a clause into a decision; `None` when the version does not have the requirement.
+pub(super) fn decide(
+    clause: Clause,
+    path: &str,
+    waited: Option<Waited>,
+    catalogue: &Catalogue,
+    pack: &Pack,
+) -> Option<Decision> {
+    let (requirement, mood) = mood(catalogue, pack, clause.requirement.as_str())?;
+    let verdict = match &clause.holds {
+        Holds::Yes => Verdict::Pass,
+        Holds::Late | Holds::Softly => Verdict::Warning,
+        Holds::No => mood.broken(),
+        Holds::Unseen(_) => Verdict::Inconclusive,
+    };
+    let broken = matches!(clause.holds, Holds::No | Holds::Softly | Holds::Late);
+    let explanation = broken.then(|| explain(&clause));
+    let (word, place) = (format!("{path}.{}", clause.word), clause.span.place());
+    let mut decision = Decision::new(clause.requirement.as_str(), verdict, word, place, clause.message);
+    decision.witness = clause.witness;
+    decision.expected = clause.expected;
+    decision.nearest = clause.nearest;
+    decision.waited = waited.filter(|_| broken);
+    decision.explanation = explanation;
+    decision.interpretation = requirement.interpretation.clone().filter(|_| broken);
+    Some(decision)
+}
+
+/// The clause with a caret. What was awaited, the nearest miss and the next command stand in the decision itself;
+/// the renderings put them below.
+fn explain(clause: &Clause) -> String {
+    Diagnostic::new("", clause.span.clone(), "", clause.label.clone()).render_place()
+}

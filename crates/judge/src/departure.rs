@@ -1,0 +1,110 @@
+//! Whether the device left during a test of its own accord, as it does when it crashes.
+
+use tck_journal::Entry;
+use tck_journal::event::{Close, Event, LinkFault};
+
+/// Watches the connection of the device through one test.
+#[derive(Debug, Default)]
+pub(super) struct Departure {
+    /// The harness disturbed the link, or somebody did something to the device: a close proves nothing.
+    disturbed: bool,
+    /// The device said DISCONNECT.
+    announced: bool,
+    last_sent: Option<u64>,
+    /// Close of the connection, and the message sent last before it.
+    left: Option<(u64, Option<u64>)>,
+}
+
+impl Departure {
+    pub(super) fn observe(&mut self, entry: &Entry, subject: Option<&str>) {
+        match entry.event() {
+            Event::Fault { fault } if !matches!(fault, LinkFault::Restore) => self.disturbed = true,
+            Event::Hook { .. } | Event::Vehicle { .. } => self.disturbed = true,
+            Event::Sent { .. } => self.last_sent = Some(entry.seq()),
+            Event::Closed {
+                how: Close::DeviceFin | Close::DeviceReset,
+                ..
+            } if !self.disturbed && !self.announced && self.left.is_none() => {
+                self.left = Some((entry.seq(), self.last_sent));
+            }
+            _ if subject == Some("mqtt/connect") => self.announced = false,
+            _ if subject == Some("mqtt/disconnect") => self.announced = true,
+            _ => {}
+        }
+    }
+
+    /// What happened, if the device left.
+    pub(super) fn story(&self) -> Option<String> {
+        let (closed, sent) = self.left?;
+        Some(match sent {
+            Some(sent) => {
+                format!("the device closed its connection without DISCONNECT (#{closed}) after it was sent #{sent}")
+            }
+            None => format!("the device closed its connection without DISCONNECT (#{closed})"),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tck_base::clock::{Moment, Stamp};
+    use tck_journal::Journal;
+    use tck_journal::event::{Direction, Occurrence, Packet, Payload, Source};
+
+    fn story(events: &[Event]) -> Option<String> {
+        let mut journal = Journal::new();
+        let mut departure = Departure::default();
+        for event in events {
+            let is_disconnect = matches!(event, Event::Packet { .. });
+            let entry = journal.append(Occurrence {
+                at: Stamp {
+                    moment: Moment::START,
+                    utc: jiff::Timestamp::UNIX_EPOCH,
+                },
+                source: Source::Tap,
+                direction: is_disconnect.then_some(Direction::FromDevice),
+                event: event.clone(),
+            });
+            departure.observe(&entry, is_disconnect.then_some("mqtt/disconnect"));
+        }
+        departure.story()
+    }
+
+    fn sent() -> Event {
+        Event::Sent {
+            topic: "order".to_owned(),
+            qos: 0,
+            retain: false,
+            payload: Payload::keep(bytes::Bytes::from_static(b"{}")),
+        }
+    }
+
+    const CLOSED: Event = Event::Closed {
+        connection: 1,
+        how: Close::DeviceFin,
+    };
+
+    #[test]
+    fn a_device_that_leaves_without_a_word_is_named_with_what_it_was_sent() {
+        let story = story(&[sent(), CLOSED]).unwrap();
+        assert!(story.contains("after it was sent #"), "{story}");
+    }
+
+    #[test]
+    fn a_device_that_says_goodbye_has_not_crashed() {
+        let goodbye = Event::Packet {
+            connection: 1,
+            packet: Packet::Disconnect { code: 0 },
+        };
+        assert_eq!(story(&[sent(), goodbye, CLOSED]), None);
+    }
+
+    #[test]
+    fn a_close_after_the_harness_disturbed_the_link_proves_nothing() {
+        let fault = Event::Fault {
+            fault: LinkFault::Cut { reset: false },
+        };
+        assert_eq!(story(&[sent(), fault, CLOSED]), None);
+    }
+}

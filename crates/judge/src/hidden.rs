@@ -1,0 +1,182 @@
+//! What a broken report hides.
+//!
+//! A state that forgets the name of its order, or leaves out actions that are done, cannot show what most tests wait
+//! for, nor can an instantActions message without its list. The device is guilty of that, once; whether it did what it
+//! was told could not be observed. A monitor names the members it speaks for under `hides:`, and what was missed there
+//! is inconclusive in the tests it found something in. Which monitors do so is data.
+
+use tck_result::Waited;
+
+use super::step::{Clause, Holds, Timing};
+
+/// A clause of a step that has ended, not decided yet.
+pub(super) struct Open {
+    /// How it came out.
+    pub clause: Clause,
+    /// The step.
+    pub path: String,
+    /// Whether the step follows an action.
+    pub walks: bool,
+    /// The last entry of the step.
+    pub ended: u64,
+    /// What was waited for.
+    pub waited: Option<Waited>,
+    /// The vehicle has reported a new error since the message the step is about: it says itself that it did not obey.
+    pub refused: bool,
+    /// What it says about time, if it is a finding about time.
+    pub of_time: Option<Timing>,
+}
+
+/// A member of a message that shows nothing in a test.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Hidden {
+    /// The member.
+    pub member: String,
+    /// Who found it.
+    pub monitor: String,
+    /// What is broken.
+    pub requirement: String,
+    /// The requirements of the monitor, which are decided all the same.
+    pub decides: Vec<String>,
+    /// The entry that showed it first in this test.
+    pub seq: u64,
+    /// It is known from before this test: where the member shows nothing, it shows nothing in any message.
+    pub lasting: bool,
+}
+
+impl Hidden {
+    /// Whether this was waited for in vain where nothing is shown. A step that is about the member is decided all the
+    /// same, and so is what a message shows that did come.
+    fn hides(&self, open: &Open, about: &[String]) -> bool {
+        let Some(nearest) = &open.clause.nearest else {
+            return false;
+        };
+        let member = nearest.path.split(['.', '[']).next();
+        let shows_nothing = matches!(nearest.found.as_str(), "\"\"" | "0" | "nothing");
+        let is_unseen = match self.lasting {
+            // What is known to be forgotten at times is seen whenever it is shown.
+            true => shows_nothing,
+            false => open.clause.witness.is_none() || open.walks,
+        };
+        matches!(open.clause.holds, Holds::No | Holds::Softly | Holds::Late)
+            && is_unseen
+            && member == Some(self.member.as_str())
+            && !self.decides.iter().any(|id| about.contains(id))
+            && self.seq <= open.ended
+            && !(open.refused && open.clause.holds == Holds::No && open.clause.witness.is_none())
+    }
+}
+
+/// Marks as unseen what rests on members that show nothing; says so in one line if there is any.
+pub(super) fn hide(all: &mut [Open], hidden: &[Hidden]) -> Option<String> {
+    if hidden.is_empty() {
+        return None;
+    }
+    let mut told = None;
+    let ids: Vec<(String, &'static str, String)> = all
+        .iter()
+        .map(|open| {
+            let requirement = open.clause.requirement.as_str().to_owned();
+            (open.path.clone(), open.clause.word, requirement)
+        })
+        .collect();
+    for open in all {
+        let same = ids
+            .iter()
+            .filter(|(path, word, _)| *path == open.path && *word == open.clause.word);
+        let about: Vec<String> = same.map(|(_, _, id)| id.clone()).collect();
+        let Some(hidden) = hidden.iter().find(|hidden| hidden.hides(open, &about)) else {
+            continue;
+        };
+        let why = format!(
+            "the messages do not show `{}` as they must (#{}: {} is broken, found by {})",
+            hidden.member, hidden.seq, hidden.requirement, hidden.monitor
+        );
+        open.clause.holds = Holds::Unseen(why.clone());
+        open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+        told.get_or_insert(why);
+    }
+    told
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tck_base::diagnostic::{Source, Span};
+    use tck_pack::RequirementId;
+    use tck_result::NearestMiss;
+
+    fn clause(requirement: &str, path: &str) -> Open {
+        let nearest = NearestMiss {
+            seq: 20,
+            path: path.to_owned(),
+            found: String::new(),
+            expected: String::new(),
+        };
+        Open {
+            clause: Clause {
+                requirement: RequirementId::from(requirement),
+                word: "checks",
+                span: Span::new(&Source::new("test", ""), 0, 0),
+                label: String::new(),
+                holds: Holds::No,
+                witness: None,
+                message: "nothing came".to_owned(),
+                expected: None,
+                nearest: Some(nearest),
+            },
+            path: "steps[1]".to_owned(),
+            walks: false,
+            ended: 30,
+            waited: None,
+            of_time: None,
+            refused: false,
+        }
+    }
+
+    fn is_hidden(open: Open, found: u64) -> bool {
+        first_is_hidden(&mut [open], found)
+    }
+
+    fn first_is_hidden(all: &mut [Open], found: u64) -> bool {
+        let hidden = [Hidden {
+            member: "orderId".to_owned(),
+            monitor: "state/order-kept".to_owned(),
+            requirement: "STATE-MSG-02".to_owned(),
+            decides: vec!["STATE-MSG-02".to_owned()],
+            seq: found,
+            lasting: false,
+        }];
+        hide(all, &hidden);
+        matches!(all[0].clause.holds, Holds::Unseen(_))
+    }
+
+    #[test]
+    fn what_was_missed_where_nothing_is_shown_is_unseen() {
+        assert!(is_hidden(clause("ORD-06", "orderId"), 15));
+        assert!(is_hidden(clause("ORD-06", "orderId[0].x"), 15));
+    }
+
+    #[test]
+    fn anything_else_stays_as_it_was() {
+        assert!(!is_hidden(clause("ORD-06", "lastNodeId"), 15));
+        assert!(!is_hidden(clause("STATE-MSG-02", "orderId"), 15));
+        assert!(!is_hidden(clause("ORD-06", "orderId"), 31));
+        let mut came = clause("ORD-06", "orderId");
+        came.clause.witness = Some(20);
+        assert!(!is_hidden(came, 15));
+    }
+
+    #[test]
+    fn what_the_vehicle_says_it_refused_is_seen() {
+        let mut refused = clause("ORD-06", "orderId");
+        refused.refused = true;
+        assert!(!is_hidden(refused, 15));
+    }
+
+    #[test]
+    fn a_step_about_the_member_itself_is_decided() {
+        let mut step = [clause("MQTT-10", "orderId"), clause("STATE-MSG-02", "orderId")];
+        assert!(!first_is_hidden(&mut step, 15));
+    }
+}

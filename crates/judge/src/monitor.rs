@@ -1,0 +1,345 @@
+//! Always-on checks, judged on everything that happens in a run.
+//!
+//! A monitor's findings are kept once per requirement and verdict, with a count and the first occurrences,
+//! not as noise in every test.
+
+use std::sync::Arc;
+
+use serde_json::Map;
+
+use super::decide::mood;
+use super::hidden::Hidden;
+use super::holds::unbound_text;
+use super::step::shown_path;
+use super::test::Ground;
+use tck_base::clock::Moment;
+use tck_base::pattern::{Bindings, Bound, Unbound};
+use tck_base::verdict::{Accumulated, Verdict};
+use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
+use tck_journal::Entry;
+use tck_journal::event::Event;
+use tck_result::{MonitorFinding, MonitorResult};
+use tck_suite::model::{Monitor, Need, Rule};
+
+/// How many occurrences of a finding are kept by number.
+pub(super) const FIRST: usize = 5;
+/// How many different findings a monitor keeps.
+const DIFFERENT: usize = 64;
+
+/// A monitor on duty.
+pub struct MonitorJudge {
+    monitor: Arc<Monitor>,
+    rule: Watching,
+    judged: u64,
+    /// What requirements are about, and has not come by yet.
+    unseen: Vec<Awaited>,
+    findings: Vec<MonitorFinding>,
+    /// Why it cannot be judged, though it should be: a variable without a value.
+    open: Option<String>,
+    /// The first fail since the running test began: requirement and entry.
+    broken: Option<(String, u64)>,
+    /// The requirement of the first fail of the run.
+    accuses: Option<String>,
+}
+
+/// A message without which nothing is known of a requirement.
+struct Awaited {
+    requirement: String,
+    topic: String,
+    pattern: Bound,
+}
+
+enum Watching {
+    Pattern {
+        topic: String,
+        when: Option<Bound>,
+        pattern: Bound,
+        forbidden: bool,
+    },
+    Check {
+        running: Box<dyn Running>,
+        with: Map<String, serde_json::Value>,
+    },
+    /// Something it needs is not there: judges nothing.
+    Off,
+}
+
+impl MonitorJudge {
+    /// Puts a monitor on duty; `None` when it is not meant for this version.
+    pub fn start(monitor: &Arc<Monitor>, ground: &Ground, bindings: &Bindings, tap: bool) -> Option<Self> {
+        let wanted = monitor
+            .checks
+            .iter()
+            .any(|binding| mood(&ground.catalogue, &ground.pack, binding.requirement.as_str()).is_some());
+        if !monitor.spec.contains(ground.pack.version) || !wanted {
+            return None;
+        }
+        let mut open = None;
+        let rule = if monitor.needs.contains(&Need::Tap) && !tap {
+            Watching::Off
+        } else {
+            Self::watch(&monitor.rule, ground, bindings).unwrap_or_else(|unbound| {
+                open = Some(unbound_text(&unbound));
+                Watching::Off
+            })
+        };
+        let about = monitor.about.iter().filter_map(|about| {
+            Some(Awaited {
+                requirement: about.requirement.requirement.as_str().to_owned(),
+                topic: about.topic.clone(),
+                pattern: about.pattern.bind(bindings).ok()?,
+            })
+        });
+        Some(Self {
+            unseen: about.collect(),
+            open,
+            monitor: Arc::clone(monitor),
+            rule,
+            judged: 0,
+            findings: Vec::new(),
+            broken: None,
+            accuses: None,
+        })
+    }
+
+    fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings) -> Result<Watching, Unbound> {
+        Ok(match rule {
+            Rule::Always { topic, when, pattern } => Watching::Pattern {
+                topic: topic.clone(),
+                when: when.as_ref().map(|when| when.bind(bindings)).transpose()?,
+                pattern: pattern.bind(bindings)?,
+                forbidden: false,
+            },
+            Rule::Never { topic, pattern } => Watching::Pattern {
+                topic: topic.clone(),
+                when: None,
+                pattern: pattern.bind(bindings)?,
+                forbidden: true,
+            },
+            Rule::Check(check) => {
+                let Some(definition) = find(ground.checks, &check.name) else {
+                    return Ok(Watching::Off);
+                };
+                let mut with = Map::new();
+                for (name, term) in &check.with {
+                    with.insert(name.clone(), term.bind(bindings)?);
+                }
+                Watching::Check {
+                    running: (definition.start)(&context(ground, &with, &Shared::default())),
+                    with,
+                }
+            }
+        })
+    }
+
+    /// Shows it one entry.
+    pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground, shared: &Shared) {
+        if matches!(entry.event(), Event::TestBegun { .. }) {
+            self.broken = None;
+        }
+        self.see(entry, subject);
+        let mut found = Vec::new();
+        match &mut self.rule {
+            Watching::Off => {}
+            Watching::Check { running, with } => {
+                if running.observe(entry, &context(ground, with, shared), &mut found) {
+                    self.judged += 1;
+                }
+            }
+            Watching::Pattern {
+                topic,
+                when,
+                pattern,
+                forbidden,
+            } => {
+                // What was stored before the run is not this run's evidence.
+                let stale = matches!(entry.event(), Event::Message { retain: true, .. });
+                if subject != Some(topic.as_str()) || stale {
+                    return;
+                }
+                let Some(message) = entry.subject() else { return };
+                if when.as_ref().is_some_and(|when| !when.matches(&message, None)) {
+                    return;
+                }
+                self.judged += 1;
+                if pattern.matches(&message, None) == *forbidden {
+                    found.push(CheckFinding {
+                        requirement: None,
+                        verdict: None,
+                        seq: entry.seq(),
+                        message: miss(pattern, &message, *forbidden),
+                    });
+                }
+            }
+        }
+        self.keep(found, ground);
+    }
+
+    /// Notes what came by of what requirements are about.
+    fn see(&mut self, entry: &Entry, subject: Option<&str>) {
+        let (false, Some(subject)) = (self.unseen.is_empty(), subject) else {
+            return;
+        };
+        if matches!(entry.event(), Event::Message { retain: true, .. }) {
+            return;
+        }
+        let Some(message) = entry.subject() else { return };
+        self.unseen
+            .retain(|awaited| awaited.topic != subject || !awaited.pattern.matches(&message, None));
+    }
+
+    /// The requirements it is bound to and had something to judge of.
+    pub(super) fn judged(&self) -> Vec<String> {
+        if self.judged == 0 {
+            return Vec::new();
+        }
+        let bound = self.monitor.checks.iter().map(|binding| binding.requirement.as_str());
+        let seen = bound.filter(|id| !self.unseen.iter().any(|awaited| awaited.requirement == *id));
+        seen.map(str::to_owned).collect()
+    }
+
+    /// Takes what was found since it was taken last.
+    pub(super) fn take(&mut self) -> Vec<MonitorFinding> {
+        std::mem::take(&mut self.findings)
+    }
+
+    /// Why nothing of it can be judged, though it should be.
+    pub(super) fn open(&self) -> Option<&str> {
+        self.open.as_deref()
+    }
+
+    /// The run has ended.
+    pub fn finish(&mut self, end: Moment, ground: &Ground, shared: &Shared) {
+        let mut found = Vec::new();
+        if let Watching::Check { running, with } = &mut self.rule {
+            running.finish(end, &context(ground, with, shared), &mut found);
+        }
+        self.keep(found, ground);
+    }
+
+    fn keep(&mut self, found: Vec<CheckFinding>, ground: &Ground) {
+        for finding in found {
+            let id = finding
+                .requirement
+                .as_ref()
+                .or_else(|| self.monitor.checks.first().map(|binding| &binding.requirement));
+            let Some(id) = id else { continue };
+            let Some((requirement, mood)) = mood(&ground.catalogue, &ground.pack, id.as_str()) else {
+                continue;
+            };
+            let verdict = finding.verdict.unwrap_or_else(|| mood.broken());
+            if verdict == Verdict::Pass {
+                continue;
+            }
+            let (verdict, message) = match &ground.interference {
+                Some(why) if verdict == Verdict::Fail => (
+                    Verdict::Inconclusive,
+                    format!("cannot be told, since {why}; {}", finding.message),
+                ),
+                _ => (verdict, finding.message),
+            };
+            if verdict == Verdict::Fail && self.broken.is_none() && !self.monitor.hides.is_empty() {
+                self.broken = Some((id.as_str().to_owned(), finding.seq));
+                self.accuses.get_or_insert_with(|| id.as_str().to_owned());
+            }
+            let known = self
+                .findings
+                .iter_mut()
+                .find(|known| known.requirement == id.as_str() && known.verdict == verdict);
+            if let Some(known) = known {
+                known.count += 1;
+                if known.first.len() < FIRST && !known.first.contains(&finding.seq) {
+                    known.first.push(finding.seq);
+                }
+            } else if self.findings.len() < DIFFERENT {
+                self.findings.push(MonitorFinding {
+                    requirement: id.as_str().to_owned(),
+                    verdict,
+                    count: 1,
+                    first: vec![finding.seq],
+                    message,
+                    interpretation: requirement.interpretation.clone(),
+                });
+            }
+        }
+    }
+
+    /// What it has to say.
+    pub fn result(&self) -> MonitorResult {
+        let mut verdict: Accumulated = self.findings.iter().map(|finding| finding.verdict).collect();
+        if self.judged > 0 {
+            verdict.add(Verdict::Pass);
+        }
+        if self.open.is_some() {
+            verdict.add(Verdict::Inconclusive);
+        }
+        MonitorResult {
+            id: self.monitor.id.clone(),
+            title: self.monitor.title.clone(),
+            verdict: verdict.get(),
+            judged: self.judged,
+            findings: self.findings.clone(),
+        }
+    }
+
+    /// What shows nothing in the running test for what was found in it.
+    pub(super) fn hidden(&self) -> Vec<Hidden> {
+        let Some((requirement, seq)) = &self.broken else {
+            return Vec::new();
+        };
+        let decides = self.monitor.checks.iter();
+        let decides: Vec<String> = decides.map(|binding| binding.requirement.as_str().to_owned()).collect();
+        let members = self.monitor.hides.iter();
+        members
+            .map(|member| Hidden {
+                member: member.clone(),
+                monitor: self.monitor.id.clone(),
+                requirement: requirement.clone(),
+                decides: decides.clone(),
+                seq: *seq,
+                lasting: false,
+            })
+            .collect()
+    }
+
+    /// The members that show nothing for what was found in this run, with the requirement.
+    pub(super) fn accused(&self) -> Vec<(String, String)> {
+        let Some(requirement) = &self.accuses else {
+            return Vec::new();
+        };
+        let members = self.monitor.hides.iter();
+        members.map(|member| (member.clone(), requirement.clone())).collect()
+    }
+
+    /// The monitor.
+    pub fn monitor(&self) -> &Arc<Monitor> {
+        &self.monitor
+    }
+}
+
+fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String {
+    if forbidden {
+        return format!("matches {}, which must not come", pattern.describe());
+    }
+    match pattern.examine(message, None).misses.first() {
+        Some(miss) => format!(
+            "{} is {}, expected {}",
+            shown_path(&miss.path),
+            miss.found,
+            miss.expected
+        ),
+        None => format!("does not match {}", pattern.describe()),
+    }
+}
+
+fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>, shared: &'a Shared) -> CheckContext<'a> {
+    CheckContext {
+        pack: &ground.pack,
+        topics: &ground.topics,
+        role: ground.role,
+        identity: (&ground.identity.0, &ground.identity.1),
+        with,
+        bindings: &ground.bindings,
+        shared,
+    }
+}

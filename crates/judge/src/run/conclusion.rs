@@ -1,0 +1,249 @@
+//! What came out of a run: tests, requirements and the verdict over all, as they stand at any time.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::super::company::Company;
+use super::super::decide::mood;
+use super::super::joined;
+use super::super::opinions::Opinions;
+use super::super::said;
+use super::super::watches::Watched;
+use super::RunJudge;
+use tck_base::verdict::{Accumulated, Verdict};
+use tck_journal::event::Gate;
+use tck_pack::Decided;
+use tck_result::{Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult};
+use tck_suite::model::Test;
+
+/// Format of `result.json`.
+pub const RESULT_FORMAT: &str = "vda5050-tck.result/1";
+
+impl RunJudge {
+    /// The tests that were planned, as this run and the one before it left them: what was run, in the order of the suites,
+    /// and then what was not.
+    pub(super) fn tests(&self) -> Vec<TestResult> {
+        let mut tests = if self.is_stranger {
+            Vec::new()
+        } else {
+            let mut tests = joined::repetitions(&self.done);
+            tests.extend(self.set_aside());
+            tests
+        };
+        if let Some(earlier) = &self.earlier {
+            tests = joined::tests(earlier.tests(), tests);
+        }
+        // Which order they were run in is the harness's own business.
+        let suites = self.rules.suites.tests.iter().enumerate();
+        let places: BTreeMap<&str, usize> = suites.map(|(at, test)| (test.id.as_str(), at)).collect();
+        tests.sort_by_key(|test| match test.journal {
+            Some(_) => (false, places.get(test.id.as_str()).copied()),
+            None => (true, None),
+        });
+        tests
+    }
+
+    /// The result as it stands.
+    pub fn result(&self) -> RunResult {
+        let tests = self.tests();
+        let watched = self.watched();
+        let all = tests
+            .iter()
+            .filter_map(|test| test.verdict)
+            .chain(watched.iter().filter_map(|watched| watched.result.verdict));
+        let verdict: Accumulated = all.collect();
+        // Monitors alone make no device conform when tests were planned and none of them applied.
+        let none_applied = !tests.is_empty() && tests.iter().all(|test| test.verdict.is_none());
+        let verdict = verdict
+            .get()
+            .filter(|verdict| !none_applied || *verdict > Verdict::Warning);
+        let (partial, reason) = match &self.end {
+            Some((partial, reason)) => (*partial, reason.clone()),
+            None => (true, Some("the run has not ended yet".to_owned())),
+        };
+        // Nobody knows what the rest would have shown. A failure stands on its evidence.
+        let unknown = (partial && !self.is_stranger).then_some(Verdict::Inconclusive);
+        let verdict = verdict.into_iter().chain(unknown).collect::<Accumulated>().get();
+        let header = &self.header;
+        let joined = self.joined();
+        let fleet = match &self.earlier {
+            Some(earlier) => self.reactions.after(&earlier.reactions).result(),
+            None => self.reactions.result(),
+        };
+        RunResult {
+            format: RESULT_FORMAT.to_owned(),
+            tool: header.tool.clone(),
+            run: header.run.clone(),
+            mode: header.mode.clone(),
+            started: format!("{:.3}", self.begun.utc),
+            seconds: joined.iter().map(|run| run.seconds).sum::<f64>()
+                + self.last.moment.since(self.begun.moment).as_secs_f64(),
+            role: header.role.clone(),
+            protocol: header.protocol.clone(),
+            partial,
+            partial_reason: reason.filter(|_| partial),
+            verdict,
+            device: DeviceIdentity {
+                manufacturer: header.manufacturer.clone(),
+                serial_number: header.serial_number.clone(),
+                series_name: self.plan.series_name.clone(),
+            },
+            vantage: header.vantage.clone(),
+            suites_sha256: header.suites.clone(),
+            suites_modified: header.modified,
+            journal: "journal.jsonl".to_owned(),
+            joined,
+            requirements: self.requirements(&tests, &watched),
+            exploration: said::exploration(&self.rules.suites.tests, &tests, self.role),
+            tests,
+            monitors: watched.into_iter().map(|watched| watched.result).collect(),
+            capabilities: self
+                .plan
+                .capabilities
+                .iter()
+                .map(|capability| Capability {
+                    name: capability.name.clone(),
+                    value: capability.value.clone(),
+                    source: capability.source.clone(),
+                })
+                .collect(),
+            fleet,
+            limits: self.limits(),
+            deviations: self.plan.deviations.clone(),
+            settings: header.settings.clone(),
+        }
+    }
+
+    /// What restricts the statement, the harness's own lag included.
+    fn limits(&self) -> Vec<String> {
+        let mut limits = self.plan.limits.clone();
+        let lag = self.timeline.longest_lag();
+        if !lag.is_zero() {
+            limits.push(format!(
+                "The harness itself was held up for up to {:.1} s; what that can explain was not held against the device.",
+                lag.as_secs_f64()
+            ));
+        }
+        limits.extend(self.company.iter().flat_map(Company::limits));
+        let before = self.earlier.iter().flat_map(|earlier| earlier.limits());
+        let before: Vec<String> = before.filter(|limit| !limits.contains(limit)).collect();
+        limits.extend(before);
+        limits
+    }
+
+    /// The planned tests that did not run, with the reason.
+    fn set_aside(&self) -> Vec<TestResult> {
+        let mut all = Vec::new();
+        for planned in &self.plan.tests {
+            if self.done.iter().any(|done| done.id == planned.test) {
+                continue;
+            }
+            let Some(test) = self.test(&planned.test) else { continue };
+            let mut result = TestResult {
+                id: test.id.clone(),
+                title: test.title.clone(),
+                verdict: None,
+                not_applicable: None,
+                seconds: 0.0,
+                reason: None,
+                maturity: test.maturity.word().to_owned(),
+                maturity_note: test.maturity.note().map(str::to_owned),
+                journal: None,
+                decisions: Vec::new(),
+                steps: Vec::new(),
+                allowances: Vec::new(),
+                repetitions: Vec::new(),
+            };
+            let why = match &planned.gate {
+                Gate::NotApplicable(why) => {
+                    result.not_applicable = Some(why.clone());
+                    all.push(result);
+                    continue;
+                }
+                Gate::Unobservable(why) => why.clone(),
+                Gate::Runs if self.end.is_some() => "the run ended before this test".to_owned(),
+                Gate::Runs => continue,
+            };
+            result.verdict = Some(Verdict::Inconclusive);
+            for step in &test.steps {
+                for (requirement, clause) in step.clauses() {
+                    if mood(&self.ground.catalogue, &self.ground.pack, requirement.as_str()).is_some() {
+                        result
+                            .decisions
+                            .push(undecided(requirement.as_str(), clause, step.verb_span.place(), &why));
+                    }
+                }
+            }
+            result.reason = Some(why);
+            all.push(result);
+        }
+        all
+    }
+
+    fn requirements(&self, tests: &[TestResult], watched: &[Watched]) -> Vec<RequirementResult> {
+        let mut decided: BTreeMap<&str, Opinions> = BTreeMap::new();
+        for test in tests {
+            for decision in &test.decisions {
+                let opinions = decided.entry(decision.requirement.as_str()).or_default();
+                opinions.add(decision.verdict(), &test.id, test.journal.is_some());
+            }
+        }
+        let monitored: Vec<(String, Vec<(String, Verdict)>)> = watched
+            .iter()
+            .map(|watched| (watched.result.id.clone(), watched.decisions()))
+            .collect();
+        for (id, decisions) in &monitored {
+            for (requirement, verdict) in decisions {
+                decided.entry(requirement.as_str()).or_default().add(*verdict, id, true);
+            }
+        }
+        let mut all = Vec::new();
+        for requirement in self.rules.catalogue.all() {
+            if !requirement.role.concerns(self.role) || requirement.in_version(&self.ground.pack).is_none() {
+                continue;
+            }
+            let id = requirement.id.as_str();
+            let opinions = decided.remove(id).unwrap_or_default();
+            let verdict = opinions.verdict();
+            let not_decided = match verdict {
+                Some(_) => None,
+                None => Some(self.why_not(id, &requirement.decided, tests, watched)),
+            };
+            all.push(RequirementResult {
+                id: id.to_owned(),
+                verdict,
+                verdicts: opinions.verdicts(),
+                decided_by: opinions.by,
+                not_decided,
+            });
+        }
+        all
+    }
+
+    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult], watched: &[Watched]) -> String {
+        if let Decided::NotTestable { reason } = decided {
+            return format!("not testable: {reason}");
+        }
+        let deciding = self.rules.suites.deciding(id).iter();
+        let with_test: Vec<&Arc<Test>> = deciding.filter(|test| test.device == self.role).collect();
+        if with_test.is_empty() {
+            let monitored = watched
+                .iter()
+                .any(|w| w.monitor.checks.iter().any(|b| b.requirement.as_str() == id));
+            return if monitored {
+                "nothing came that could have been judged".to_owned()
+            } else {
+                "no test".to_owned()
+            };
+        }
+        let reason = with_test.iter().find_map(|test| {
+            let result = tests.iter().find(|result| result.id == test.id)?;
+            result.not_applicable.clone()
+        });
+        reason.map_or_else(|| "not selected".to_owned(), |why| format!("not applicable: {why}"))
+    }
+}
+
+fn undecided(requirement: &str, clause: String, place: String, why: &str) -> Decision {
+    Decision::new(requirement, Verdict::Inconclusive, clause, place, why.to_owned())
+}

@@ -1,0 +1,38 @@
+//! What an evaluator may look at.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
+use super::timeline::Timeline;
+use tck_base::pattern::Bindings;
+use tck_check::Check;
+use tck_journal::Entry;
+use tck_journal::event::Waiver;
+use tck_pack::{Pack, Role};
+
+/// Everything around a step.
+#[derive(Clone, Copy)]
+pub struct Scene<'a> {
+    /// The named checks.
+    pub checks: &'static [Check],
+    /// The protocol version.
+    pub pack: &'a Pack,
+    /// Full topic by topic name.
+    pub topics: &'a BTreeMap<String, String>,
+    /// The side under test.
+    pub role: Role,
+    /// Manufacturer and serial number.
+    pub identity: (&'a str, &'a str),
+    /// The run's own bindings: `time`, `device`.
+    pub run_bindings: &'a Map<String, Value>,
+    /// All variables of the test.
+    pub bindings: &'a Bindings,
+    /// By subject.
+    pub timeline: &'a Timeline,
+    /// All entries of the test so far.
+    pub entries: &'a [Arc<Entry>],
+    /// Lasting mistakes of the vehicle that do not stand in the way any more.
+    pub waivers: &'a [Waiver],
+}

@@ -1,0 +1,101 @@
+//! One side of recorded traffic, judged by monitors alone.
+//!
+//! Nothing is kept of what was seen but what the monitors remember, which is bounded, so traffic may go on for weeks.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::company::{Company, Part};
+use super::grounds::Grounds;
+use super::rules::{JudgeError, Rules};
+use super::test::Ground;
+use super::timeline::Timeline;
+use super::watches::{Observed, Watches};
+use tck_journal::Entry;
+use tck_journal::event::RunHeader;
+use tck_suite::model::Monitor;
+
+/// See the module.
+pub struct SideJudge {
+    ground: Ground,
+    timeline: Timeline,
+    watches: Watches,
+    /// Who is on the tap besides the device, where a journal tells.
+    company: Option<Company>,
+}
+
+impl SideJudge {
+    /// Puts the wanted monitors on duty.
+    pub fn begin(rules: &Rules, header: &RunHeader, wanted: &dyn Fn(&Monitor) -> bool) -> Result<Self, JudgeError> {
+        let Grounds { role, ground, vehicles } = Grounds::of(rules, header)?;
+        let monitors: Vec<&Arc<Monitor>> = rules
+            .suites
+            .monitors
+            .iter()
+            .filter(|monitor| monitor.device.is_none_or(|device| device == role) && wanted(monitor))
+            .collect();
+        let timeline = if header.vehicles.is_empty() {
+            Timeline::new(&header.topics)
+        } else {
+            Timeline::of_vehicles(&header.vehicles)
+        };
+        Ok(Self {
+            watches: Watches::begin(&monitors, &ground, vehicles, header.vantage == "tap"),
+            timeline,
+            ground,
+            company: None,
+        })
+    }
+
+    /// The same for the journal of a run, which tells who is on the tap besides the device: what bystanders do is not judged.
+    #[must_use]
+    pub fn among_others(mut self) -> Self {
+        self.company = Company::of(self.ground.role, &self.ground.topics, &self.ground.pack);
+        self
+    }
+
+    /// Shows it the next entry and takes what was found since.
+    pub fn observe(&mut self, entry: &Arc<Entry>) -> Vec<Observed> {
+        let mut part = Part::Judged;
+        if let Some(company) = &mut self.company {
+            part = company.observe(entry);
+            self.ground.interference = company.interference(entry.at().moment).cloned();
+        }
+        match part {
+            Part::Judged => self.judge(entry),
+            Part::Bystander => {}
+            Part::Joined(before) => {
+                for entry in &before {
+                    self.judge(entry);
+                }
+                self.judge(entry);
+            }
+        }
+        self.watches.take()
+    }
+
+    fn judge(&mut self, entry: &Arc<Entry>) {
+        let subject = self.timeline.subject_of(entry);
+        self.watches
+            .observe(entry, subject.as_deref(), &self.timeline, &self.ground);
+    }
+
+    /// The traffic is known to end here: takes what is found by that.
+    pub fn finish(&mut self, end: tck_base::clock::Moment) -> Vec<Observed> {
+        self.watches.finish(end, &self.ground);
+        self.watches.take()
+    }
+
+    /// How many entries each monitor has judged, by its id.
+    pub fn judged(&self) -> BTreeMap<String, u64> {
+        let results = self.watches.results().into_iter();
+        results
+            .map(|watched| (watched.result.id, watched.result.judged))
+            .collect()
+    }
+
+    /// The requirements of which something was judged, with the monitor.
+    pub fn decided(&self) -> Vec<(String, String)> {
+        self.watches.decided()
+    }
+}

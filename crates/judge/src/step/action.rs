@@ -1,0 +1,314 @@
+//! `action`: the action sent under a name walks through these statuses.
+
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use super::{Holds, Position, Progress, StepOutcome, Timing, backlog, bound_clauses, ids, limit, seconds};
+use crate::limit::Limit;
+use crate::mend::{Mends, is_lasting, status_meant};
+use crate::scene::Scene;
+use tck_base::clock::Moment;
+use tck_base::diagnostic::Span;
+use tck_journal::Entry;
+use tck_journal::event::Waiver;
+use tck_result::NearestMiss;
+use tck_suite::model::{ActionWalk, Step, Walk};
+
+/// The topic that reports action states.
+const TOPIC: &str = "state";
+
+pub(crate) struct Walking {
+    verb: ActionWalk,
+    span: Span,
+    position: Position,
+    id: String,
+    limit: Limit,
+    deadline: Moment,
+    through: Track,
+    tolerated: Option<Track>,
+    walked: Vec<String>,
+    last: Option<Arc<Entry>>,
+    seen: u64,
+    /// Actions that are known never to end, where nothing is decided.
+    waivers: Vec<Waiver>,
+    /// What stands in the way of reading its status as it is.
+    meant: Option<String>,
+    /// It is one of them.
+    lasting: bool,
+}
+
+/// Where on a walk an action can be.
+struct Track {
+    walk: Walk,
+    /// Indices of the stations it may stand on; empty when it has left the walk.
+    places: Vec<usize>,
+    begun: bool,
+}
+
+impl Track {
+    fn new(walk: &Walk) -> Self {
+        Self {
+            walk: walk.clone(),
+            places: Vec::new(),
+            begun: false,
+        }
+    }
+
+    fn step(&mut self, status: &str) {
+        let starts: Vec<usize> = if self.begun { self.places.clone() } else { vec![0] };
+        let inclusive = !self.begun;
+        self.begun = true;
+        let mut next = Vec::new();
+        for start in starts {
+            let from = if inclusive { start } else { start + 1 };
+            for at in from..self.walk.stations.len() {
+                let station = &self.walk.stations[at];
+                if station.statuses.iter().any(|allowed| allowed == status) && !next.contains(&at) {
+                    next.push(at);
+                }
+                if !station.optional {
+                    break;
+                }
+            }
+        }
+        self.places = next;
+    }
+
+    fn left(&self) -> bool {
+        self.begun && self.places.is_empty()
+    }
+
+    fn done(&self) -> bool {
+        self.places
+            .iter()
+            .any(|at| self.walk.stations[at + 1..].iter().all(|station| station.optional))
+    }
+}
+
+impl Walking {
+    pub(super) fn begin(verb: &ActionWalk, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+        let name = &verb.name;
+        let text = |what: &str| scene.bindings.get(&format!("{name}.{what}"));
+        let id = text("id").and_then(|value| value.as_str().map(str::to_owned));
+        let id = id.ok_or_else(|| format!("no action was sent as `{name}`"))?;
+        let sent = text("sent")
+            .and_then(serde_json::Value::as_u64)
+            .unwrap_or(position.test);
+        let limit = limit(&verb.within, scene)?;
+        let mut this = Self {
+            span: step.verb_span.clone(),
+            position,
+            id,
+            limit,
+            deadline: position.base + limit.hard,
+            through: Track::new(&verb.through),
+            tolerated: verb.tolerated.as_ref().map(Track::new),
+            verb: verb.clone(),
+            walked: Vec::new(),
+            last: None,
+            seen: 0,
+            waivers: Mends::of(scene.waivers, TOPIC, &ids(&verb.checks)).into_waivers(),
+            meant: None,
+            lasting: false,
+        };
+        for entry in backlog(scene.timeline, TOPIC, sent) {
+            this.look_at(&entry);
+        }
+        Ok(this)
+    }
+
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>) {
+        if subject == Some(TOPIC) {
+            self.look_at(entry);
+        }
+    }
+
+    fn look_at(&mut self, entry: &Arc<Entry>) {
+        if self.decided() || entry.at().moment > self.deadline {
+            return;
+        }
+        self.seen += 1;
+        let Some(status) = entry.json().and_then(|state| status_of(state, &self.id)) else {
+            return;
+        };
+        if self.walked.last().is_some_and(|last| last == status) {
+            return;
+        }
+        let mut shown = status.to_owned();
+        shown.truncate(shown.char_indices().nth(40).map_or(shown.len(), |(at, _)| at));
+        self.walked.push(shown);
+        self.last = Some(Arc::clone(entry));
+        let action = entry.json().and_then(|state| action_of(state, &self.id));
+        self.lasting = self.verb.checks.is_empty() && action.is_some_and(|action| is_lasting(action, &self.waivers));
+        let meant = status_meant(status, &self.waivers).map(|(meant, waiver)| (meant.to_owned(), waiver.why.clone()));
+        let status = meant.as_ref().map_or(status, |(meant, _)| meant.as_str());
+        self.through.step(status);
+        if let Some(tolerated) = &mut self.tolerated {
+            tolerated.step(status);
+        }
+        self.meant = meant.map(|(_, why)| why).or(self.meant.take());
+    }
+
+    fn decided(&self) -> bool {
+        let lost = self.through.left() && self.tolerated.as_ref().is_none_or(Track::left);
+        self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost || self.lasting
+    }
+
+    #[expect(clippy::unnecessary_wraps, reason = "the other evaluators may have none")]
+    pub(super) fn timing(&self) -> Option<Timing> {
+        let (since, limit) = (self.position.base, self.limit.soft);
+        match &self.last {
+            Some(last) if self.decided() => {
+                let at = last.at().moment;
+                Some(Timing::Late { since, at, limit })
+            }
+            _ => Some(Timing::Missed(self.deadline)),
+        }
+    }
+
+    pub(super) fn allowances(&self) -> Vec<String> {
+        let told = format!(
+            "it is not waited for that this action ends, which is {}",
+            self.walked.join(" -> ")
+        );
+        if self.lasting && !self.through.done() {
+            vec![told]
+        } else {
+            self.meant.iter().cloned().collect()
+        }
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        if self.decided() {
+            Progress::Decided
+        } else {
+            Progress::Pending(self.deadline)
+        }
+    }
+
+    pub(super) fn end(self, at: Moment, cut_short: Option<&str>) -> StepOutcome {
+        let seq = self.last.as_ref().map(|entry| entry.seq());
+        let walked = if self.walked.is_empty() {
+            "no status".to_owned()
+        } else {
+            self.walked.join(" -> ")
+        };
+        let waited = seconds(at.since(self.position.base));
+        let arrived = self
+            .last
+            .as_ref()
+            .map(|entry| entry.at().moment.since(self.position.base));
+        // It stopped on its way, as opposed to walking another one.
+        let stopped = !self.decided() && cut_short.is_none();
+        let (holds, message) = if self.through.done() {
+            match arrived.filter(|took| *took > self.limit.soft) {
+                Some(took) => (Holds::Late, format!("walked {walked}, after {}", seconds(took))),
+                None => (Holds::Yes, format!("walked {walked}")),
+            }
+        } else if self.lasting {
+            (Holds::Yes, format!("walked {walked}, and is known to go no further"))
+        } else if self.tolerated.as_ref().is_some_and(Track::done) {
+            (Holds::Softly, format!("walked {walked}, which a ruling tolerates"))
+        } else if let (true, Some(meant)) = (self.decided(), &self.meant) {
+            let why = format!("walked {walked}, which cannot be told, since {meant}");
+            (Holds::Unseen(why.clone()), why)
+        } else if self.decided() {
+            (Holds::No, format!("walked {walked}"))
+        } else if let Some(why) = cut_short {
+            (Holds::Unseen(why.to_owned()), why.to_owned())
+        } else if self.walked.is_empty() {
+            let message = format!(
+                "the action never showed up in actionStates ({} states within {waited})",
+                self.seen
+            );
+            (Holds::No, message)
+        } else {
+            (Holds::No, format!("walked {walked} and no further within {waited}"))
+        };
+        let mut clauses = bound_clauses(&self.verb.checks, "checks", &self.span, &holds, seq, &message);
+        for clause in &mut clauses {
+            clause.label = format!("walked {walked}");
+            clause.expected = Some(self.verb.through.text.clone());
+            clause.nearest = seq.filter(|_| stopped).map(|seq| NearestMiss {
+                seq,
+                path: "actionStates".to_owned(),
+                found: walked.clone(),
+                expected: self.verb.through.text.clone(),
+            });
+        }
+        let message_json = self.last.as_ref().and_then(|entry| entry.json());
+        let saves = self.verb.save.iter().filter_map(|(name, path)| {
+            let value = path.of(message_json?)?;
+            Some((name.clone(), value.clone()))
+        });
+        let fine = matches!(holds, Holds::Yes | Holds::Late | Holds::Softly);
+        StepOutcome {
+            reached: Some(if fine { Ok(()) } else { Err(message) }),
+            took: seq,
+            saves: saves.collect(),
+            clauses,
+            seen: self.seen,
+            allowances: Vec::new(),
+            timing: None,
+        }
+    }
+}
+
+fn action_of<'a>(state: &'a Value, id: &str) -> Option<&'a Value> {
+    let mut all = state.get("actionStates")?.as_array()?.iter();
+    all.find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))
+}
+
+fn status_of<'a>(state: &'a Value, id: &str) -> Option<&'a str> {
+    let one = action_of(state, id)?;
+    Some(one.get("actionStatus").and_then(Value::as_str).unwrap_or("no status"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tck_suite::model::Station;
+
+    fn walk(text: &str) -> Walk {
+        let station = |part: &str| Station {
+            optional: part.ends_with('?'),
+            statuses: part
+                .trim_end_matches('?')
+                .split('|')
+                .map(|one| one.trim().to_owned())
+                .collect(),
+        };
+        Walk {
+            stations: text.split("->").map(|part| station(part.trim())).collect(),
+            text: text.to_owned(),
+        }
+    }
+
+    fn track(text: &str, statuses: &[&str]) -> Track {
+        let mut track = Track::new(&walk(text));
+        for status in statuses {
+            track.step(status);
+        }
+        track
+    }
+
+    #[test]
+    fn optional_stations_may_be_skipped_and_others_not() {
+        let text = "WAITING? -> INITIALIZING? -> RUNNING -> FINISHED | FAILED";
+        assert!(track(text, &["RUNNING", "FINISHED"]).done());
+        assert!(track(text, &["WAITING", "INITIALIZING", "RUNNING", "FAILED"]).done());
+        assert!(track(text, &["WAITING", "FINISHED"]).left());
+        assert!(!track(text, &["WAITING", "RUNNING"]).done());
+        assert!(track(text, &["RUNNING", "WAITING"]).left());
+    }
+
+    #[test]
+    fn a_status_may_be_visited_twice_when_the_walk_says_so() {
+        let text = "RUNNING -> PAUSED? -> RUNNING? -> FINISHED";
+        assert!(track(text, &["RUNNING", "FINISHED"]).done());
+        assert!(track(text, &["RUNNING", "PAUSED", "RUNNING", "FINISHED"]).done());
+        assert!(track(text, &["RUNNING", "PAUSED", "FINISHED"]).done());
+        assert!(track(text, &["PAUSED"]).left());
+    }
+}

@@ -1,0 +1,125 @@
+//! Puts the bench up.
+
+use tokio::task::JoinSet;
+
+use super::MqttLink;
+use super::delivery::Delivery;
+use super::echo::Echo;
+use super::lag::watch_lag;
+use super::options::{BenchInfo, BenchOptions, BrokerChoice, tap_url};
+use super::standing::{listen, probe_topic, standing, without_echo, without_own_topics};
+use crate::bench::endpoint::Endpoint;
+use crate::bench::inbox::inbox;
+use crate::bench::{LinkError, tls};
+use crate::broker::{EmbeddedBroker, Tested, self_test};
+use crate::maps::MapServer;
+use crate::tap::{Tap, Upstream};
+use tck_journal::Vantage;
+
+/// Starts benches.
+pub struct MqttBench;
+
+impl MqttBench {
+    /// Starts broker, tap and map server, tests the broker, and connects. When it returns, the standing
+    /// subscription is acknowledged and the device may connect.
+    ///
+    /// # Errors
+    /// [`LinkError::Listen`] when a port is taken, [`LinkError::Broker`] when an external broker is not there,
+    /// [`LinkError::Setup`] when certificates do not work or the broker fails its self-test.
+    pub async fn start(options: BenchOptions) -> Result<(MqttLink, BenchInfo), LinkError> {
+        let (reporter, inbox) = inbox(options.clock);
+        let tls = options.tls.as_ref().map(tls::server).transpose()?;
+        let (embedded, endpoint) = match &options.broker {
+            BrokerChoice::Embedded => {
+                let broker = EmbeddedBroker::start().await?;
+                let endpoint = Endpoint::plain(broker.address());
+                (Some(broker), endpoint)
+            }
+            BrokerChoice::External {
+                url,
+                authority,
+                credentials,
+            } => (None, Endpoint::parse(url, authority.as_deref(), credentials.clone())?),
+        };
+        let upstream = Upstream {
+            broker: endpoint.clone(),
+            embedded: embedded.is_some(),
+        };
+        let maps = MapServer::start(&options.maps_listen, options.maps_host.as_deref(), reporter.clone()).await?;
+        let mut limits = match self_test(&endpoint, &options.own).await? {
+            Tested::Keeps => Vec::new(),
+            Tested::Forbids(what) => vec![without_own_topics(&what, &endpoint, &options)],
+        };
+        let has_own_topics = limits.is_empty();
+        let run = uuid::Uuid::new_v4().simple().to_string();
+        // Known to nobody on the broker, so that nobody can take it.
+        let client_id = options.own.client("");
+        let probes = probe_topic(&options.own, &run);
+        let own_topic = has_own_topics.then(|| probes.clone());
+        let standing = standing(&endpoint, own_topic, &client_id, &options, &reporter).await?;
+        let mut tasks = JoinSet::new();
+        let echo = if embedded.is_some() || options.tap || options.harness_topics.is_empty() {
+            None
+        } else {
+            let echo = Echo::open(&endpoint, &options, &mut tasks).await?;
+            if echo.is_none() {
+                limits.push(without_echo(&endpoint, &options));
+            }
+            echo
+        };
+        // Last, so that nothing of the device can be missed.
+        let tap = if options.tap {
+            Some(Tap::start(&options.listen, tls, upstream, reporter.clone()).await?)
+        } else {
+            None
+        };
+        let info = BenchInfo {
+            device_address: tap
+                .as_ref()
+                .map_or_else(|| endpoint.address(), |tap| tap.address().to_string()),
+            device_url: tap
+                .as_ref()
+                .map_or_else(|| endpoint.url(), |tap| tap_url(tap.address(), options.tls.is_some())),
+            broker_address: endpoint.address(),
+            broker: Endpoint {
+                authority: options.authority.clone(),
+                ..endpoint.clone()
+            },
+            maps_address: maps.address(),
+            limits,
+        };
+        if let Some(broker) = &embedded {
+            let (mut ended, reporter, endpoint) = (broker.ended(), reporter.clone(), endpoint.clone());
+            tasks.spawn(async move {
+                if let Ok(reason) = ended.wait_for(Option::is_some).await {
+                    reporter.broken(endpoint.lost(reason.clone().unwrap_or_default()));
+                }
+            });
+        }
+        tasks.spawn(listen(standing.events, endpoint.clone(), probes, reporter.clone()));
+        tasks.spawn(watch_lag(reporter.clone()));
+        let link = MqttLink {
+            clock: options.clock,
+            vantage: if options.tap { Vantage::Tap } else { Vantage::Subscriber },
+            endpoint,
+            own: options.own,
+            delivery: (embedded.is_none() && options.tap).then(|| Delivery::new(options.device_topics.clone())),
+            echo,
+            device_topics: options.device_topics,
+            has_own_topics,
+            run,
+            client_id,
+            client: standing.client,
+            inbox,
+            reporter,
+            tap,
+            maps,
+            embedded,
+            tasks,
+            requests: 0,
+            probes: 0,
+            broken: None,
+        };
+        Ok((link, info))
+    }
+}

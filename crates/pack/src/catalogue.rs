@@ -1,0 +1,385 @@
+//! The catalogue of requirements: `suites/requirements/`, one file per group.
+//!
+//! Says what the standard demands, of whom and in which version. What decides a requirement is bound in the
+//! suites, never here.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::catalogue_file;
+use super::{Assets, Pack, Role};
+use tck_base::diagnostic::{Diagnostic, Source};
+use tck_base::verdict::Verdict;
+
+/// Id of a requirement, such as `ORD-REJ-03`. Never renumbered, never reused.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct RequirementId(std::sync::Arc<str>);
+
+impl RequirementId {
+    /// The id as text.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl From<&str> for RequirementId {
+    fn from(text: &str) -> Self {
+        Self(text.into())
+    }
+}
+
+impl std::fmt::Display for RequirementId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+/// How strongly the standard demands something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mood {
+    /// An obligation.
+    Shall,
+    /// A recommendation.
+    Should,
+    /// A permission.
+    May,
+}
+
+impl Mood {
+    /// The verdict on a device that breaks a requirement of this mood.
+    #[must_use]
+    pub fn broken(self) -> Verdict {
+        match self {
+            Self::Shall => Verdict::Fail,
+            Self::Should => Verdict::Warning,
+            Self::May => Verdict::Pass,
+        }
+    }
+
+    /// The word of the standard.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Shall => "shall",
+            Self::Should => "should",
+            Self::May => "may",
+        }
+    }
+}
+
+/// Who has to obey.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Subject {
+    /// The vehicle.
+    Agv,
+    /// The fleet manager.
+    MasterControl,
+    /// Both sides of the interface.
+    Both,
+    /// Whoever builds the site.
+    Integrator,
+    /// The MQTT broker.
+    Broker,
+}
+
+impl Subject {
+    /// Whether a device under test in this role has to obey.
+    #[must_use]
+    pub fn concerns(self, role: Role) -> bool {
+        match self {
+            Self::Agv => role == Role::Agv,
+            Self::MasterControl => role == Role::MasterControl,
+            Self::Both => true,
+            Self::Integrator | Self::Broker => false,
+        }
+    }
+
+    /// The word used in files and outputs.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Agv => "agv",
+            Self::MasterControl => "master-control",
+            Self::Both => "both",
+            Self::Integrator => "integrator",
+            Self::Broker => "broker",
+        }
+    }
+}
+
+/// How a requirement can be decided.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decided {
+    /// By a stimulus and its answer.
+    Active,
+    /// By watching traffic.
+    Passive,
+    /// With the help of a person or a hook.
+    Operator,
+    /// Not by any exchange of messages.
+    NotTestable {
+        /// Why not.
+        reason: String,
+    },
+}
+
+impl Decided {
+    /// The word used in files and outputs.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Active => "active",
+            Self::Passive => "passive",
+            Self::Operator => "operator",
+            Self::NotTestable { .. } => "not-testable",
+        }
+    }
+}
+
+/// What one protocol version says.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct VersionNote {
+    /// Section of that version's document.
+    pub section: String,
+    /// How strongly it is demanded there.
+    pub mood: Mood,
+}
+
+/// One obligation of the standard, in our words.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Requirement {
+    /// Its id.
+    pub id: RequirementId,
+    /// The id without its number: `ORD-REJ`.
+    pub group: String,
+    /// Title of the group: "Rejection reports".
+    pub chapter: String,
+    /// The obligation.
+    pub text: String,
+    /// Who has to obey.
+    pub role: Subject,
+    /// How it can be decided.
+    pub decided: Decided,
+    /// By pack id, what that version says. A version that is absent does not have the requirement.
+    pub versions: BTreeMap<String, VersionNote>,
+    /// How to provoke it.
+    pub stimulus: String,
+    /// What tells obedience from breach.
+    pub observe: String,
+    /// What a test of it needs, such as `layout` or `operator`.
+    pub needs: Vec<String>,
+    /// The ruling where the text is silent or contradicts itself.
+    pub interpretation: Option<String>,
+}
+
+impl Requirement {
+    /// What the version of `pack` says; `None` if it does not have the requirement.
+    #[must_use]
+    pub fn in_version(&self, pack: &Pack) -> Option<&VersionNote> {
+        self.versions.get(&pack.id)
+    }
+}
+
+/// All requirements.
+#[derive(Clone, Debug)]
+pub struct Catalogue {
+    requirements: Vec<Requirement>,
+    by_id: BTreeMap<RequirementId, usize>,
+}
+
+impl Catalogue {
+    /// Reads `suites/requirements/`.
+    ///
+    /// # Errors
+    /// Every mistake in the files, with its place; also when there are none.
+    pub fn load(assets: &Assets) -> Result<Self, Vec<Diagnostic>> {
+        let mut problems = Vec::new();
+        let mut chapters = Vec::new();
+        for file in assets.under("suites/requirements/") {
+            let source = Source::new(file.path.as_str(), file.text.as_str());
+            chapters.extend(catalogue_file::read(&source, &mut problems));
+        }
+        chapters.sort_by_key(|chapter| chapter.position);
+        let mut catalogue = Self {
+            requirements: Vec::new(),
+            by_id: BTreeMap::new(),
+        };
+        for (span, requirement) in chapters.into_iter().flat_map(|chapter| chapter.requirements) {
+            let at = catalogue.requirements.len();
+            if catalogue.by_id.insert(requirement.id.clone(), at).is_some() {
+                let title = format!("{} for a second time", requirement.id);
+                problems.push(
+                    Diagnostic::new("requirement-twice", span, title, "this id is taken")
+                        .hint("an id is never reused: take the next free number"),
+                );
+            }
+            catalogue.requirements.push(requirement);
+        }
+        if catalogue.requirements.is_empty() && problems.is_empty() {
+            problems.push(
+                Diagnostic::whole(
+                    "no-requirements",
+                    "there are no requirements under suites/requirements/",
+                )
+                .hint("a directory that replaces the suites needs a copy of that folder"),
+            );
+        }
+        if problems.is_empty() {
+            Ok(catalogue)
+        } else {
+            Err(problems)
+        }
+    }
+
+    /// The requirement with this id.
+    #[must_use]
+    pub fn get(&self, id: &str) -> Option<&Requirement> {
+        self.requirements.get(*self.by_id.get(&RequirementId::from(id))?)
+    }
+
+    /// All of them in the order of the catalogue: by chapter, then by number.
+    pub fn all(&self) -> impl Iterator<Item = &Requirement> {
+        self.requirements.iter()
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.requirements.len()
+    }
+
+    /// Whether there are none; a loaded catalogue never is.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.requirements.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Packs;
+    use std::collections::BTreeSet;
+
+    fn catalogue() -> Catalogue {
+        let loaded = Catalogue::load(&Assets::of_source_tree().unwrap());
+        loaded.unwrap_or_else(|problems| panic!("{}", problems.iter().map(ToString::to_string).collect::<String>()))
+    }
+
+    #[test]
+    fn all_requirements_are_there_once() {
+        let catalogue = catalogue();
+        assert_eq!(catalogue.len(), 350);
+        let ids: BTreeSet<_> = catalogue.all().map(|requirement| &requirement.id).collect();
+        assert_eq!(ids.len(), 350);
+        let count = |subject| {
+            catalogue
+                .all()
+                .filter(|requirement| requirement.role == subject)
+                .count()
+        };
+        assert_eq!(count(Subject::Agv), 246);
+        assert_eq!(count(Subject::MasterControl), 62);
+        assert_eq!(count(Subject::Both), 33);
+        assert_eq!(count(Subject::Integrator), 8);
+        assert_eq!(count(Subject::Broker), 1);
+    }
+
+    #[test]
+    fn moods_of_the_newest_version_are_counted() {
+        let (catalogue, packs) = (
+            catalogue(),
+            Packs::load(&Assets::of_source_tree().unwrap()).expect("packs"),
+        );
+        let count = |mood| {
+            catalogue
+                .all()
+                .filter_map(|requirement| requirement.in_version(packs.latest()))
+                .filter(|note| note.mood == mood)
+                .count()
+        };
+        assert_eq!(
+            (count(Mood::Shall), count(Mood::Should), count(Mood::May)),
+            (309, 35, 6)
+        );
+    }
+
+    #[test]
+    fn every_version_named_is_a_pack_and_the_oldest_lacks_what_came_later() {
+        let (catalogue, packs) = (
+            catalogue(),
+            Packs::load(&Assets::of_source_tree().unwrap()).expect("packs"),
+        );
+        for requirement in catalogue.all() {
+            for version in requirement.versions.keys() {
+                assert!(packs.all().iter().any(|pack| &pack.id == version), "{}", requirement.id);
+            }
+        }
+        let oldest = &packs.all()[0];
+        let later = catalogue.get("MAP-24").expect("enableMap");
+        assert!(later.in_version(oldest).is_none() && later.in_version(packs.latest()).is_some());
+        assert_eq!(
+            catalogue
+                .all()
+                .filter(|requirement| requirement.in_version(oldest).is_some())
+                .count(),
+            299
+        );
+        let retained = catalogue.get("CONN-06").expect("retain");
+        assert_eq!(retained.in_version(oldest).expect("older").mood, Mood::Should);
+        assert_eq!(retained.in_version(packs.latest()).expect("newer").mood, Mood::Shall);
+    }
+
+    #[test]
+    fn every_not_testable_requirement_says_why() {
+        let reasons: Vec<_> = catalogue()
+            .all()
+            .filter_map(|requirement| match &requirement.decided {
+                Decided::NotTestable { reason } => Some(reason.clone()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(reasons.len(), 6);
+        assert!(reasons.iter().all(|reason| reason.len() > 20));
+    }
+
+    #[test]
+    fn the_order_is_by_chapter_and_number() {
+        let catalogue = catalogue();
+        let ids: Vec<_> = catalogue.all().map(|requirement| requirement.id.as_str()).collect();
+        assert_eq!(ids[..2], ["MQTT-01", "MQTT-02"]);
+        assert!(ids[349].starts_with("BP-"));
+        let requirement = catalogue.get("ORD-REJ-03").expect("requirement");
+        assert_eq!(
+            (requirement.group.as_str(), requirement.chapter.as_str()),
+            ("ORD-REJ", "Rejection reports")
+        );
+        assert!(catalogue.get("ORD-REJ-99").is_none());
+    }
+
+    #[test]
+    fn a_mood_says_what_a_breach_costs_and_a_subject_whom_it_concerns() {
+        assert_eq!(Mood::Shall.broken(), Verdict::Fail);
+        assert_eq!(Mood::Should.broken(), Verdict::Warning);
+        assert_eq!(Mood::May.broken(), Verdict::Pass);
+        assert!(Subject::Both.concerns(Role::Agv) && Subject::Both.concerns(Role::MasterControl));
+        assert!(Subject::Agv.concerns(Role::Agv) && !Subject::Agv.concerns(Role::MasterControl));
+        assert!(!Subject::Broker.concerns(Role::Agv) && !Subject::Integrator.concerns(Role::MasterControl));
+    }
+
+    #[test]
+    fn a_directory_without_requirements_is_an_error() {
+        let dir = tempfile::tempdir().expect("directory");
+        let assets = Assets::of_source_tree()
+            .unwrap()
+            .with_suites(dir.path())
+            .expect("assets");
+        assert_eq!(Catalogue::load(&assets).expect_err("empty")[0].code, "no-requirements");
+    }
+}

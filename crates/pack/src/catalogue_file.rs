@@ -1,0 +1,271 @@
+//! One file of the catalogue: from a tree with places to typed requirements.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::de::DeserializeOwned;
+
+use super::{Decided, Requirement, RequirementId, VersionNote};
+use tck_base::diagnostic::{Diagnostic, Source, Span, did_you_mean};
+use tck_base::yaml::{self, Node};
+
+/// The requirements of one group, in the order written.
+pub(super) struct Chapter {
+    /// Place of the chapter in lists and reports.
+    pub position: u64,
+    /// Each with the place of its id.
+    pub requirements: Vec<(Span, Requirement)>,
+}
+
+/// Reads a file; mistakes are added to `problems`.
+pub(super) fn read(source: &Arc<Source>, problems: &mut Vec<Diagnostic>) -> Option<Chapter> {
+    let root = match yaml::tree(source) {
+        Ok(root) => root,
+        Err(mistakes) => {
+            problems.extend(mistakes);
+            return None;
+        }
+    };
+    let mut reader = Reader { problems };
+    reader.known(&root, &["group", "chapter", "position", "requirements"]);
+    let group = reader.text(&root, "group")?;
+    let chapter = reader.text(&root, "chapter")?;
+    let position = reader.member(&root, "position")?;
+    let Some(position) = yaml::value(position).as_u64() else {
+        reader.wrong(position, "a whole number");
+        return None;
+    };
+    let items = reader.list(&root, "requirements")?;
+    let requirements = items
+        .iter()
+        .filter_map(|item| reader.requirement(item, &group, &chapter))
+        .collect();
+    Some(Chapter { position, requirements })
+}
+
+struct Reader<'a> {
+    problems: &'a mut Vec<Diagnostic>,
+}
+
+const KEYS: [&str; 10] = [
+    "id",
+    "text",
+    "role",
+    "decided",
+    "reason",
+    "in",
+    "stimulus",
+    "observe",
+    "needs",
+    "interpretation",
+];
+
+impl Reader<'_> {
+    fn requirement(&mut self, node: &Node, group: &str, chapter: &str) -> Option<(Span, Requirement)> {
+        self.known(node, &KEYS);
+        let place = self.member(node, "id")?;
+        let id = self.text(node, "id")?;
+        let number = id.strip_prefix(group).and_then(|rest| rest.strip_prefix('-'));
+        if !number.is_some_and(|number| number.len() == 2 && number.bytes().all(|digit| digit.is_ascii_digit())) {
+            let title = format!("`{id}` is no id of the group {group}");
+            self.problem(place, &title, "not of the form GROUP-NN", &format!("write {group}-NN"));
+        }
+        let needs = self
+            .list(node, "needs")?
+            .iter()
+            .filter_map(|need| self.as_text(need))
+            .collect();
+        let requirement = Requirement {
+            id: RequirementId::from(id.as_str()),
+            group: group.to_owned(),
+            chapter: chapter.to_owned(),
+            text: self.text(node, "text")?,
+            role: self.choice(node, "role", &["agv", "master-control", "both", "integrator", "broker"])?,
+            decided: self.decided(node)?,
+            versions: self.versions(node)?,
+            stimulus: self.text(node, "stimulus")?,
+            observe: self.text(node, "observe")?,
+            needs,
+            interpretation: node.get("interpretation").and_then(|text| self.as_text(text)),
+        };
+        Some((place.span.clone(), requirement))
+    }
+
+    fn decided(&mut self, node: &Node) -> Option<Decided> {
+        let words = ["active", "passive", "operator", "not-testable"];
+        let word: String = self.choice(node, "decided", &words)?;
+        if word == "not-testable" {
+            let reason = self.text(node, "reason")?;
+            return Some(Decided::NotTestable { reason });
+        }
+        if let Some(reason) = node.get("reason") {
+            let hint = "only what is not testable needs a reason";
+            self.problem(reason, "a reason without need", "not expected here", hint);
+        }
+        Some(match word.as_str() {
+            "active" => Decided::Active,
+            "passive" => Decided::Passive,
+            _ => Decided::Operator,
+        })
+    }
+
+    fn versions(&mut self, node: &Node) -> Option<BTreeMap<String, VersionNote>> {
+        let place = self.member(node, "in")?;
+        let Some(entries) = place.map() else {
+            self.wrong(place, "a mapping from version to section and mood");
+            return None;
+        };
+        let mut versions = BTreeMap::new();
+        for (version, said) in entries {
+            self.known(said, &["section", "mood"]);
+            let said = VersionNote {
+                section: self.text(said, "section")?,
+                mood: self.choice(said, "mood", &["shall", "should", "may"])?,
+            };
+            versions.insert(version.text()?.to_owned(), said);
+        }
+        if versions.is_empty() {
+            self.problem(
+                place,
+                "in no version",
+                "empty",
+                "name the versions that have the requirement",
+            );
+        }
+        Some(versions)
+    }
+
+    fn member<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n Node> {
+        let found = node.get(key);
+        if found.is_none() {
+            let title = format!("`{key}` is missing");
+            self.problem(node, &title, "belongs here", &format!("add `{key}:`"));
+        }
+        found
+    }
+
+    fn text(&mut self, node: &Node, key: &str) -> Option<String> {
+        let member = self.member(node, key)?;
+        self.as_text(member)
+    }
+
+    fn as_text(&mut self, node: &Node) -> Option<String> {
+        match node.text().map(str::trim) {
+            Some(text) if !text.is_empty() => Some(text.to_owned()),
+            _ => {
+                self.wrong(node, "a text");
+                None
+            }
+        }
+    }
+
+    fn list<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n [Node]> {
+        let member = self.member(node, key)?;
+        if member.list().is_none() {
+            self.wrong(member, "a list");
+        }
+        member.list()
+    }
+
+    fn choice<T: DeserializeOwned>(&mut self, node: &Node, key: &str, words: &[&str]) -> Option<T> {
+        let member = self.member(node, key)?;
+        let word = self.as_text(member)?;
+        if !words.contains(&word.as_str()) {
+            let title = format!("`{word}` is not known for `{key}`");
+            self.problem(
+                member,
+                &title,
+                "unknown word",
+                &did_you_mean(&word, words.iter().copied()),
+            );
+            return None;
+        }
+        serde_json::from_value(word.into()).ok()
+    }
+
+    fn known(&mut self, node: &Node, keys: &[&str]) {
+        for (key, _) in node.map().unwrap_or_default() {
+            let name = key.text().unwrap_or_default();
+            if !keys.contains(&name) {
+                let title = format!("unknown key `{name}`");
+                self.problem(key, &title, "not known here", &did_you_mean(name, keys.iter().copied()));
+            }
+        }
+    }
+
+    fn wrong(&mut self, node: &Node, due: &str) {
+        let title = format!("{} where {due} is due", node.kind_word());
+        self.problem(node, &title, "of another kind", &format!("write {due}"));
+    }
+
+    fn problem(&mut self, node: &Node, title: &str, label: &str, hint: &str) {
+        self.problems
+            .push(Diagnostic::new("catalogue", node.span.clone(), title, label).hint(hint));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = r#"group: A-B
+chapter: Title
+position: 3
+requirements:
+  - id: A-B-01
+    text: Do it.
+    role: both
+    decided: not-testable
+    reason: Nobody sees it.
+    in: { "9.9": { section: "1", mood: may } }
+    stimulus: none needed
+    observe: nothing
+    needs: [layout]
+    interpretation: Free.
+"#;
+
+    fn titles(text: &str) -> Vec<String> {
+        let mut problems = Vec::new();
+        read(&Source::new("x.yaml", text), &mut problems);
+        problems.into_iter().map(|problem| problem.title).collect()
+    }
+
+    #[test]
+    fn a_good_file_is_read_whole() {
+        let mut problems = Vec::new();
+        let chapter = read(&Source::new("x.yaml", GOOD), &mut problems).expect("chapter");
+        assert!(problems.is_empty(), "{problems:?}");
+        assert_eq!(chapter.position, 3);
+        let (span, requirement) = &chapter.requirements[0];
+        assert_eq!(span.text(), "A-B-01");
+        assert_eq!(requirement.needs, ["layout"]);
+        assert_eq!(requirement.versions["9.9"].section, "1");
+        assert_eq!(requirement.interpretation.as_deref(), Some("Free."));
+        assert_eq!(requirement.decided.word(), "not-testable");
+    }
+
+    #[test]
+    fn every_mistake_is_named() {
+        for (good, bad, expected) in [
+            ("role: both", "role: agx", "`agx` is not known for `role`"),
+            ("    reason: Nobody sees it.\n", "", "`reason` is missing"),
+            ("decided: not-testable", "decided: active", "a reason without need"),
+            ("text: Do it.", "text: 5", "a number where a text is due"),
+            ("id: A-B-01", "id: A-C-01", "`A-C-01` is no id of the group A-B"),
+            ("id: A-B-01", "id: A-B-1", "`A-B-1` is no id of the group A-B"),
+            ("observe:", "observes:", "unknown key `observes`"),
+            ("mood: may", "mood: must", "`must` is not known for `mood`"),
+            ("needs: [layout]", "needs: layout", "a text where a list is due"),
+            (
+                "in: { \"9.9\": { section: \"1\", mood: may } }",
+                "in: {}",
+                "in no version",
+            ),
+            ("position: 3", "position: first", "a text where a whole number is due"),
+        ] {
+            let text = GOOD.replace(good, bad);
+            assert_ne!(text, GOOD);
+            assert_eq!(titles(&text).first().map(String::as_str), Some(expected), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! A protocol version as data, and the catalogue of requirements.
+//!
+//! A [`Pack`] is one folder of `schemas/`: six JSON schemas, `protocol.toml` and `vocabulary.yaml`. The
+//! [`Catalogue`] is `suites/requirements/`. Both come from [`Assets`], the embedded files
+//! or a replacement. Versions are data: no code below or above names one. What a message *means* is left to
+//! patterns, checks and the judge.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod assets;
+mod breakage;
+mod catalogue;
+mod catalogue_file;
+mod fields;
+mod participant;
+mod protocol;
+mod schema;
+mod shape;
+mod version;
+
+#[cfg(test)]
+mod tests;
+
+pub use assets::{AssetFile, Assets};
+pub use breakage::{Breakage, Ground, Way};
+pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionNote};
+pub use participant::Participant;
+pub use protocol::{Pack, PackError, Packs, TopicName, TopicRule};
+pub use schema::{Finding, FindingKind, MessageSchema};
+pub use shape::Shape;
+pub use version::{Version, VersionRange};
+
+/// The two sides of the interface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// The vehicle.
+    Agv,
+    /// The fleet manager.
+    MasterControl,
+}
+
+impl Role {
+    /// The word used in files and outputs.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Agv => "agv",
+            Self::MasterControl => "master-control",
+        }
+    }
+
+    /// The other side.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Agv => Self::MasterControl,
+            Self::MasterControl => Self::Agv,
+        }
+    }
+}
+
+impl std::fmt::Display for Role {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.word())
+    }
+}

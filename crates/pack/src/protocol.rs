@@ -1,0 +1,329 @@
+//! One protocol version, and all that are known.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use tck_view::Names;
+
+use super::fields::{self, FieldRule};
+use super::schema::FindingKind;
+use super::{AssetFile, Assets, MessageSchema, Role, Version};
+use tck_base::diagnostic::{Diagnostic, Source};
+use tck_base::yaml;
+
+/// Name of a topic of the protocol, the last level of the MQTT topic: `order`, `state` ….
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct TopicName(Arc<str>);
+
+impl TopicName {
+    /// The name as text.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl From<&str> for TopicName {
+    fn from(text: &str) -> Self {
+        Self(text.into())
+    }
+}
+
+impl fmt::Display for TopicName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+/// How a topic is published.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TopicRule {
+    /// Its name.
+    pub name: TopicName,
+    /// The side that publishes it.
+    pub publisher: Role,
+    /// MQTT quality of service.
+    pub qos: u8,
+    /// Whether it is published with the retain flag.
+    pub retain: bool,
+    /// Whether every implementation has it.
+    pub mandatory: bool,
+}
+
+/// `protocol.toml`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Protocol {
+    id: String,
+    version: String,
+    topic_template: String,
+    topic: Vec<TopicRule>,
+    features: BTreeMap<String, bool>,
+    fields: Vec<FieldRule>,
+    #[serde(default)]
+    members: Names,
+}
+
+/// One protocol version as data.
+#[derive(Debug)]
+pub struct Pack {
+    /// Folder name below `schemas/`, major and minor.
+    pub id: String,
+    /// The version written into headers.
+    pub version: Version,
+    topics: Vec<TopicRule>,
+    schemas: BTreeMap<String, MessageSchema>,
+    vocabulary: Value,
+    words: Arc<Map<String, Value>>,
+    topic_template: String,
+    features: BTreeMap<String, bool>,
+    fields: Vec<FieldRule>,
+    names: Names,
+}
+
+/// Why a pack could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PackError {
+    /// No folder below `schemas/` holds a `protocol.toml`.
+    #[error("there is no protocol version under schemas/")]
+    None,
+    /// A file a pack needs is not there.
+    #[error("{0} is missing")]
+    Missing(String),
+    /// `protocol.toml` cannot be read.
+    #[error("{path}: {message}")]
+    Protocol {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// `vocabulary.yaml` cannot be read.
+    #[error("{path} cannot be read: {}", .problems.first().map_or_else(String::new, |first| first.title.clone()))]
+    Vocabulary {
+        /// The file.
+        path: String,
+        /// What is wrong, with places.
+        problems: Vec<Diagnostic>,
+    },
+    /// A schema does not parse or compile.
+    #[error("{path} is not a schema: {message}")]
+    Schema {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+impl Pack {
+    fn load(assets: &Assets, file: &AssetFile) -> Result<Self, PackError> {
+        let wrong = |message: String| PackError::Protocol {
+            path: file.path.clone(),
+            message,
+        };
+        let folder = file.path.trim_end_matches("/protocol.toml");
+        let protocol: Protocol = toml::from_str(&file.text).map_err(|error| wrong(error.to_string()))?;
+        let version: Version = protocol.version.parse().map_err(wrong)?;
+        if folder != format!("schemas/{}", protocol.id) || protocol.id != format!("{}.{}", version.major, version.minor)
+        {
+            return Err(wrong("folder, id and version do not agree".to_owned()));
+        }
+        let mut schemas = BTreeMap::new();
+        for topic in &protocol.topic {
+            let path = format!("{folder}/{}.schema.json", topic.name);
+            let schema = read_schema(assets, &path)?;
+            schemas.insert(topic.name.to_string(), schema);
+        }
+        let vocabulary = read_vocabulary(assets, &format!("{folder}/vocabulary.yaml"))?;
+        let words = Map::from_iter([("vda".to_owned(), vocabulary.clone())]);
+        Ok(Self {
+            vocabulary,
+            words: Arc::new(words),
+            id: protocol.id,
+            version,
+            topics: protocol.topic,
+            schemas,
+            topic_template: protocol.topic_template,
+            features: protocol.features,
+            fields: protocol.fields,
+            names: protocol.members,
+        })
+    }
+
+    /// The topics of the protocol.
+    pub fn topics(&self) -> &[TopicRule] {
+        &self.topics
+    }
+
+    /// The topic called `name`.
+    #[must_use]
+    pub fn topic(&self, name: &str) -> Option<&TopicRule> {
+        self.topics.iter().find(|topic| topic.name.as_str() == name)
+    }
+
+    /// The schema of the messages of a topic.
+    #[must_use]
+    pub fn schema(&self, topic: &str) -> Option<&MessageSchema> {
+        self.schemas.get(topic)
+    }
+
+    /// `vocabulary.yaml`: the words of this version by meaning, such as `/error/outdatedUpdate`.
+    #[must_use]
+    pub fn vocabulary(&self) -> &Value {
+        &self.vocabulary
+    }
+
+    /// The vocabulary as the variable `vda` of every test and monitor.
+    #[must_use]
+    pub fn words(&self) -> Arc<Map<String, Value>> {
+        Arc::clone(&self.words)
+    }
+
+    /// One word of the vocabulary: `error.outdatedUpdate`. `None` if there is no such entry or it is not a text
+    /// (an error the version does not name is a partial error object, see [`Pack::vocabulary`]).
+    #[must_use]
+    pub fn word(&self, path: &str) -> Option<&str> {
+        path.split('.')
+            .try_fold(&self.vocabulary, |here, name| here.get(name))?
+            .as_str()
+    }
+
+    /// How a topic is named unless a profile says otherwise, with the placeholders `{majorVersion}`,
+    /// `{manufacturer}`, `{serialNumber}` and `{topic}`.
+    pub fn topic_template(&self) -> &str {
+        &self.topic_template
+    }
+
+    /// Fills the placeholders of a topic template. What is filled in is not searched for placeholders again, and
+    /// an unknown placeholder stays as it is.
+    #[must_use]
+    pub fn fill_topic(&self, template: &str, manufacturer: &str, serial_number: &str, topic: &str) -> String {
+        let major = self.version.major.to_string();
+        let values = [
+            ("{majorVersion}", major.as_str()),
+            ("{manufacturer}", manufacturer),
+            ("{serialNumber}", serial_number),
+            ("{topic}", topic),
+        ];
+        let mut filled = String::new();
+        let mut rest = template;
+        while let Some(at) = rest.find('{') {
+            let (before, from) = rest.split_at(at);
+            filled.push_str(before);
+            let known = values
+                .iter()
+                .find_map(|(name, value)| Some((value, from.strip_prefix(name)?)));
+            rest = if let Some((value, behind)) = known {
+                filled.push_str(value);
+                behind
+            } else {
+                filled.push('{');
+                &from[1..]
+            };
+        }
+        filled.push_str(rest);
+        filled
+    }
+
+    /// Which requirement a field of a message breaks that has such a mistake, beside those about types and values in general;
+    /// `None` where none does, or a check of its own judges the field.
+    #[must_use]
+    pub fn requirement_of(&self, topic: &str, path: &[&str], kind: FindingKind) -> Option<&str> {
+        fields::requirement(&self.fields, topic, path, kind)
+    }
+
+    /// The members and requirements that the table of fields names.
+    pub fn fields(&self) -> impl Iterator<Item = (Vec<&str>, Option<&str>)> {
+        self.fields
+            .iter()
+            .map(|rule| (rule.names().collect(), rule.requirement()))
+    }
+
+    /// What the version calls the members of messages (`[members]` of `protocol.toml`): what views are read by.
+    #[must_use]
+    pub fn names(&self) -> &Names {
+        &self.names
+    }
+
+    /// Whether the version has a feature (`[features]` of `protocol.toml`): what reference devices switch on.
+    #[must_use]
+    pub fn has(&self, feature: &str) -> bool {
+        self.features.get(feature).copied().unwrap_or(false)
+    }
+
+    /// All features with their settings, by name.
+    pub fn features(&self) -> impl Iterator<Item = (&str, bool)> {
+        self.features.iter().map(|(name, on)| (name.as_str(), *on))
+    }
+}
+
+fn read_schema(assets: &Assets, path: &str) -> Result<MessageSchema, PackError> {
+    let file = assets.get(path).ok_or_else(|| PackError::Missing(path.to_owned()))?;
+    serde_json::from_str(&file.text)
+        .map_err(|error| error.to_string())
+        .and_then(MessageSchema::compile)
+        .map_err(|message| PackError::Schema {
+            path: path.to_owned(),
+            message,
+        })
+}
+
+fn read_vocabulary(assets: &Assets, path: &str) -> Result<Value, PackError> {
+    let file = assets.get(path).ok_or_else(|| PackError::Missing(path.to_owned()))?;
+    yaml::tree(&Source::new(path, file.text.as_str()))
+        .map(|node| yaml::value(&node))
+        .map_err(|problems| PackError::Vocabulary {
+            path: path.to_owned(),
+            problems,
+        })
+}
+
+/// All protocol versions known.
+#[derive(Clone, Debug)]
+pub struct Packs {
+    /// By version, oldest first; never empty.
+    all: Vec<Arc<Pack>>,
+    latest: Arc<Pack>,
+}
+
+impl Packs {
+    /// Reads every folder of `schemas/` that has a `protocol.toml`.
+    ///
+    /// # Errors
+    /// There is none, or one is broken.
+    pub fn load(assets: &Assets) -> Result<Self, PackError> {
+        let mut all = assets
+            .under("schemas/")
+            .filter(|file| file.path.ends_with("/protocol.toml"))
+            .map(|file| Pack::load(assets, file).map(Arc::new))
+            .collect::<Result<Vec<_>, _>>()?;
+        all.sort_by_key(|pack| (pack.version.major, pack.version.minor));
+        let latest = all.last().cloned().ok_or(PackError::None)?;
+        Ok(Self { all, latest })
+    }
+
+    /// All of them, oldest first.
+    pub fn all(&self) -> &[Arc<Pack>] {
+        &self.all
+    }
+
+    /// The newest.
+    pub fn latest(&self) -> &Arc<Pack> {
+        &self.latest
+    }
+
+    /// The pack of a version, whatever its patch level.
+    #[must_use]
+    pub fn get(&self, version: &str) -> Option<&Arc<Pack>> {
+        let version: Version = version.parse().ok()?;
+        self.all
+            .iter()
+            .find(|pack| (pack.version.major, pack.version.minor) == (version.major, version.minor))
+    }
+}

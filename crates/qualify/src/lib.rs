@@ -1,0 +1,117 @@
+//! Proof of every check: it passes on the faultless reference device, and a named fault makes it fail.
+//!
+//! Qualification runs everything in virtual time without a fault. Each fault is then tried on the tests that are most
+//! likely to find it, and on more of them until one does ([`find`]). What is still unproven is tried with the faults
+//! that are about it, and at last with every fault ([`rest`]). What no fault fails, and which fault nothing finds, is
+//! said by name, unless the exceptions of the suites give the reason ([`outcome`]).
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod decider;
+mod find;
+mod kill;
+mod matrix;
+mod outcome;
+mod rest;
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+pub use decider::{Decider, decided};
+pub use kill::Kill;
+pub use outcome::Qualification;
+
+use self::decider::{blemishes_of, decided_in};
+use self::kill::{Grounds, Vehicle, each};
+use tck_engine::EngineError;
+use tck_judge::Library;
+use tck_pack::{Pack, Role};
+use tck_reference::Fault;
+use tck_run::{VirtualRun, run_silently};
+use tck_simulate::BuiltIn;
+use tck_suite::model::Test;
+
+/// What is drawn of the cases that come from a schema.
+const DRAWN: Option<u64> = Some(1);
+
+/// How far a qualification goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// Whether each fault is found.
+    Faults,
+    /// Also whether each clause and each monitor is failed by a fault.
+    Clauses,
+    /// Everything that a fault fails: each one is tried on every test.
+    Everything,
+}
+
+/// Qualifies some tests, all of one role, with these faults of its reference device.
+///
+/// # Errors
+/// When a run cannot be carried out.
+pub fn qualify(
+    library: &Library,
+    pack: &Pack,
+    tests: &[Arc<Test>],
+    faults: &[Fault],
+    depth: Depth,
+) -> Result<Qualification, EngineError> {
+    let role = tests.first().map_or(Role::Agv, |test| test.device);
+    let mut blemishes = Vec::new();
+    let mut deciders = BTreeSet::new();
+    let mut vehicles = Vec::new();
+    for device in BuiltIn::variants(role, pack) {
+        let mut request = VirtualRun {
+            device,
+            tests: tests.to_vec(),
+            ..VirtualRun::of_role(role, library, pack)
+        };
+        let result = run_silently(library, pack, request.clone())?.result;
+        blemishes.extend(blemishes_of(&result));
+        let all = decided_in(library, &result).into_iter().map(|(decider, _)| decider);
+        let own: BTreeSet<Decider> = all.filter(|decider| !deciders.contains(decider)).collect();
+        if !vehicles.is_empty() {
+            // What also runs on the usual vehicle is proven there.
+            let is_own = |id: &str| own.iter().any(|decider| decider.place.split(' ').next() == Some(id));
+            request.tests.retain(|test| is_own(test.table()));
+            request.complete = false;
+        }
+        vehicles.push(Vehicle {
+            request,
+            requirements: own.iter().map(|decider| decider.requirement.clone()).collect(),
+        });
+        deciders.extend(own);
+    }
+    let grounds = Grounds {
+        library,
+        pack,
+        vehicles,
+    };
+    let mut outcome = Qualification {
+        role,
+        is_latest: pack.id == library.rules.packs.latest().id,
+        blemishes,
+        deciders,
+        kills: Vec::new(),
+        exceptions: library.rules.suites.exceptions.of(role, pack.version),
+    };
+    // What breaks only obligations that this version does not have cannot show; whoever asks for it gets it tried.
+    let in_version = |id: &str| {
+        let requirement = library.rules.catalogue.get(id);
+        requirement.is_none_or(|requirement| requirement.in_version(pack).is_some())
+    };
+    let possible = |fault: &&Fault| depth == Depth::Everything || fault.breaks.iter().any(|id| in_version(id));
+    let faults: Vec<Fault> = faults.iter().filter(possible).copied().collect();
+    outcome.kills = match depth {
+        Depth::Everything => each(&faults, |fault| grounds.kill(fault, DRAWN, &|_| true))?,
+        Depth::Faults | Depth::Clauses if outcome.is_latest => {
+            each(&faults, |fault| find::find(&grounds, role, fault))?
+        }
+        // In an older version no fault has to be found; what it fails is seen when the clauses are proven.
+        Depth::Faults | Depth::Clauses => faults.iter().map(Kill::nothing).collect(),
+    };
+    if depth == Depth::Clauses {
+        rest::Rest::new(&grounds, &outcome.deciders, &outcome.exceptions).prove(&faults, &mut outcome.kills)?;
+    }
+    Ok(outcome)
+}

@@ -1,0 +1,126 @@
+//! Downloads of maps: one request to the server for each downloadMap action (section 6.7.3).
+//!
+//! A download without mapVersion is refused: one table asks for it, the text does not (the ruling of MAP-16). A hash is
+//! compared as the parties have agreed (that of MAP-34).
+
+use std::collections::BTreeMap;
+
+use crate::{Download, Output};
+
+use super::Agv;
+use super::actions::Status;
+use super::deeds::{Outcome, Problem};
+use super::maps;
+use super::points::{Event, Permission};
+
+/// Downloads under way: actionId by token.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Downloads {
+    under_way: BTreeMap<u64, String>,
+    next: u64,
+}
+
+impl Downloads {
+    /// Forgets the download of an action.
+    pub(crate) fn forget(&mut self, action_id: &str) {
+        self.under_way.retain(|_, id| id != action_id);
+    }
+
+    /// Whether none is under way.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.under_way.is_empty()
+    }
+
+    /// Forgets all downloads.
+    pub(crate) fn clear(&mut self) {
+        self.under_way.clear();
+    }
+}
+
+impl Agv {
+    /// A downloadMap action begins: asks for the file, if the map is new and there is room.
+    pub(crate) fn begin_download(&mut self, action_id: &str) -> Outcome {
+        let Some(action) = self.actions.get(action_id).cloned() else {
+            return Outcome::Open;
+        };
+        let (map_id, version, url) = (
+            action.text("mapId"),
+            action.text("mapVersion"),
+            action.text("mapDownloadLink"),
+        );
+        let under_way = self.downloads.under_way.values().filter_map(|id| self.actions.get(id));
+        let twice = under_way
+            .into_iter()
+            .any(|other| other.text("mapId") == map_id && other.text("mapVersion") == version);
+        let known = self.maps.has_version(map_id, version) && !self.allows(Permission::DownloadAgain, false);
+        let refusal = match () {
+            () if known => Some("the map is on board already"),
+            () if self.maps.is_full() => Some("there is no room for another map"),
+            () if twice => Some("the map is being downloaded already"),
+            () if map_id.is_empty() || version.is_empty() => Some("mapId or mapVersion is empty"),
+            () if !(url.starts_with("http://") || url.starts_with("https://")) => Some("the link is not HTTP"),
+            () => None,
+        };
+        if let Some(reason) = refusal {
+            return Outcome::Failed(Problem::map(&action, reason));
+        }
+        let token = self.downloads.next;
+        self.downloads.next += 1;
+        self.downloads.under_way.insert(token, action_id.to_owned());
+        let url = url.to_owned();
+        self.pending.push(Output::Fetch { token, url });
+        let due = self.moment() + self.config.download_timeout;
+        if let Some(action) = self.actions.get_mut(action_id) {
+            action.status = Status::Initializing;
+            action.due = Some(due);
+        }
+        Outcome::Open
+    }
+
+    /// The server was heard of.
+    pub(crate) fn download_progress(&mut self, token: u64, progress: Download) {
+        let Some(action_id) = self.downloads.under_way.get(&token).cloned() else {
+            return;
+        };
+        match progress {
+            Download::Begun => {
+                if let Some(action) = self.actions.get_mut(&action_id) {
+                    action.status = Status::Running;
+                }
+                self.happens(Event::DownloadRunning);
+            }
+            Download::Done(file) => self.download_done(&action_id, &file),
+            Download::Failed(reason) => {
+                let reason: String = reason.chars().take(200).collect();
+                self.download_failed(&action_id, &reason);
+            }
+        }
+    }
+
+    fn download_done(&mut self, action_id: &str, file: &[u8]) {
+        let Some(action) = self.actions.get(action_id).cloned() else {
+            return;
+        };
+        if file.is_empty() {
+            self.download_failed(action_id, "the file is empty");
+        } else if !maps::hash_fits(file, action.text("mapHash")) && self.allows(Permission::CheckHash, true) {
+            self.download_failed(action_id, "the file does not have the announced hash");
+        } else {
+            self.downloads.forget(action_id);
+            self.happens(Event::Downloaded);
+            self.maps.store(action.text("mapId"), action.text("mapVersion"));
+            let outcome = self.turned_out(&action, Outcome::Done(None));
+            self.conclude(action_id, outcome);
+        }
+    }
+
+    /// The map did not arrive; all else stays as it was (MAP-19, MAP-22).
+    pub(crate) fn download_failed(&mut self, action_id: &str, reason: &str) {
+        self.downloads.forget(action_id);
+        let Some(action) = self.actions.get(action_id).cloned() else {
+            return;
+        };
+        let outcome = self.turned_out(&action, Outcome::Failed(Problem::map(&action, reason)));
+        self.conclude(action_id, outcome);
+    }
+}

@@ -1,0 +1,132 @@
+//! The active errors of the vehicle and how long each of them is reported (sections 6.6.4 and 6.10.5).
+//!
+//! What was refused stays until a new order is accepted (the rulings of ORD-REJ-03 and ORD-REJ-08); every other error
+//! ends with its cause, or after a while where it has none that lasts.
+
+use serde_json::{Value, json};
+
+use tck_base::clock::Moment;
+
+/// At most this many errors are reported; older ones give way.
+pub(crate) const MAX_ERRORS: usize = 20;
+
+/// When an error ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Life {
+    /// When a new order is accepted (ORD-REJ-03, ORD-REJ-08).
+    UntilNewOrder,
+    /// At a time, or when a new order is accepted.
+    Until(Moment),
+    /// While the emergency stop is active.
+    WhileStopped,
+    /// While the vehicle is outside its corridor.
+    WhileOutside,
+    /// While the vehicle itself has a defect.
+    WhileDefective,
+    /// Never.
+    Always,
+}
+
+/// One active error.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct ActiveError {
+    pub(crate) error_type: String,
+    pub(crate) fatal: bool,
+    pub(crate) references: Vec<(String, String)>,
+    pub(crate) description: String,
+    pub(crate) life: Life,
+}
+
+/// All active errors.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Errors {
+    pub(crate) active: Vec<ActiveError>,
+}
+
+impl Errors {
+    /// Adds an error; one with the same type and references is replaced.
+    pub(crate) fn raise(&mut self, error: ActiveError) {
+        self.active
+            .retain(|other| other.error_type != error.error_type || other.references != error.references);
+        if self.active.len() >= MAX_ERRORS
+            && let Some(oldest) = self.active.iter().position(|error| !error.fatal)
+        {
+            self.active.remove(oldest);
+        }
+        self.active.push(error);
+    }
+
+    /// A new order was accepted.
+    pub(crate) fn new_order(&mut self) {
+        self.active.retain(|error| {
+            matches!(
+                error.life,
+                Life::WhileStopped | Life::WhileOutside | Life::WhileDefective | Life::Always
+            )
+        });
+    }
+
+    /// Forgets what was refused.
+    pub(crate) fn forget_refusals(&mut self) {
+        self.active.retain(|error| error.life != Life::UntilNewOrder);
+    }
+
+    /// Whether anything that was refused is still listed.
+    pub(crate) fn lists_refusals(&self) -> bool {
+        self.active.iter().any(|error| error.life == Life::UntilNewOrder)
+    }
+
+    /// The emergency stop was released.
+    pub(crate) fn released(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileStopped);
+    }
+
+    /// The vehicle is where it belongs again.
+    pub(crate) fn back_inside(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileOutside);
+    }
+
+    /// The defect was put right.
+    pub(crate) fn cleared(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileDefective);
+    }
+
+    /// Drops what has run out.
+    pub(crate) fn expire(&mut self, now: Moment) {
+        self.active
+            .retain(|error| !matches!(error.life, Life::Until(end) if end <= now));
+    }
+
+    /// When the next error runs out.
+    pub(crate) fn next_end(&self) -> Option<Moment> {
+        let ends = self.active.iter().filter_map(|error| match error.life {
+            Life::Until(end) => Some(end),
+            _ => None,
+        });
+        ends.min()
+    }
+
+    /// Whether nothing is wrong.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.active.is_empty()
+    }
+
+    /// Forgets everything.
+    pub(crate) fn clear(&mut self) {
+        self.active.clear();
+    }
+}
+
+impl ActiveError {
+    /// The error as a state lists it.
+    pub(crate) fn picture(&self) -> Value {
+        let references = self.references.iter();
+        let references = references.map(|(key, value)| json!({ "referenceKey": key, "referenceValue": value }));
+        json!({
+            "errorType": self.error_type,
+            "errorDescription": self.description,
+            "errorLevel": if self.fatal { "FATAL" } else { "WARNING" },
+            "errorReferences": references.collect::<Vec<_>>(),
+        })
+    }
+}

@@ -1,0 +1,321 @@
+//! The reference AGV: a complete vehicle as a sans-IO state machine, written from the standard.
+//!
+//! A message goes through it like this: `connection` receives nothing and sends everything; a driver hands in what came
+//! ([`Device::handle`]), and takes out what is to be sent. An order is read by `read` and `order_message`, decided in
+//! `acceptance` (figure 8), with `updates` for what continues an order, `ability` for what the vehicle can do and
+//! `rejection` for how it says no. `book` holds the order, `progress` drives it, leg by leg as `way` and `path` plan them,
+//! and `cancel` ends it (figure 9). `actions` knows when an action runs, `blocking` what may run beside it, `deeds`,
+//! `stations`, `maps` and `downloads` what it does. `instant` takes instant actions, `commands` what people do to the
+//! vehicle. `report` says all that in states, `factsheet` what the vehicle is.
+//!
+//! The vehicle asks at its points of decision whether it may, and says what happens: the words for both stand in `points`
+//! and `objections`, and `seam` is who else is asked. With nobody there the answer is what stands in the vehicle.
+
+mod ability;
+mod acceptance;
+pub(crate) mod action_kinds;
+pub(crate) mod actions;
+mod blocking;
+pub(crate) mod book;
+pub(crate) mod cancel;
+mod commands;
+pub(crate) mod config;
+pub(crate) mod connection;
+pub(crate) mod deeds;
+pub(crate) mod downloads;
+pub(crate) mod errors;
+mod factsheet;
+pub(crate) mod instant;
+pub(crate) mod maps;
+pub(crate) mod motion;
+pub(crate) mod objections;
+pub(crate) mod order_message;
+pub(crate) mod path;
+pub(crate) mod points;
+pub(crate) mod progress;
+pub(crate) mod read;
+pub(crate) mod rejection;
+pub(crate) mod report;
+pub(crate) mod seam;
+mod stations;
+#[cfg(test)]
+mod tests;
+pub(crate) mod updates;
+pub(crate) mod way;
+
+use std::collections::{BTreeSet, VecDeque};
+
+use crate::{ConnectOptions, Device, Input, Output};
+use tck_base::clock::{Moment, Stamp};
+
+pub use commands::COMMANDS;
+pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
+
+use actions::Actions;
+use book::Book;
+use connection::Connection;
+use downloads::Downloads;
+use errors::Errors;
+use maps::Maps;
+use motion::{Motion, Pose};
+use report::Report;
+use seam::Seam;
+
+/// operatingMode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mode {
+    Automatic,
+    Semiautomatic,
+    Manual,
+    Service,
+    Teachin,
+}
+
+impl Mode {
+    /// Whether master control commands the vehicle (MODE-02).
+    pub(crate) fn takes_orders(self) -> bool {
+        matches!(self, Self::Automatic | Self::Semiautomatic)
+    }
+}
+
+/// What keeps the vehicle from moving.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Holds {
+    /// startPause.
+    pub(crate) pause: bool,
+    /// The pause button on the vehicle.
+    pub(crate) button: bool,
+    /// The emergency stop.
+    pub(crate) emergency: bool,
+    /// Something stands in the protective field.
+    pub(crate) field: bool,
+    /// It is outside its corridor.
+    pub(crate) outside: bool,
+    /// A defect that keeps it from running.
+    pub(crate) defect: bool,
+}
+
+impl Holds {
+    pub(crate) fn any(self) -> bool {
+        self.pause || self.button || self.emergency || self.field || self.outside || self.defect
+    }
+}
+
+/// A load on the vehicle.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Load {
+    pub(crate) id: String,
+    pub(crate) kind: String,
+    pub(crate) position: String,
+}
+
+/// The reference AGV.
+#[derive(Debug)]
+pub struct Agv {
+    /// Who else is asked.
+    pub(crate) seam: Seam,
+    pub(crate) config: AgvConfig,
+    /// The time of what is happening.
+    pub(crate) now: Stamp,
+    pub(crate) book: Book,
+    pub(crate) motion: Motion,
+    pub(crate) actions: Actions,
+    pub(crate) maps: Maps,
+    pub(crate) downloads: Downloads,
+    pub(crate) errors: Errors,
+    pub(crate) holds: Holds,
+    pub(crate) mode: Mode,
+    pub(crate) loads: Vec<Load>,
+    /// Edges on which something stands.
+    pub(crate) obstacles: BTreeSet<String>,
+    /// It has left its corridor and was not put back yet.
+    pub(crate) strayed: bool,
+    /// Where loads are handed over, and whether one stands there.
+    pub(crate) stations: std::collections::BTreeMap<String, bool>,
+    pub(crate) charging: bool,
+    /// A switch keeps it from pausing and from going on.
+    pub(crate) pause_blocked: bool,
+    /// Something keeps it from ending its charging.
+    pub(crate) charger_locked: bool,
+    pub(crate) connection: Connection,
+    pub(crate) report: Report,
+    /// What has come and was not looked at yet, and when it will be: messages, and what people do.
+    pub(crate) inbox: VecDeque<(Moment, Input)>,
+    /// It stands still until then.
+    pub(crate) lingers_until: Option<Moment>,
+    /// Counts states.
+    pub(crate) states_sent: u64,
+    /// Counts logs.
+    pub(crate) logs: u32,
+    /// What was decided and is still to be handed to the driver.
+    pub(crate) pending: Vec<Output>,
+}
+
+impl Agv {
+    /// A vehicle of this configuration.
+    ///
+    /// It stands on its start node, is switched on, and asks for its connection at the first [`Input::Time`]
+    /// (a driver may also connect it unasked).
+    #[must_use]
+    pub fn new(config: AgvConfig) -> Self {
+        let pose = config.node(&config.start_node).map_or_else(
+            || Pose {
+                x: 0.0,
+                y: 0.0,
+                theta: 0.0,
+                map_id: config.maps.first().map_or_else(String::new, |map| map.map_id.clone()),
+            },
+            |node| Pose {
+                x: node.x,
+                y: node.y,
+                theta: node.theta.unwrap_or(0.0),
+                map_id: node.map_id.clone(),
+            },
+        );
+        let start = if config.node(&config.start_node).is_some() {
+            config.start_node.clone()
+        } else {
+            String::new()
+        };
+        let maps = Maps::new(config.maps.clone(), config.map_capacity);
+        Self {
+            seam: Seam::default(),
+            now: Stamp {
+                moment: Moment::START,
+                utc: jiff::Timestamp::UNIX_EPOCH,
+            },
+            book: Book::empty(start),
+            motion: Motion::at(pose),
+            actions: Actions::default(),
+            maps,
+            downloads: Downloads::default(),
+            errors: Errors::default(),
+            holds: Holds::default(),
+            mode: Mode::Automatic,
+            loads: Vec::new(),
+            obstacles: BTreeSet::new(),
+            strayed: false,
+            stations: config.stations.clone(),
+            charging: false,
+            pause_blocked: false,
+            charger_locked: false,
+            connection: Connection::new(),
+            report: Report::default(),
+            inbox: VecDeque::new(),
+            lingers_until: None,
+            states_sent: 0,
+            logs: 0,
+            pending: Vec::new(),
+            config,
+        }
+    }
+
+    /// The present moment.
+    pub(crate) fn moment(&self) -> Moment {
+        self.now.moment
+    }
+
+    /// When something happens next by itself.
+    fn next_event(&self) -> Option<Moment> {
+        let events = [
+            self.motion.end(),
+            self.actions.next_end(),
+            self.errors.next_end(),
+            self.connection.next_attempt(),
+            self.lingers_until,
+            self.inbox.front().map(|(due, _)| *due),
+            self.due(),
+            self.next_report(),
+        ];
+        events.into_iter().flatten().min()
+    }
+
+    /// Lives through everything that happens by itself up to `now`, each at its own time.
+    fn advance(&mut self, now: Stamp) {
+        // A driver that was away for hours gets a bounded number of events, then the rest at once.
+        for _ in 0..10_000 {
+            let Some(event) = self.next_event().filter(|event| *event <= now.moment) else {
+                break;
+            };
+            self.now = now.at(event.max(self.now.moment));
+            self.step();
+        }
+        self.now = now;
+    }
+
+    /// What is due at the present moment.
+    fn step(&mut self) {
+        let moment = self.moment();
+        if let Some(rolled) = self.motion.finish(moment) {
+            self.leg_finished(rolled);
+        }
+        while let Some(id) = self.actions.due(moment) {
+            self.stage_finished(&id);
+        }
+        self.errors.expire(moment);
+        self.happens(seam::Event::Woken);
+        self.lingers_until = self.lingers_until.filter(|until| *until > moment);
+        while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
+            match self.inbox.pop_front() {
+                Some((_, Input::Message { topic, payload })) => self.message(&topic, &payload),
+                Some((_, Input::Command(name, arguments))) => self.command(&name, &arguments),
+                _ => {}
+            }
+        }
+        self.attempt_connection();
+        self.settle();
+        self.happens(seam::Event::Settled);
+        self.flush();
+    }
+}
+
+impl Device for Agv {
+    fn connect_options(&mut self, now: Stamp) -> ConnectOptions {
+        self.options(now)
+    }
+
+    fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {
+        self.advance(now);
+        match input {
+            Input::Connected => self.connected(),
+            Input::ConnectionLost => self.connection_lost(),
+            Input::Message { .. } | Input::Command(..) => self.lay_down(input),
+            Input::Time => {}
+            Input::Download { token, progress } => self.download_progress(token, progress),
+        }
+        self.step();
+        out.append(&mut self.pending);
+    }
+
+    fn wake_up(&self) -> Option<Moment> {
+        self.next_event()
+    }
+}
+
+impl Agv {
+    /// Puts something into the inbox. What people do does not wait behind messages that are taken late.
+    fn lay_down(&mut self, input: Input) {
+        let is_message = |input: &Input| matches!(input, Input::Message { .. });
+        let mut due = self.moment() + self.config.answers_after;
+        if is_message(&input) {
+            due = self.moment() + self.lasts(seam::Span::Answer, self.config.answers_after);
+            let before = self.inbox.iter().filter(|(_, other)| is_message(other));
+            due = before.map(|(other, _)| *other).fold(due, Moment::max);
+        }
+        let at = self.inbox.partition_point(|(other, _)| *other <= due);
+        self.inbox.insert(at, (due, input));
+    }
+
+    fn message(&mut self, topic: &str, payload: &[u8]) {
+        for name in ["order", "instantActions"] {
+            if self.config.topic(name) != Some(topic) || !self.hears(name, payload) {
+                continue;
+            }
+            if name == "order" {
+                self.order_received(payload);
+            } else {
+                self.instant_actions_received(payload);
+            }
+        }
+    }
+}

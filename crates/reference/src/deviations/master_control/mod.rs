@@ -1,0 +1,187 @@
+//! What a master control can do otherwise: records by topic, and a reference master control that has some of them.
+
+#![allow(
+    clippy::case_sensitive_file_extension_comparisons,
+    clippy::collapsible_if,
+    clippy::ignored_unit_patterns,
+    clippy::manual_is_variant_and,
+    clippy::needless_for_each,
+    clippy::nonminimal_bool,
+    clippy::redundant_closure,
+    clippy::redundant_closure_for_method_calls,
+    clippy::ref_option,
+    clippy::semicolon_if_nothing_returned,
+    clippy::trivially_copy_pass_by_ref,
+    clippy::type_complexity,
+    clippy::unnecessary_box_returns,
+    reason = "records are short closures of a few given shapes"
+)]
+
+mod actions;
+mod base;
+mod cancellation;
+mod curves;
+mod dispatch;
+mod form;
+mod header;
+mod hooks;
+mod instants;
+mod limits;
+mod maps;
+mod options;
+mod orders;
+mod presence;
+mod reading;
+mod sending;
+mod starts;
+#[cfg(test)]
+mod tests;
+mod transport;
+mod updates;
+
+use std::sync::LazyLock;
+
+use serde_json::Value;
+
+use super::record::{Kind, Record};
+use crate::Fault;
+use crate::deviations::agv::Tolerance;
+use crate::master_control::seam::Deviation;
+use crate::master_control::vehicle::Vehicle;
+use crate::master_control::{MasterControl, MasterControlConfig, Site};
+
+/// A name that is not that of a deviation.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the reference master control has no {kind} `{name}`")]
+pub struct Unknown {
+    /// Fault or tolerance.
+    pub kind: &'static str,
+    /// The name.
+    pub name: String,
+}
+
+/// All records.
+fn records() -> impl Iterator<Item = &'static Record<dyn Deviation>> {
+    let topics = [
+        transport::RECORDS,
+        header::RECORDS,
+        form::RECORDS,
+        orders::RECORDS,
+        curves::RECORDS,
+        options::RECORDS,
+        limits::RECORDS,
+        starts::RECORDS,
+        dispatch::RECORDS,
+        base::RECORDS,
+        updates::RECORDS,
+        sending::RECORDS,
+        cancellation::RECORDS,
+        actions::RECORDS,
+        instants::RECORDS,
+        maps::RECORDS,
+        presence::RECORDS,
+        reading::RECORDS,
+    ];
+    topics.into_iter().flatten()
+}
+
+fn find(name: &str) -> Option<&'static Record<dyn Deviation>> {
+    records().find(|record| record.name == name)
+}
+
+fn fault(record: &Record<dyn Deviation>) -> Fault {
+    Fault {
+        name: record.name,
+        breaks: record.requirements,
+        wrong: record.does,
+    }
+}
+
+/// Its faults and lapses.
+pub static FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| {
+    let faults = records().filter(|record| record.is_fault());
+    faults.map(fault).collect()
+});
+
+/// The liberties it can take.
+pub static TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| {
+    let liberties = records().filter(|record| record.is_liberty());
+    let liberties = liberties.map(|record| Tolerance {
+        name: record.name,
+        under: record.requirements,
+        does: record.does,
+    });
+    liberties.collect()
+});
+
+/// Why a fault ends in less than a failure.
+#[must_use]
+pub fn lapse(name: &str) -> Option<&'static str> {
+    match find(name)?.kind {
+        Kind::Lapse(why) => Some(why),
+        _ => None,
+    }
+}
+
+/// Lets a configuration take a liberty, and adds its name to those it takes.
+///
+/// # Errors
+/// When there is none of that name.
+pub fn tolerate(
+    config: &mut MasterControlConfig,
+    liberties: &mut Vec<&'static str>,
+    name: &str,
+) -> Result<(), Unknown> {
+    let Some(record) = find(name).filter(|record| record.is_liberty()) else {
+        return Err(unknown("tolerance", name));
+    };
+    (record.make)().configures(config);
+    liberties.push(record.name);
+    Ok(())
+}
+
+fn unknown(kind: &'static str, name: &str) -> Unknown {
+    let name = name.to_owned();
+    Unknown { kind, name }
+}
+
+/// A reference master control with these faults and liberties, by name; without any it keeps to the standard.
+///
+/// # Errors
+/// When there is none of a name.
+pub fn built(config: MasterControlConfig, liberties: &[&str], faults: &[&str]) -> Result<MasterControl, Unknown> {
+    let mut deviations: Vec<Box<dyn Deviation>> = vec![Box::new(Configurable)];
+    for name in faults {
+        let record = find(name).filter(|record| record.is_fault());
+        deviations.push((record.ok_or_else(|| unknown("fault", name))?.make)());
+    }
+    for name in liberties {
+        let record = find(name).filter(|record| record.is_liberty());
+        deviations.push((record.ok_or_else(|| unknown("tolerance", name))?.make)());
+    }
+    Ok(MasterControl::with(config, deviations))
+}
+
+/// Takes liberties while it runs, when somebody asks for that: `configure` with the name of one as `what`.
+struct Configurable;
+
+impl Deviation for Configurable {
+    fn asked(
+        &mut self,
+        site: &mut Site,
+        _: &mut [Vehicle],
+        _: Option<usize>,
+        command: &str,
+        arguments: &Value,
+    ) -> bool {
+        if command != "configure" {
+            return true;
+        }
+        // What it has no setting for leaves it as it is.
+        let what = arguments.get("what").and_then(Value::as_str).unwrap_or_default();
+        if let Some(record) = find(what).filter(|record| record.is_liberty()) {
+            site.switch_on((record.make)());
+        }
+        false
+    }
+}

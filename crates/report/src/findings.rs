@@ -1,0 +1,139 @@
+//! What a device breaks, requirement by requirement: the rows that stand directly below the headline.
+//!
+//! A row joins what tests and monitors found of one requirement, so that one mistake is one row however many tests saw it.
+
+use super::sources::Sources;
+use tck_base::verdict::Verdict;
+use tck_result::RunResult;
+
+/// A requirement that is broken, or about which there is a remark.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding<'a> {
+    /// Its id.
+    pub requirement: &'a str,
+    /// Fail or warning.
+    pub verdict: Verdict,
+    /// What it asks, in the words of the catalogue; nothing when the catalogue is not there.
+    pub asks: Option<&'a str>,
+    /// Whom it binds how, and where: `shall, §6.6.4`.
+    pub origin: Option<String>,
+    /// What was seen the first time.
+    pub seen: String,
+    /// How often it was seen.
+    pub count: u64,
+    /// The first message it was seen in, by journal number.
+    pub first: Option<u64>,
+    /// The tests that found it.
+    pub tests: Vec<&'a str>,
+    /// The monitors that found it.
+    pub monitors: Vec<&'a str>,
+}
+
+/// The findings of a run: what is broken before what is only remarked on, then by the number of tests that found it.
+#[must_use]
+pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<'a>> {
+    let bad = |verdict: Verdict| matches!(verdict, Verdict::Fail | Verdict::Warning);
+    let mut all: Vec<Finding<'a>> = Vec::new();
+    for test in &result.tests {
+        for decision in test.decisions.iter().filter(|decision| bad(decision.verdict())) {
+            let finding = row(&mut all, &decision.requirement, sources);
+            let seen = match &decision.nearest {
+                Some(nearest) => format!("{} is {}, not {}", nearest.path, nearest.found, nearest.expected),
+                None => decision.message.clone(),
+            };
+            let at = decision
+                .witness
+                .or(decision.nearest.as_ref().map(|nearest| nearest.seq));
+            finding.see(decision.verdict(), 1, at, seen);
+            if !finding.tests.contains(&test.id.as_str()) {
+                finding.tests.push(&test.id);
+            }
+        }
+    }
+    for monitor in &result.monitors {
+        for found in monitor.findings.iter().filter(|found| bad(found.verdict)) {
+            let finding = row(&mut all, &found.requirement, sources);
+            finding.see(
+                found.verdict,
+                found.count,
+                found.first.first().copied(),
+                found.message.clone(),
+            );
+            if !finding.monitors.contains(&monitor.id.as_str()) {
+                finding.monitors.push(&monitor.id);
+            }
+        }
+    }
+    all.sort_by_key(|finding| std::cmp::Reverse((finding.verdict, finding.tests.len() + finding.monitors.len())));
+    all
+}
+
+impl Finding<'_> {
+    /// Takes one more sighting in. The worst of them is shown, and of equals the first.
+    fn see(&mut self, verdict: Verdict, times: u64, at: Option<u64>, seen: String) {
+        let is_new = self.count == 0;
+        let is_earlier = match (at, self.first) {
+            (Some(at), Some(first)) => at < first,
+            (Some(_), None) => true,
+            (None, _) => false,
+        };
+        if is_new || verdict > self.verdict || (verdict == self.verdict && is_earlier) {
+            self.seen = seen;
+            self.first = at;
+        }
+        self.verdict = self.verdict.join(verdict);
+        self.count = self.count.saturating_add(times);
+    }
+}
+
+fn row<'a, 'r>(all: &'r mut Vec<Finding<'a>>, id: &'a str, sources: &'a Sources) -> &'r mut Finding<'a> {
+    let at = all.iter().position(|finding| finding.requirement == id);
+    let at = at.unwrap_or_else(|| {
+        let known = sources.requirement(id);
+        all.push(Finding {
+            requirement: id,
+            verdict: Verdict::Warning,
+            asks: known.map(|known| known.text.as_str()),
+            origin: known.map(|known| format!("{}, §{}", known.mood, known.section)),
+            seen: String::new(),
+            count: 0,
+            first: None,
+            tests: Vec::new(),
+            monitors: Vec::new(),
+        });
+        all.len() - 1
+    });
+    &mut all[at]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn empty() -> Finding<'static> {
+        Finding {
+            requirement: "A-1",
+            verdict: Verdict::Warning,
+            asks: None,
+            origin: None,
+            seen: String::new(),
+            count: 0,
+            first: None,
+            tests: Vec::new(),
+            monitors: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_worst_sighting_is_shown_and_of_equals_the_first() {
+        let mut finding = empty();
+        finding.see(Verdict::Warning, 1, Some(3), "slow".to_owned());
+        finding.see(Verdict::Fail, 2, Some(20), "wrong, later".to_owned());
+        finding.see(Verdict::Fail, 1, Some(9), "wrong".to_owned());
+        finding.see(Verdict::Fail, 1, None, "wrong, nobody knows when".to_owned());
+        assert_eq!(
+            (finding.verdict, finding.count, finding.first, finding.seen.as_str()),
+            (Verdict::Fail, 5, Some(9), "wrong")
+        );
+    }
+}

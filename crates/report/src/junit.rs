@@ -1,0 +1,458 @@
+//! JUnit XML for build servers.
+//!
+//! JUnit knows pass, failure, error and skipped, and a build server knows red and green. A fail is a
+//! failure of type *requirement id*; inconclusive and error are errors, so that neither is taken for a pass;
+//! a warning passes and says so in `system-out`; *not applicable* is skipped. One suite per group of tests,
+//! one for the monitors, and one for the run itself: a run that ended early or decided nothing must not be
+//! green only because nothing failed.
+//!
+//! `junit_report` writes text as it comes, so everything goes through [`attribute`] or [`cdata`] first. What
+//! it cannot do: more than one `<failure>` in a test case (the worst decision gives type and message, all
+//! of them stand in its text), and a `skipped` count on the suite; [`with_properties`] adds the properties. It always
+//! writes a timestamp: ours is the start of the run, and its constructors that read the clock are not used. No test case
+//! has a `file`, which the schema of Jenkins' xUnit plugin forbids.
+
+use std::fmt::Write as _;
+
+use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult as Outcome, TestSuite};
+
+use askama::filters::Escaper as _;
+
+use super::clean;
+use super::findings::{Finding, findings};
+use super::html::Escape;
+use super::repeated;
+use super::sources::Sources;
+use super::statement::{self, Gap};
+use tck_base::verdict::Verdict;
+use tck_result::{Decision, MonitorResult, RequirementResult, RunResult, TestResult};
+
+/// Why no JUnit file could be made.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write JUnit XML: {0}")]
+pub struct JunitError(String);
+
+/// How what was not decided is shown to a build server.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Inconclusive {
+    /// As an error: the build is red.
+    #[default]
+    Error,
+    /// As skipped.
+    Skip,
+}
+
+/// What a build server is told beside the result.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Flavour<'a> {
+    /// How what was not decided is shown.
+    pub inconclusive: Inconclusive,
+    /// The root hash of the bundle. A file of the bundle cannot hold it.
+    pub root: Option<&'a str>,
+}
+
+/// The result as JUnit XML: a case for each test and each monitor.
+///
+/// # Errors
+/// When the XML writer refuses; it has no reason to.
+pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
+    let how = flavour.inconclusive;
+    let mut report = ReportBuilder::new();
+    report.add_testsuite(suite(result, "run", vec![run_case(result)]));
+    let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
+    for test in &result.tests {
+        let group = test.id.split_once('/').map_or("tests", |(group, _)| group);
+        let case = test_case(test, how);
+        match groups.iter_mut().find(|(name, _)| *name == group) {
+            Some((_, cases)) => cases.push(case),
+            None => groups.push((group, vec![case])),
+        }
+    }
+    for (group, cases) in groups {
+        report.add_testsuite(suite(result, group, cases));
+    }
+    if !result.monitors.is_empty() {
+        let cases = result
+            .monitors
+            .iter()
+            .map(|monitor| monitor_case(monitor, how))
+            .collect();
+        report.add_testsuite(suite(result, "monitors", cases));
+    }
+    written(&report, result, flavour)
+}
+
+/// The result as JUnit XML: a case for each requirement, and a suite for each group of requirements.
+///
+/// # Errors
+/// When the XML writer refuses; it has no reason to.
+pub fn by_requirement(result: &RunResult, sources: &Sources, flavour: Flavour<'_>) -> Result<String, JunitError> {
+    let found = findings(result, sources);
+    let mut report = ReportBuilder::new();
+    report.add_testsuite(suite(result, "run", vec![run_case(result)]));
+    let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
+    for requirement in &result.requirements {
+        let group = requirement.id.rsplit_once('-').map_or("other", |(group, _)| group);
+        let finding = found.iter().find(|finding| finding.requirement == requirement.id);
+        let case = requirement_case(requirement, group, finding, sources, flavour.inconclusive);
+        match groups.iter_mut().find(|(name, _)| *name == group) {
+            Some((_, cases)) => cases.push(case),
+            None => groups.push((group, vec![case])),
+        }
+    }
+    for (group, cases) in groups {
+        report.add_testsuite(suite(result, group, cases));
+    }
+    written(&report, result, flavour)
+}
+
+/// A case of something that is no run.
+#[derive(Clone, Debug)]
+pub struct Plain {
+    /// The suite.
+    pub suite: String,
+    /// Its name: the requirement.
+    pub name: String,
+    /// How it ended.
+    pub verdict: Option<Verdict>,
+    /// What was found.
+    pub text: String,
+}
+
+/// Cases as JUnit XML, each in its suite. A warning passes and says so.
+///
+/// # Errors
+/// When the XML writer refuses; it has no reason to.
+pub fn plain(cases: &[Plain]) -> Result<String, JunitError> {
+    let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
+    for case in cases {
+        let message = case.text.lines().next().unwrap_or_default();
+        let built = Case {
+            name: &case.name,
+            class: &case.suite,
+            seconds: 0.0,
+            outcome: outcome(case.verdict, &case.name, message, &case.text, Inconclusive::Error),
+            out: (case.verdict == Some(Verdict::Warning)).then(|| format!("warning: {}", case.text)),
+        }
+        .build();
+        match groups.last_mut().filter(|(name, _)| *name == case.suite) {
+            Some((_, cases)) => cases.push(built),
+            None => groups.push((&case.suite, vec![built])),
+        }
+    }
+    let mut report = ReportBuilder::new();
+    for (name, testcases) in groups {
+        report.add_testsuite(TestSuite {
+            name: attribute(name),
+            package: "vda5050-tck".to_owned(),
+            timestamp: OffsetDateTime::UNIX_EPOCH,
+            hostname: "localhost".to_owned(),
+            testcases,
+            system_out: None,
+            system_err: None,
+        });
+    }
+    let mut xml = Vec::new();
+    let built = report.build().write_xml(&mut xml);
+    built.map_err(|error| JunitError(error.to_string()))?;
+    let xml = String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))?;
+    let xml = xml.replace("><testcase ", ">\n<testcase ");
+    Ok(xml.replace("><testsuite ", ">\n<testsuite ") + "\n")
+}
+
+fn written(report: &ReportBuilder, result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
+    let mut xml = Vec::new();
+    let written = report.build().write_xml(&mut xml);
+    written.map_err(|error| JunitError(error.to_string()))?;
+    let xml = String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))?;
+    // A line for each case: whoever compares two files sees what differs.
+    let xml = with_properties(&xml, result, flavour).replace("><testcase ", ">\n<testcase ");
+    Ok(xml.replace("><testsuite ", ">\n<testsuite ") + "\n")
+}
+
+/// Puts what is known of the run into the first suite, which is about the run. The writer escapes `>` in attributes, so
+/// that the first one ends the tag.
+fn with_properties(xml: &str, result: &RunResult, flavour: Flavour<'_>) -> String {
+    let Some(begin) = xml.find("<testsuite ") else {
+        return xml.to_owned();
+    };
+    let Some(end) = xml[begin..].find('>').map(|at| begin + at + 1) else {
+        return xml.to_owned();
+    };
+    let device = &result.device;
+    let root = flavour.root.map(|root| format!("sha256:{root}"));
+    let all = [
+        ("tool", Some(result.tool.as_str())),
+        ("run", Some(&result.run)),
+        ("mode", result.mode.as_deref()),
+        ("verdict", result.verdict.map(Verdict::word)),
+        ("role", Some(&result.role)),
+        ("protocol", Some(&result.protocol)),
+        ("manufacturer", Some(&device.manufacturer)),
+        ("serialNumber", Some(&device.serial_number)),
+        ("firmwareVersion", result.setting("certificate.firmware-version")),
+        ("suites", Some(&result.suites_sha256)),
+        ("root", root.as_deref()),
+    ];
+    let mut properties = String::from("<properties>");
+    for (name, value) in all.iter().filter_map(|(name, value)| Some((name, (*value)?))) {
+        let mut escaped = String::new();
+        // Writing to a text does not fail.
+        let _ = Escape.write_escaped_str(&mut escaped, &attribute(value));
+        let _ = write!(properties, "<property name=\"{name}\" value=\"{escaped}\"/>");
+    }
+    properties += "</properties>";
+    format!("{}{properties}{}", &xml[..end], &xml[end..])
+}
+
+/// One line, without anything XML forbids. Escaping is done by the writer.
+fn attribute(text: &str) -> String {
+    // Line breaks would be folded to blanks by the next parser anyway.
+    clean::line(&text.replace(['\n', '\t'], " ")).into_owned()
+}
+
+/// Many lines, without anything XML forbids and without an end of the CDATA section they will stand in.
+fn cdata(text: &str) -> String {
+    clean::block(text).replace("]]>", "]] >")
+}
+
+/// Sums of these are made by the writer, which must not overflow.
+fn duration(seconds: f64) -> Duration {
+    let seconds = if seconds.is_finite() {
+        seconds.clamp(0.0, 1e9)
+    } else {
+        0.0
+    };
+    // Whole milliseconds: what is finer is noise, and reads badly.
+    #[expect(clippy::cast_possible_truncation, reason = "clamped above")]
+    Duration::milliseconds((seconds * 1000.0).round() as i64)
+}
+
+/// The start of the run; the epoch when it cannot be read.
+fn timestamp(result: &RunResult) -> OffsetDateTime {
+    let started = result.started.parse::<jiff::Timestamp>().ok();
+    let nanos = started.map_or(0, |started| started.as_nanosecond().max(0));
+    OffsetDateTime::from_unix_timestamp_nanos(nanos).unwrap_or(OffsetDateTime::UNIX_EPOCH)
+}
+
+fn suite(result: &RunResult, name: &str, testcases: Vec<TestCase>) -> TestSuite {
+    TestSuite {
+        name: attribute(name),
+        package: "vda5050-tck".to_owned(),
+        timestamp: timestamp(result),
+        // The machine is not known, and no part of the evidence. The device stands among the properties.
+        hostname: "localhost".to_owned(),
+        testcases,
+        system_out: None,
+        system_err: None,
+    }
+}
+
+struct Case<'a> {
+    name: &'a str,
+    class: &'a str,
+    seconds: f64,
+    outcome: Outcome,
+    out: Option<String>,
+}
+
+impl Case<'_> {
+    fn build(self) -> TestCase {
+        TestCase {
+            name: attribute(self.name),
+            time: duration(self.seconds),
+            result: self.outcome,
+            classname: Some(attribute(self.class)),
+            filepath: None,
+            system_out: self.out.map(|text| cdata(&text)),
+            system_err: None,
+        }
+    }
+}
+
+/// The outcome for a verdict; `kind` is the requirement id of a fail.
+fn outcome(verdict: Option<Verdict>, kind: &str, message: &str, cause: &str, how: Inconclusive) -> Outcome {
+    let message = attribute(message);
+    let cause = (!cause.is_empty()).then(|| cdata(cause));
+    match verdict {
+        Some(Verdict::Pass | Verdict::Warning) => Outcome::Success,
+        Some(Verdict::Fail) => Outcome::Failure {
+            type_: attribute(kind),
+            message,
+            cause,
+        },
+        Some(Verdict::Inconclusive) if how == Inconclusive::Skip => Outcome::SkippedWithCause {
+            type_: Verdict::Inconclusive.word().to_owned(),
+            message,
+            cause,
+        },
+        Some(undecided @ (Verdict::Inconclusive | Verdict::Error)) => Outcome::Error {
+            type_: undecided.word().to_owned(),
+            message,
+            cause,
+        },
+        None => Outcome::SkippedWithCause {
+            type_: "not applicable".to_owned(),
+            message,
+            cause: None,
+        },
+    }
+}
+
+fn run_case(result: &RunResult) -> TestCase {
+    let trouble = match (result.partial, result.verdict) {
+        (true, _) => Some(
+            result
+                .partial_reason
+                .as_deref()
+                .unwrap_or("the run ended before its plan did"),
+        ),
+        (false, None) => Some("nothing was decided"),
+        // Were all of it skipped, nothing would be red.
+        (false, Some(_)) if statement::requirements(result).decided() == 0 => Some("no requirement was decided"),
+        (false, Some(_)) => None,
+    };
+    let statement = statement::statement(result);
+    Case {
+        name: "the run is complete and decided something",
+        class: "run",
+        seconds: 0.0,
+        outcome: trouble.map_or(Outcome::Success, |reason| {
+            outcome(Some(Verdict::Error), "", reason, &statement, Inconclusive::Error)
+        }),
+        out: trouble.is_none().then_some(statement),
+    }
+    .build()
+}
+
+fn test_case(test: &TestResult, how: Inconclusive) -> TestCase {
+    let verdict = statement::test_verdict(test);
+    let worst = test
+        .decisions
+        .iter()
+        .filter(|decision| Some(decision.verdict()) == verdict)
+        .collect::<Vec<_>>();
+    let kind = worst.first().map_or("", |decision| decision.requirement.as_str());
+    let message = match (&test.not_applicable, &test.reason, worst.first()) {
+        (Some(why), _, _) if verdict.is_none() => why.as_str(),
+        (_, Some(reason), _) => reason.as_str(),
+        (_, None, Some(decision)) => decision.message.as_str(),
+        (_, None, None) => "the test decided nothing",
+    };
+    let repeated = repeated::summary(test);
+    let message = match &repeated {
+        Some(repeated) if test.is_flaky() => &format!("{repeated}: {message}"),
+        _ => message,
+    };
+    let mut findings: Vec<&Decision> = test.decisions.iter().filter(|d| d.verdict() != Verdict::Pass).collect();
+    findings.sort_by_key(|decision| std::cmp::Reverse(decision.verdict()));
+    let details = findings
+        .iter()
+        .map(|decision| finding(decision))
+        .collect::<Vec<_>>()
+        .join("\n\n");
+    Case {
+        name: &test.id,
+        class: test.id.split_once('/').map_or("tests", |(group, _)| group),
+        seconds: test.seconds,
+        outcome: outcome(verdict, kind, message, &details, how),
+        out: match verdict {
+            Some(Verdict::Warning) => Some(format!("warning: {message}\n\n{details}")),
+            _ => repeated,
+        },
+    }
+    .build()
+}
+
+fn finding(decision: &Decision) -> String {
+    let verdict = decision.verdict();
+    let Decision {
+        requirement,
+        clause,
+        place,
+        message,
+        ..
+    } = decision;
+    let mut text = format!("{verdict}: {requirement}: {message}\n{clause} at {place}");
+    if let Some(witness) = decision.witness {
+        let _ = write!(text, "\ndecided by message #{witness}");
+    }
+    if let Some(nearest) = &decision.nearest {
+        let _ = write!(
+            text,
+            "\nclosest: #{} {}: {} (expected {})",
+            nearest.seq, nearest.path, nearest.found, nearest.expected
+        );
+    }
+    if let Some(explanation) = &decision.explanation {
+        text.push('\n');
+        text.push_str(explanation);
+    }
+    text
+}
+
+fn monitor_case(monitor: &MonitorResult, how: Inconclusive) -> TestCase {
+    let mut findings: Vec<_> = monitor.findings.iter().collect();
+    findings.sort_by_key(|finding| std::cmp::Reverse(finding.verdict));
+    let kind = findings.first().map_or("", |finding| finding.requirement.as_str());
+    let message = match (findings.first(), monitor.verdict) {
+        (Some(finding), Some(_)) => finding.message.as_str(),
+        (_, None) => "there was nothing to judge",
+        (None, Some(_)) => monitor.title.as_str(),
+    };
+    let lines = findings
+        .iter()
+        .map(|finding| {
+            let first = finding
+                .first
+                .iter()
+                .map(|seq| format!("#{seq}"))
+                .collect::<Vec<_>>()
+                .join(", ");
+            format!(
+                "{}: {}: {} ({} times; first at {first})",
+                finding.verdict, finding.requirement, finding.message, finding.count
+            )
+        })
+        .collect::<Vec<_>>()
+        .join("\n");
+    Case {
+        name: &monitor.id,
+        class: "monitors",
+        seconds: 0.0,
+        outcome: outcome(monitor.verdict, kind, message, &lines, how),
+        out: (monitor.verdict == Some(Verdict::Warning)).then_some(lines),
+    }
+    .build()
+}
+
+fn requirement_case(
+    requirement: &RequirementResult,
+    group: &str,
+    finding: Option<&Finding<'_>>,
+    sources: &Sources,
+    how: Inconclusive,
+) -> TestCase {
+    let asks = sources
+        .requirement(&requirement.id)
+        .map_or("", |known| known.text.as_str());
+    // What applies and was not decided is no pass, and what no test can decide is nobody's fault.
+    let verdict = match statement::gap(requirement) {
+        Some(Gap::NotDecided) => Some(Verdict::Inconclusive),
+        _ => requirement.verdict,
+    };
+    let message = match (finding, &requirement.not_decided) {
+        (Some(finding), _) => finding.seen.as_str(),
+        (None, Some(why)) => why.as_str(),
+        (None, None) => "no test came to a decision",
+    };
+    let by = format!("{asks}\ndecided by {}", requirement.decided_by.join(", "));
+    Case {
+        name: &format!("{} {asks}", requirement.id),
+        class: group,
+        seconds: 0.0,
+        outcome: outcome(verdict, &requirement.id, message, &by, how),
+        out: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{by}")),
+    }
+    .build()
+}

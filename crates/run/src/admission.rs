@@ -1,0 +1,221 @@
+//! Before the first test: the device is there, and has said what it can do.
+
+use std::borrow::Cow;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use super::identity::somebody_else;
+use super::presence::{Presence, is_stale};
+use super::session::Session;
+use tck_engine::{EngineError, Operator, Recorder};
+use tck_journal::event::Event;
+use tck_net::link::Link;
+use tck_pack::Role;
+use tck_profile::show_duration;
+
+/// How often a person is told what is waited for.
+const TOLD_EVERY: Duration = Duration::from_secs(10);
+
+impl<L: Link, O: Operator> Session<'_, L, O> {
+    /// Waits for the device, its first state and its factsheet. `Err` says why it cannot be judged.
+    pub(super) async fn admit(&mut self) -> Result<Result<(), String>, EngineError> {
+        let vantage = self.setup.capabilities.vantage;
+        let patience = self.time("connect");
+        let there = |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
+        if !self.wait_for(patience, there).await? {
+            return Ok(Err(format!("no device connected within {}", show_duration(patience))));
+        }
+        if let Err(why) = self.after_start().await? {
+            return Ok(Err(why));
+        }
+        if self.engine.recorder.judge().role() == Role::MasterControl {
+            return self.settle_in().await;
+        }
+        let begun = self.engine.recorder.journal().entries().len() as u64;
+        let is_virtual = self.engine.operator.runs_on_the_link();
+        let has_state = |recorder: &Recorder| {
+            let states = recorder.judge().timeline().of("state");
+            states.iter().any(|entry| !is_stale(entry))
+        };
+        let speaks =
+            |recorder: &Recorder| has_state(recorder) || (!is_virtual && somebody_else(recorder.judge()).is_some());
+        let patience = self.time("statePeriod");
+        self.wait_for(patience, speaks).await?;
+        if !has_state(&self.engine.recorder) {
+            let why = format!(
+                "the device connected (see #{begun}) but sent no state within {} on {}",
+                show_duration(patience),
+                self.topic("state")
+            );
+            return Ok(Err(why));
+        }
+        self.factsheet().await?;
+        self.active_map()?;
+        self.home.first = self.engine.recorder.judge().state().map(Cow::into_owned);
+        self.home.before.clone_from(&self.home.first);
+        self.read_over(self.engine.link.now().moment).await?;
+        Ok(Ok(()))
+    }
+
+    /// Who speaks instead of the device of the profile. A built-in device in virtual time is wrong on purpose.
+    pub(super) fn somebody_else(&self) -> Option<String> {
+        let is_virtual = self.engine.operator.runs_on_the_link();
+        (!is_virtual)
+            .then(|| somebody_else(self.engine.recorder.judge()))
+            .flatten()
+    }
+
+    /// Waits so long, and says from time to time what for.
+    async fn wait_for(
+        &mut self,
+        patience: Duration,
+        mut done: impl FnMut(&Recorder) -> bool,
+    ) -> Result<bool, EngineError> {
+        let begun = self.engine.link.now().moment;
+        let end = begun + patience;
+        loop {
+            let now = self.engine.link.now().moment;
+            let until = (now + TOLD_EVERY).min(end);
+            if self.engine.watch(until, &mut done).await? {
+                return Ok(true);
+            }
+            if until == end || self.engine.interrupted() || self.engine.recorder.flood().is_some() {
+                return Ok(false);
+            }
+            let opened = self.engine.recorder.journal().entries().iter();
+            let opened = opened
+                .filter(|entry| matches!(entry.event(), Event::Opened { .. }))
+                .count();
+            self.progress.note(&format!(
+                "waiting for the device: {} s of {} s; connections seen: {opened}; awaited: {}",
+                until.since(begun).as_secs(),
+                patience.as_secs(),
+                self.awaited()
+            ));
+        }
+    }
+
+    /// The topics on which the device has to speak.
+    fn awaited(&self) -> String {
+        let ground = self.engine.recorder.judge().ground();
+        let rules = ground.pack.topics().iter();
+        let own = rules.filter(|rule| rule.publisher == ground.role);
+        let topics = own.filter_map(|rule| ground.topics.get(rule.name.as_str()).map(String::as_str));
+        topics.collect::<Vec<_>>().join(", ")
+    }
+
+    fn topic(&self, name: &str) -> String {
+        let ground = self.engine.recorder.judge().ground();
+        ground.topics.get(name).cloned().unwrap_or_default()
+    }
+
+    async fn factsheet(&mut self) -> Result<(), EngineError> {
+        let has_sheet = |recorder: &Recorder| {
+            recorder
+                .judge()
+                .timeline()
+                .of("factsheet")
+                .iter()
+                .any(|entry| entry.json().is_some())
+        };
+        let until = self.engine.link.now().moment + self.time("settle");
+        let mut found = self.engine.watch(until, has_sheet).await?;
+        let ground = self.engine.recorder.judge().ground();
+        let is_known = ground.pack.vocabulary().pointer("/action/factsheetRequest").is_some();
+        // Who says that the device has no such action knows that it would only find a mistake in it.
+        let is_denied = self.setup.capabilities.claims.get("action factsheetRequest") == Some(&false);
+        if !found && is_known && !is_denied {
+            self.instant_action("factsheetRequest", json!([])).await?;
+            let until = self.engine.link.now().moment + self.time("react");
+            found = self.engine.watch(until, has_sheet).await?;
+        }
+        if !found {
+            self.setup.limits.push(
+                "The device published no factsheet, so what it can do is only known from the profile.".to_owned(),
+            );
+            return Ok(());
+        }
+        let sheet = self
+            .engine
+            .recorder
+            .judge()
+            .timeline()
+            .of("factsheet")
+            .iter()
+            .rev()
+            .find_map(|entry| entry.json().cloned());
+        if let Some(sheet) = sheet {
+            self.engine.note(Event::Bound {
+                name: "device.factsheet".to_owned(),
+                value: sheet.clone(),
+            })?;
+            self.setup.capabilities.factsheet = Some(sheet);
+            let contradictions = self.setup.capabilities.contradictions();
+            self.setup.limits.extend(contradictions);
+        }
+        Ok(())
+    }
+
+    /// The map the vehicle stands on, if it says so: `device.activeMap`.
+    fn active_map(&mut self) -> Result<(), EngineError> {
+        let state = self
+            .engine
+            .recorder
+            .judge()
+            .timeline()
+            .of("state")
+            .last()
+            .and_then(|entry| entry.json().cloned());
+        let found = state.as_ref().and_then(|state| {
+            let id = state.pointer("/agvPosition/mapId")?;
+            let enabled = self.engine.recorder.judge().ground().pack.word("mapStatus.enabled")?;
+            let maps = state.get("maps")?.as_array()?;
+            let active = maps.iter().find(|map| {
+                map.get("mapId") == Some(id)
+                    && map.get("mapStatus").and_then(serde_json::Value::as_str) == Some(enabled)
+            })?;
+            Some(json!({ "mapId": id, "mapVersion": active.get("mapVersion")? }))
+        });
+        if let Some(value) = found {
+            let statements = &mut self.setup.capabilities.statements;
+            statements.insert("active-map".to_owned(), true);
+            self.engine.note(Event::Bound {
+                name: "device.activeMap".to_owned(),
+                value,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Sends one instant action outside any test, and gives its id.
+    pub(super) async fn instant_action(&mut self, action_type: &str, parameters: Value) -> Result<String, EngineError> {
+        let id = self.engine.composer.action_id();
+        let members = json!({ "actions": [{
+            "actionType": action_type, "actionId": id, "blockingType": "HARD", "actionParameters": parameters,
+        }] });
+        let now = self.engine.link.now();
+        let message = self
+            .engine
+            .composer
+            .plain("instantActions", members, self.engine.recorder.judge().ground(), now);
+        match message {
+            Ok(message) => self.engine.publish(message).await?,
+            Err(error) => {
+                self.engine.note(Event::Trouble {
+                    text: error.to_string(),
+                })?;
+            }
+        }
+        Ok(id)
+    }
+
+    /// A time limit of the profile.
+    pub(super) fn time(&self, name: &str) -> Duration {
+        let times = self.engine.recorder.judge().ground().bindings.get("time");
+        let millis = times
+            .and_then(|times| times.get(name))
+            .and_then(serde_json::Value::as_u64);
+        Duration::from_millis(millis.unwrap_or(31_000))
+    }
+}

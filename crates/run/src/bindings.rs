@@ -1,0 +1,163 @@
+//! The variables of one test: the course from where the vehicle stands, and fresh ids.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Map, Value};
+
+use super::pace::{Pace, between_looks};
+use super::rest::Home;
+use tck_course::{Layout, Standing};
+use tck_engine::IdForm;
+use tck_journal::event::{Event, Packet};
+use tck_judge::RunJudge;
+use tck_pack::Role;
+use tck_suite::model::Test;
+
+/// Margin on one and a half keep-alives for the last will, in milliseconds.
+const WILL_MARGIN: u64 = 3_000;
+
+/// Where the vehicle stands, as its last state says.
+pub(super) fn standing(judge: &RunJudge, layout: &Layout, home: &Home) -> Option<Standing> {
+    let state = judge
+        .timeline()
+        .of("state")
+        .iter()
+        .rev()
+        .find_map(|entry| entry.json())?;
+    let node = state
+        .get("lastNodeId")
+        .and_then(Value::as_str)
+        .filter(|id| !id.is_empty());
+    // An order has to begin where the vehicle stands, which may be off its last node.
+    if let Some(node) = node.filter(|id| layout.node(id).is_some() && !home.is_between_nodes(state, layout)) {
+        return Some(Standing::Node(node.to_owned()));
+    }
+    let position = state.get("agvPosition")?;
+    let number = |name: &str| position.get(name).and_then(Value::as_f64);
+    Some(Standing::Pose {
+        map: position.get("mapId")?.as_str()?.to_owned(),
+        x: number("x")?,
+        y: number("y")?,
+    })
+}
+
+/// The course of a test; `Err` says why there is none.
+pub(super) fn course_of(
+    test: &Test,
+    layout: Option<&Layout>,
+    judge: &RunJudge,
+    home: &Home,
+) -> Result<Option<Value>, String> {
+    if test.course.nodes.is_empty() {
+        return Ok(None);
+    }
+    let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
+    let standing = standing(judge, layout, home).ok_or("the vehicle does not say where it stands")?;
+    let course = if test.device == Role::MasterControl {
+        layout.outward(&test.course, &standing)
+    } else if test.course.directed {
+        let layout = layout.clone().directed();
+        if layout.edges().next().is_none() {
+            return Err("no edge of the layout says its direction at a junction".to_owned());
+        }
+        layout.assign(&test.course, &standing)
+    } else {
+        layout.assign(&test.course, &standing)
+    };
+    let course = course.map_err(|error| error.to_string())?;
+    let mut course = course.bindings();
+    let factsheet = judge
+        .ground()
+        .bindings
+        .get("device")
+        .and_then(|device| device.get("factsheet"));
+    Pace::of(factsheet).set(&mut course);
+    Ok(Some(flat(course)))
+}
+
+/// The variables only this test has.
+pub(super) fn own_bindings(
+    test: &Test,
+    course: Option<Value>,
+    judge: &RunJudge,
+    run: &str,
+    number: usize,
+) -> Map<String, Value> {
+    let mut own = Map::new();
+    let mut time = Map::new();
+    time.extend(
+        course
+            .as_ref()
+            .and_then(between_looks)
+            .map(|millis| ("look".to_owned(), millis.into())),
+    );
+    own.extend(course.map(|course| ("course".to_owned(), course)));
+    let device = judge.ground().bindings.get("device");
+    let form = IdForm::of(device.and_then(|device| device.pointer("/factsheet/protocolLimits/maxStringLens")));
+    let ids = fresh_names(test).into_iter().enumerate().map(|(place, name)| {
+        let id = form.of_name(run, number, &name, place);
+        (name, Value::from(id))
+    });
+    own.insert("run".to_owned(), Value::Object(ids.collect()));
+    time.extend(will(judge).map(|millis| ("will".to_owned(), millis.into())));
+    if !time.is_empty() {
+        own.insert("time".to_owned(), time.into());
+    }
+    own
+}
+
+/// One and a half keep-alives of the device's own CONNECT, and a margin.
+fn will(judge: &RunJudge) -> Option<u64> {
+    let entry = judge.timeline().of("mqtt/connect").last()?;
+    match entry.event() {
+        // Of a will that was never registered nothing is to be expected.
+        Event::Packet {
+            packet: Packet::Connect { will: None, .. },
+            ..
+        } => Some(WILL_MARGIN),
+        Event::Packet {
+            packet: Packet::Connect { keep_alive, .. },
+            ..
+        } if *keep_alive > 0 => Some(u64::from(*keep_alive) * 1_500 + WILL_MARGIN),
+        _ => None,
+    }
+}
+
+/// Every NAME of `${run.NAME}` in the files of a test.
+fn fresh_names(test: &Test) -> BTreeSet<String> {
+    let mut names = BTreeSet::from(["order".to_owned()]);
+    let steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
+    let mut texts: Vec<&str> = steps.map(|step| step.span.source.text.as_str()).collect();
+    texts.push(&test.source.text);
+    texts.dedup();
+    for text in texts {
+        for rest in text.split("${run.").skip(1) {
+            let name: String = rest
+                .chars()
+                .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
+                .collect();
+            if !name.is_empty() {
+                names.insert(name);
+            }
+        }
+    }
+    names
+}
+
+/// `course.a.x` beside `course.nodes.a.x`, and `course.a-b.heading` beside `course.edges.a-b.heading`: suites name
+/// a node or an edge and its members in one breath.
+fn flat(mut course: Value) -> Value {
+    let mut short = Map::new();
+    let groups = ["nodes", "edges"]
+        .into_iter()
+        .filter_map(|group| course.get(group)?.as_object());
+    for (name, node) in groups.flatten() {
+        for (member, value) in node.as_object().into_iter().flatten() {
+            short.insert(format!("{name}.{member}"), value.clone());
+        }
+    }
+    if let Value::Object(members) = &mut course {
+        members.extend(short);
+    }
+    course
+}

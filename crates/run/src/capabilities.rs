@@ -1,0 +1,501 @@
+//! What the device can do, and who says so.
+//!
+//! Applicability comes from the device's own factsheet, completed by the profile. Declared absent is not applicable;
+//! what is left open, not allowed, not named or not there is not, and the tests in question stay undecided. So do those
+//! about which profile and factsheet contradict each other.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value};
+
+use super::fits::outgrown;
+use tck_base::pattern::{Term, TermKind};
+use tck_journal::Vantage;
+use tck_journal::event::{Capability, Gate};
+use tck_profile::{SAMPLE_ACTIONS, SampleKind};
+use tck_suite::model::{Need, SendAction, ServeBehaviour, Test, Verb};
+
+/// Found out from the first state, and said by no profile.
+const ACTIVE_MAP: &str = "active-map";
+
+/// How a reason begins that the factsheet of the device takes away.
+const NO_FACTSHEET: &str = "there is no factsheet ";
+/// The reason that the first state of the device takes away.
+const NO_ACTIVE_MAP: &str = "the first state shows no enabled map on which the vehicle stands";
+
+/// Whether only the device itself can say if this stands in the way.
+pub(super) fn is_said_by_the_device(why: &str) -> bool {
+    why.starts_with(NO_FACTSHEET) || why == NO_ACTIVE_MAP
+}
+
+/// What is known about device, bench and profile.
+#[derive(Clone, Debug)]
+pub struct Capabilities {
+    /// The factsheet, once it was received.
+    pub factsheet: Option<Value>,
+    /// What the profile states: `stops-between-nodes` and so on.
+    pub statements: BTreeMap<String, bool>,
+    /// What the suites know of the device below `device`: its sample actions among it.
+    pub samples: Map<String, Value>,
+    /// Capabilities the profile claims beside the factsheet, by their names.
+    pub claims: BTreeMap<String, bool>,
+    /// From where the harness can see.
+    pub vantage: Vantage,
+    /// Names of the hooks that can be run.
+    pub hooks: Vec<String>,
+    /// Names of the hooks that are prompts, where nobody can be asked.
+    pub unattended: Vec<String>,
+    /// Whether the device can reach the map server; `Err` says why not.
+    pub maps: Result<(), String>,
+    /// Whether there is a map file that the device can read; `Err` says why not.
+    pub map_file: Result<(), String>,
+    /// Whether the vehicle may drive; `Err` says why not.
+    pub motion: Result<(), String>,
+    /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
+    pub claims_add: bool,
+}
+
+impl Capabilities {
+    /// Whether a test runs, and if not, why.
+    #[must_use]
+    pub fn gate(&self, test: &Test) -> Gate {
+        match self.weigh(test) {
+            Err(why) => Gate::NotApplicable(why),
+            Ok(open) => open.into_iter().next().map_or(Gate::Runs, Gate::Unobservable),
+        }
+    }
+
+    /// Everything that stands in the way of a test, the first reason first.
+    ///
+    /// # Errors
+    /// Why it does not apply at all.
+    pub fn weigh(&self, test: &Test) -> Result<Vec<String>, String> {
+        let mut open = Vec::new();
+        let hooks = test
+            .sections()
+            .into_iter()
+            .flat_map(|(_, steps)| steps)
+            .filter_map(|step| match &step.verb {
+                Verb::Operator(operator) => Some(Need::Hook(operator.hook.clone())),
+                _ => None,
+            });
+        let stations = test
+            .course
+            .stations()
+            .filter_map(SampleKind::of_variable)
+            .map(|sample| Need::Profile(sample.name.to_owned()));
+        for need in test.needs.iter().cloned().chain(stations).chain(hooks) {
+            match self.has(&need) {
+                Gate::Runs => {}
+                Gate::NotApplicable(why) => return Err(why),
+                Gate::Unobservable(why) => open.push(why),
+            }
+        }
+        let sends = test.sections().into_iter().flat_map(|(_, steps)| steps);
+        let routes = sends.filter_map(|step| match &step.verb {
+            Verb::Send(send) => send.route.as_ref(),
+            _ => None,
+        });
+        let mut ordered = routes.flat_map(|route| &route.actions).flat_map(|(_, actions)| actions);
+        if let Some(why) = ordered.find_map(|action| self.blocks_otherwise(action)) {
+            return Err(why);
+        }
+        if let Some(why) = self.factsheet.as_ref().and_then(|sheet| outgrown(sheet, test)) {
+            return Err(why);
+        }
+        if test.moves
+            && let Err(why) = &self.motion
+        {
+            open.push(why.clone());
+        }
+        if serves_a_map_to_read(test)
+            && let Err(why) = &self.map_file
+        {
+            open.push(why.clone());
+        }
+        Ok(open)
+    }
+
+    fn has(&self, need: &Need) -> Gate {
+        match need {
+            Need::Tap if self.vantage == Vantage::Tap => Gate::Runs,
+            Need::Tap => Gate::Unobservable("it needs the device to connect through the tap".to_owned()),
+            Need::MapServer => match &self.maps {
+                Ok(()) => Gate::Runs,
+                Err(why) => Gate::Unobservable(why.clone()),
+            },
+            Need::Hook(name) if self.hooks.iter().any(|hook| hook == name) => Gate::Runs,
+            Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => Gate::NotApplicable(
+                format!("the profile says that the device has nothing for the hook `{name}`"),
+            ),
+            Need::Hook(name) if self.unattended.contains(name) => Gate::Unobservable(format!(
+                "hook `{name}` is a prompt, and nobody can be asked: standard input or standard error is no terminal"
+            )),
+            Need::Hook(name) => Gate::Unobservable(format!("the profile has no hook `{name}` ([hooks.{name}])")),
+            Need::Profile(name) => match self.statements.get(name) {
+                Some(true) => Gate::Runs,
+                Some(false) if SAMPLE_ACTIONS.iter().any(|sample| sample.name == name) => {
+                    Gate::NotApplicable(format!("the profile says that the device has no `{name}`"))
+                }
+                Some(false) => Gate::NotApplicable(format!("`device.{name}` is false in the profile")),
+                None if name == ACTIVE_MAP => Gate::Unobservable(NO_ACTIVE_MAP.to_owned()),
+                None => Gate::Unobservable(match SAMPLE_ACTIONS.iter().find(|sample| sample.name == name) {
+                    Some(sample) => format!("the profile does not name `device.{name}`: {}", sample.doc),
+                    None => format!("the profile does not say whether the device is `{name}`"),
+                }),
+            },
+            Need::Action { name, scope } => self.action(name, scope.as_deref()),
+            Need::NoAction(name) => reverse(self.action(name, None), name),
+            Need::Optional(path) => self.optional(path),
+            Need::NoOptional(path) => reverse(self.optional(path), path),
+            Need::NotRequired(path) => self.not_required(path),
+            Need::Limit(path) => self.declared(&[format!("limit {path}")], |sheet| has_limit(sheet, path)),
+        }
+    }
+
+    /// Why an action of an order cannot be sent as the test wants: the factsheet lists it with other blocking types
+    /// (FACT-15).
+    fn blocks_otherwise(&self, action: &SendAction) -> Option<String> {
+        let wanted = literal(action.blocking.as_ref()?)?;
+        let action_type = match &action.action.kind {
+            TermKind::Variable(name) => {
+                let (sample, member) = name.strip_prefix("device.")?.split_once('.')?;
+                self.samples.get(sample)?.get(member)?.as_str()?
+            }
+            _ => literal(&action.action)?,
+        };
+        let sheet = self.factsheet.as_ref()?;
+        let mut listed = sheet.pointer("/protocolFeatures/agvActions")?.as_array()?.iter();
+        let own = listed.find(|listed| listed.get("actionType").and_then(Value::as_str) == Some(action_type))?;
+        let types = own.get("blockingTypes")?.as_array()?;
+        let allowed = types.is_empty() || types.iter().any(|known| known.as_str() == Some(wanted));
+        (!allowed).then(|| format!("the factsheet does not list: action {action_type} with the blocking type {wanted}"))
+    }
+
+    fn action(&self, name: &str, scope: Option<&str>) -> Gate {
+        let whole = action_name(name, None);
+        let names = match scope {
+            Some(_) => vec![action_name(name, scope), whole],
+            None => vec![whole],
+        };
+        self.declared(&names, |sheet| has_action(sheet, name, scope))
+    }
+
+    fn not_required(&self, path: &str) -> Gate {
+        let Some(sheet) = &self.factsheet else {
+            return Gate::Unobservable(format!("there is no factsheet that could say whether it needs: {path}"));
+        };
+        if requires(sheet, path) {
+            return Gate::NotApplicable(format!("the factsheet lists as required: {path}"));
+        }
+        Gate::Runs
+    }
+
+    fn optional(&self, path: &str) -> Gate {
+        self.declared(&[format!("optional {path}")], |sheet| has_optional(sheet, path))
+    }
+
+    /// Whether it has something, by its names, the most exact one first.
+    fn declared(&self, names: &[String], says: impl Fn(&Value) -> Option<bool>) -> Gate {
+        let name = names.first().map_or("", String::as_str);
+        let claimed = names.iter().find_map(|name| self.claims.get(name)).copied();
+        let listed = self.factsheet.as_ref().map(says);
+        match (listed, claimed) {
+            (Some(Some(true)), Some(false)) => Gate::Unobservable(format!(
+                "the factsheet lists what the profile says the device does not have: {name}"
+            )),
+            (Some(Some(false)), Some(true)) if !self.claims_add => Gate::Unobservable(format!(
+                "the factsheet does not list what the profile says the device has: {name}"
+            )),
+            (Some(Some(true)), _) | (_, Some(true)) => Gate::Runs,
+            (_, Some(false)) => Gate::NotApplicable(format!("the profile says that the device does not have: {name}")),
+            (Some(Some(false)), None) => Gate::NotApplicable(format!("the factsheet does not list: {name}")),
+            (Some(None), None) => Gate::Unobservable(format!(
+                "the factsheet has no list that could say whether it has: {name}"
+            )),
+            (None, None) => Gate::Unobservable(format!("there is no factsheet that could say whether it has: {name}")),
+        }
+    }
+
+    /// Where the profile and the factsheet say the opposite of each other, one sentence each.
+    #[must_use]
+    pub fn contradictions(&self) -> Vec<String> {
+        let Some(sheet) = &self.factsheet else {
+            return Vec::new();
+        };
+        let one = |(name, claimed): (&String, &bool)| {
+            let words: Vec<&str> = name.split(' ').collect();
+            let listed = match words[..] {
+                ["action", action] => has_action(sheet, action, None),
+                ["action", action, scope] => has_action(sheet, action, Some(scope)),
+                ["optional", path] => has_optional(sheet, path),
+                ["limit", path] => has_limit(sheet, path),
+                _ => None,
+            }?;
+            let (sheet_says, profile_says) = if *claimed {
+                ("does not list", "has")
+            } else {
+                ("lists", "does not have")
+            };
+            (listed != *claimed)
+                .then(|| format!("The factsheet {sheet_says} what the profile says the device {profile_says}: {name}."))
+        };
+        self.claims.iter().filter_map(one).collect()
+    }
+
+    /// The capabilities for the report, with their sources.
+    #[must_use]
+    pub fn list(&self) -> Vec<Capability> {
+        let mut all = BTreeMap::new();
+        let entries = self
+            .factsheet
+            .iter()
+            .filter_map(|sheet| sheet.pointer("/protocolFeatures/agvActions")?.as_array());
+        for action in entries.flatten() {
+            let name = action.get("actionType").and_then(Value::as_str).unwrap_or("?");
+            for scope in action
+                .get("actionScopes")
+                .and_then(Value::as_array)
+                .into_iter()
+                .flatten()
+            {
+                let scope = scope.as_str().unwrap_or("?");
+                all.insert(
+                    action_name(name, Some(scope)),
+                    ("yes".to_owned(), "factsheet".to_owned()),
+                );
+            }
+        }
+        let optional = self
+            .factsheet
+            .iter()
+            .filter_map(|sheet| sheet.pointer("/protocolFeatures/optionalParameters")?.as_array());
+        for parameter in optional.flatten() {
+            let name = parameter.get("parameter").and_then(Value::as_str).unwrap_or("?");
+            let support = parameter.get("support").and_then(Value::as_str).unwrap_or("?");
+            all.insert(format!("optional {name}"), (support.to_owned(), "factsheet".to_owned()));
+        }
+        for (name, claimed) in self.statements.iter().chain(&self.claims) {
+            let said = if *claimed { "yes" } else { "no" };
+            all.entry(name.clone())
+                .and_modify(|(listed, source)| {
+                    let agrees = *claimed == !matches!(listed.as_str(), "no");
+                    let both = if agrees {
+                        "factsheet, and the profile"
+                    } else {
+                        "factsheet; the profile says the opposite"
+                    };
+                    both.clone_into(source);
+                })
+                .or_insert_with(|| (said.to_owned(), "profile".to_owned()));
+        }
+        all.into_iter()
+            .take(500)
+            .map(|(name, (value, source))| Capability { name, value, source })
+            .collect()
+    }
+}
+
+/// Whether the device has to get on with a map file of ours; a transfer that fails needs no file that it could read.
+fn serves_a_map_to_read(test: &Test) -> bool {
+    let mut steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
+    steps.any(|step| match &step.verb {
+        Verb::Serve(serve) => {
+            serve.file.is_none() && matches!(serve.behaviour, ServeBehaviour::Well | ServeBehaviour::Slow)
+        }
+        _ => false,
+    })
+}
+
+fn literal(term: &Term) -> Option<&str> {
+    match &term.kind {
+        TermKind::Literal(Value::String(text)) => Some(text),
+        _ => None,
+    }
+}
+
+fn action_name(name: &str, scope: Option<&str>) -> String {
+    scope.map_or_else(|| format!("action {name}"), |scope| format!("action {name} {scope}"))
+}
+
+fn reverse(gate: Gate, name: &str) -> Gate {
+    match gate {
+        Gate::Runs => Gate::NotApplicable(format!("the device has what this test needs to be absent: {name}")),
+        Gate::NotApplicable(_) => Gate::Runs,
+        open @ Gate::Unobservable(_) => open,
+    }
+}
+
+/// Whether the factsheet lists an action; `None` when it has no such list.
+fn has_action(sheet: &Value, name: &str, scope: Option<&str>) -> Option<bool> {
+    let all = sheet.pointer("/protocolFeatures/agvActions")?.as_array()?;
+    Some(all.iter().any(|action| {
+        let scopes = action.get("actionScopes").and_then(Value::as_array);
+        action.get("actionType").and_then(Value::as_str) == Some(name)
+            && scope.is_none_or(|scope| scopes.into_iter().flatten().any(|other| other.as_str() == Some(scope)))
+    }))
+}
+
+/// Whether the factsheet lists an optional parameter; `None` when it has no such list.
+fn has_optional(sheet: &Value, path: &str) -> Option<bool> {
+    let all = sheet.pointer("/protocolFeatures/optionalParameters")?.as_array()?;
+    let named = |one: &Value| one.get("parameter").and_then(Value::as_str) == Some(path);
+    Some(all.iter().any(named))
+}
+
+/// Whether the vehicle cannot do without the optional parameter, or without a part of it.
+fn requires(sheet: &Value, path: &str) -> bool {
+    let all = sheet.pointer("/protocolFeatures/optionalParameters");
+    let mut all = all.and_then(Value::as_array).into_iter().flatten();
+    all.any(|one| {
+        let name = one.get("parameter").and_then(Value::as_str).unwrap_or_default();
+        let part = name
+            .strip_prefix(path)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        part && one.get("support").and_then(Value::as_str) == Some("REQUIRED")
+    })
+}
+
+/// `maxArrayLens.order.nodes`: a group of `protocolLimits` and a member whose name has dots in it; `None` when there are
+/// no limits at all.
+fn has_limit(sheet: &Value, path: &str) -> Option<bool> {
+    let limits = sheet.get("protocolLimits")?;
+    let (group, member) = path.split_once('.').unwrap_or((path, ""));
+    let value = limits.get(group).and_then(|group| group.get(member));
+    Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+    use tck_base::diagnostic::{Source, Span};
+
+    fn capabilities(factsheet: Option<Value>) -> Capabilities {
+        Capabilities {
+            factsheet,
+            statements: BTreeMap::from([("node-bound".to_owned(), false)]),
+            samples: Map::new(),
+            claims: BTreeMap::new(),
+            vantage: Vantage::Subscriber,
+            hooks: Vec::new(),
+            unattended: Vec::new(),
+            maps: Ok(()),
+            map_file: Ok(()),
+            motion: Ok(()),
+            claims_add: true,
+        }
+    }
+
+    fn sheet() -> Value {
+        json!({ "protocolFeatures": {
+            "agvActions": [{ "actionType": "pick", "actionScopes": ["NODE"] }],
+            "optionalParameters": [{ "parameter": "order.edges.trajectory", "support": "SUPPORTED" }],
+        }, "protocolLimits": { "maxArrayLens": { "order.nodes": 10 } } })
+    }
+
+    fn action(scope: Option<&str>) -> Need {
+        Need::Action {
+            name: "pick".to_owned(),
+            scope: scope.map(str::to_owned),
+        }
+    }
+
+    #[test]
+    fn the_factsheet_decides_what_applies() {
+        let known = capabilities(Some(sheet()));
+        assert_eq!(known.has(&action(Some("NODE"))), Gate::Runs);
+        assert!(matches!(known.has(&action(Some("EDGE"))), Gate::NotApplicable(_)));
+        assert_eq!(
+            known.has(&Need::Optional("order.edges.trajectory".to_owned())),
+            Gate::Runs
+        );
+        assert!(matches!(
+            known.has(&Need::NoOptional("order.edges.trajectory".to_owned())),
+            Gate::NotApplicable(_)
+        ));
+        assert_eq!(
+            known.has(&Need::Limit("maxArrayLens.order.nodes".to_owned())),
+            Gate::Runs
+        );
+        assert!(matches!(
+            known.has(&Need::Limit("maxArrayLens.order.edges".to_owned())),
+            Gate::NotApplicable(_)
+        ));
+    }
+
+    #[test]
+    fn a_profile_that_contradicts_the_factsheet_decides_nothing_by_it() {
+        let mut known = capabilities(Some(sheet()));
+        known.claims = BTreeMap::from([
+            ("action pick".to_owned(), false),
+            ("action drop".to_owned(), true),
+            ("hook use-lift".to_owned(), false),
+        ]);
+        assert!(matches!(known.has(&action(Some("NODE"))), Gate::Unobservable(_)));
+        let drop = Need::Action {
+            name: "drop".to_owned(),
+            scope: None,
+        };
+        assert_eq!(known.has(&drop), Gate::Runs);
+        assert_eq!(known.contradictions().len(), 2);
+        known.claims_add = false;
+        assert!(matches!(known.has(&drop), Gate::Unobservable(_)));
+        let lift = Need::Hook("use-lift".to_owned());
+        assert!(matches!(known.has(&lift), Gate::NotApplicable(_)));
+    }
+
+    #[test]
+    fn an_action_is_sent_with_the_blocking_types_its_factsheet_lists() {
+        let listed = json!([{ "actionType": "beep", "blockingTypes": ["SOFT", "HARD"] }]);
+        let mut known = capabilities(Some(json!({ "protocolFeatures": { "agvActions": listed } })));
+        known.samples = Map::from_iter([("briefAction".to_owned(), json!({ "type": "beep" }))]);
+        let span = Span::new(&Source::new("x.yaml", "x"), 0, 1);
+        let term = |kind| Term {
+            kind,
+            span: span.clone(),
+        };
+        let action = |of: TermKind, blocking: &str| SendAction {
+            action: term(of),
+            name: None,
+            with: Vec::new(),
+            with_all: None,
+            blocking: Some(term(TermKind::Literal(json!(blocking)))),
+            span: span.clone(),
+        };
+        let sample = || TermKind::Variable("device.briefAction.type".to_owned());
+        assert_eq!(known.blocks_otherwise(&action(sample(), "HARD")), None);
+        assert!(known.blocks_otherwise(&action(sample(), "NONE")).is_some());
+        let unknown = TermKind::Literal(json!("other"));
+        assert_eq!(known.blocks_otherwise(&action(unknown, "NONE")), None);
+    }
+
+    #[test]
+    fn a_factsheet_without_lists_leaves_everything_open() {
+        let header_only = capabilities(Some(json!({ "headerId": 1 })));
+        assert!(matches!(header_only.has(&action(None)), Gate::Unobservable(_)));
+        assert!(matches!(
+            header_only.has(&Need::Limit("maxArrayLens.order.nodes".to_owned())),
+            Gate::Unobservable(_)
+        ));
+    }
+
+    #[test]
+    fn what_nobody_says_is_open_and_not_absent() {
+        let unknown = capabilities(None);
+        assert!(matches!(unknown.has(&action(None)), Gate::Unobservable(_)));
+        assert!(matches!(
+            unknown.has(&Need::NoAction("pick".to_owned())),
+            Gate::Unobservable(_)
+        ));
+        assert!(matches!(
+            unknown.has(&Need::Profile("stops-between-nodes".to_owned())),
+            Gate::Unobservable(_)
+        ));
+        assert!(matches!(
+            unknown.has(&Need::Profile("node-bound".to_owned())),
+            Gate::NotApplicable(_)
+        ));
+        assert!(matches!(unknown.has(&Need::Tap), Gate::Unobservable(_)));
+    }
+}

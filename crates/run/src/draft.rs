@@ -1,0 +1,240 @@
+//! A commented profile from what was heard of a device: what is known is written down, and what is not is shown as a line to
+//! be filled in. Motion stays off.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+use super::discover::Device;
+use tck_pack::{Packs, Role};
+use tck_profile::{HOOKS, SAMPLE_ACTIONS};
+
+/// What the person who asks for the profile says beside it.
+#[derive(Clone, Debug, Default)]
+pub struct Wishes {
+    /// The broker the device is connected to.
+    pub broker: String,
+    /// The user name there.
+    pub username: Option<String>,
+    /// Whose certificates are trusted there, as a PEM file.
+    pub tls_ca: Option<String>,
+    /// A LIF file of the floor.
+    pub lif: Option<String>,
+    /// The vehicle type in it.
+    pub vehicle_type: Option<String>,
+}
+
+/// The text of `device.toml`.
+#[must_use]
+pub fn draft(device: &Device, wishes: &Wishes, packs: &Packs) -> String {
+    let mut text = String::new();
+    let name = format!("{} {}", device.manufacturer, device.serial_number);
+    let _ = writeln!(
+        text,
+        "# Profile of {}, from what was heard on the broker.",
+        one_line(&name)
+    );
+    text.push_str("# Lines that begin with `# ` are proposals: take away the `# ` and fill them in. Next:\n");
+    text.push_str("#   vda5050-tck validate device.toml\n#   vda5050-tck run --profile device.toml --plan\n");
+    identity(device, packs, &mut text);
+    bench(wishes, &mut text);
+    text.push_str(
+        "\n[motion]\n# No test moves the vehicle unless this is true. Look at the floor first.\nallowed = false\n",
+    );
+    text.push_str("# max-speed = 0.5\n");
+    layout(device, wishes, &mut text);
+    hooks(device, &mut text);
+    text
+}
+
+fn identity(device: &Device, packs: &Packs, text: &mut String) {
+    text.push_str("\n[device]\nrole = \"agv\"\n");
+    let _ = writeln!(text, "manufacturer = {}", quoted(&device.manufacturer));
+    let _ = writeln!(text, "serial-number = {}", quoted(&device.serial_number));
+    match device.version.as_deref() {
+        Some(version) if packs.get(version).is_some() => {
+            let _ = writeln!(text, "protocol = {}", quoted(version));
+        }
+        Some(version) => {
+            let _ = writeln!(
+                text,
+                "# It speaks version {}, which is not known here.",
+                one_line(version)
+            );
+            let _ = writeln!(text, "# protocol = {}", quoted(&packs.latest().id));
+        }
+        None => {
+            let _ = writeln!(text, "# protocol = {}", quoted(&packs.latest().id));
+        }
+    }
+    if !device.prefix.is_empty() {
+        let template = format!("{}/{{manufacturer}}/{{serialNumber}}", device.prefix);
+        let _ = writeln!(text, "topic-template = {}", quoted(&template));
+    }
+    text.push_str("# Harmless actions that tests may use; without them the tests in question are inconclusive.\n");
+    text.push_str("# long-action = { type = \"…\" }\n# brief-action = { type = \"…\" }\n");
+    for sample in SAMPLE_ACTIONS
+        .iter()
+        .filter(|sample| !sample.name.starts_with("failing-"))
+    {
+        let Some(action) = predefined(sample.name).filter(|action| has_action(device, action)) else {
+            continue;
+        };
+        let place = if sample.name.starts_with("edge-") {
+            "edge"
+        } else {
+            "node"
+        };
+        let _ = writeln!(text, "# {}", sample.doc);
+        let _ = writeln!(text, "# {} = {{ type = \"{action}\", {place} = \"…\" }}", sample.name);
+    }
+}
+
+fn bench(wishes: &Wishes, text: &mut String) {
+    text.push_str("\n[bench]\n# The device stays at its broker, so packets are not seen. To judge last will, keep-alive and retain as well:\n");
+    text.push_str("# let it connect to `listen`, and take the line `tap = false` out.\ntap = false\n");
+    let _ = writeln!(text, "broker = {}", quoted(&wishes.broker));
+    text.push_str("# listen = \"0.0.0.0:1883\"\n");
+    match &wishes.username {
+        Some(username) => {
+            let _ = writeln!(
+                text,
+                "username = {}\npassword-env = \"VDA5050_TCK_PASSWORD\"",
+                quoted(username)
+            );
+        }
+        None => text.push_str("# username = \"tck\"\n# password-env = \"VDA5050_TCK_PASSWORD\"\n"),
+    }
+    match &wishes.tls_ca {
+        Some(file) => {
+            let _ = writeln!(text, "tls-ca = {}", quoted(file));
+        }
+        None => text.push_str("# tls-ca = \"ca.crt\"\n"),
+    }
+}
+
+fn layout(device: &Device, wishes: &Wishes, text: &mut String) {
+    text.push_str("\n[layout]\n");
+    if let Some(lif) = &wishes.lif {
+        let _ = writeln!(text, "lif = {}", quoted(lif));
+        match &wishes.vehicle_type {
+            Some(vehicle_type) => {
+                let _ = writeln!(text, "vehicle-type = {}", quoted(vehicle_type));
+            }
+            None => text.push_str("# vehicle-type = \"…\"\n"),
+        }
+        return;
+    }
+    text.push_str(
+        "# Where the vehicle may drive: a LIF file, or a list of nodes and edges.\n# lif = \"hall.lif.json\"\n",
+    );
+    let Some(position) = &device.position else {
+        text.push_str("# nodes = [{ id = \"n1\", x = 0.0, y = 0.0, map = \"…\" }]\n# edges = []\n");
+        return;
+    };
+    let id = device.last_node.as_deref().unwrap_or("here");
+    text.push_str("# It stands on the first node now. Add at least three more, and the edges between them.\n");
+    let _ = writeln!(
+        text,
+        "nodes = [\n  {{ id = {}, x = {:?}, y = {:?}, map = {} }},\n]\nedges = [\n  # {{ id = \"e1\", from = {}, to = \"…\" }},\n]",
+        quoted(id),
+        position.x,
+        position.y,
+        quoted(&position.map_id),
+        one_line(&quoted(id)),
+    );
+}
+
+/// The hooks that make sense for what the device can do.
+fn hooks(device: &Device, text: &mut String) {
+    text.push_str("\n# What people or machines do to the device when a test asks for it. Exactly one of `run`, `http` and `prompt`.\n");
+    for hook in HOOKS.iter().filter(|hook| hook.role == Role::Agv) {
+        let needs = match hook.name {
+            "place-load" | "remove-load" => "pick",
+            "enable-map" => "enableMap",
+            "block-charging" | "unblock-charging" => "startCharging",
+            _ => "",
+        };
+        if !needs.is_empty() && device.factsheet.is_some() && !has_action(device, needs) {
+            continue;
+        }
+        let _ = writeln!(text, "\n# {}", one_line(hook.doc));
+        let _ = writeln!(text, "# [hooks.{}]\n# prompt = \"…\"", hook.name);
+    }
+}
+
+fn has_action(device: &Device, name: &str) -> bool {
+    let actions = device
+        .factsheet
+        .as_ref()
+        .and_then(|sheet| sheet.pointer("/protocolFeatures/agvActions"));
+    let mut actions = actions.and_then(Value::as_array).into_iter().flatten();
+    actions.any(|action| action.get("actionType").and_then(Value::as_str) == Some(name))
+}
+
+/// The predefined action that a sample action is about.
+fn predefined(sample: &str) -> Option<&'static str> {
+    Some(match sample.strip_prefix("edge-").unwrap_or(sample) {
+        "pick" => "pick",
+        "drop" => "drop",
+        "detect-object" => "detectObject",
+        "fine-positioning" => "finePositioning",
+        "start-charging" => "startCharging",
+        _ => return None,
+    })
+}
+
+/// A TOML text: what a device writes stays a text.
+fn quoted(text: &str) -> String {
+    toml::Value::String(one_line(text)).to_string()
+}
+
+fn one_line(text: &str) -> String {
+    text.chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .take(500)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::discover::Position;
+    use tck_base::diagnostic::Source;
+
+    #[test]
+    fn a_draft_is_a_valid_profile_whatever_the_device_is_called() {
+        let library = tck_testing::library();
+        let packs = &library.rules.packs;
+        for serial in ["0001", "a\"b\\c", "x\ny = 1"] {
+            let device = Device {
+                manufacturer: "ACME".to_owned(),
+                serial_number: serial.to_owned(),
+                prefix: "uagv/v2".to_owned(),
+                version: Some(packs.latest().version.to_string()),
+                position: Some(Position {
+                    x: 1.0,
+                    y: 2.5,
+                    map_id: "hall".to_owned(),
+                }),
+                factsheet: Some(json!({ "protocolFeatures": { "agvActions": [{ "actionType": "pick" }] } })),
+                ..Device::default()
+            };
+            let wishes = Wishes {
+                broker: "mqtt://127.0.0.1:1883".to_owned(),
+                ..Wishes::default()
+            };
+            let text = draft(&device, &wishes, packs);
+            let read = tck_profile::check(&Source::new("device.toml", text.clone()), std::path::Path::new(""));
+            let profile = read.unwrap_or_else(|wrong| panic!("{}\n{text}", wrong[0])).profile;
+            assert!(!profile.motion.allowed);
+            assert_eq!(profile.device.serial_number.as_deref(), Some(one_line(serial).as_str()));
+            assert!(
+                text.contains("# pick = ") && !text.contains("# start-charging = "),
+                "{text}"
+            );
+        }
+    }
+}

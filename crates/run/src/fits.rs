@@ -1,0 +1,181 @@
+//! Whether the messages of a test fit into a vehicle, by the limits of its factsheet.
+//!
+//! FACT-12 binds a master control, and the harness plays one: what the factsheet says is too much may be refused.
+
+use serde_json::Value;
+
+use tck_base::pattern::{Piece, Term, TermKind, whole};
+use tck_suite::model::{Need, Patch, RoutePlace, Send, Test, Verb};
+
+/// The most characters that a variable in an id may stand for.
+const VARIABLE: usize = 64;
+
+/// Why a test is nothing for a vehicle with such a factsheet. A test that is about a limit goes beyond it on purpose.
+pub(super) fn outgrown(sheet: &Value, test: &Test) -> Option<String> {
+    if test.needs.iter().any(|need| matches!(need, Need::Limit(_))) {
+        return None;
+    }
+    let limits = sheet.get("protocolLimits")?;
+    let sends = test.sections().into_iter().flat_map(|(_, steps)| steps);
+    let sends = sends.filter_map(|step| match &step.verb {
+        Verb::Send(send) => Some(send.as_ref()),
+        _ => None,
+    });
+    sends.into_iter().find_map(|send| {
+        let arrays = limits.get("maxArrayLens");
+        let too_many = sizes(send)
+            .into_iter()
+            .find_map(|(name, size)| Some((name, size, limit(arrays, name).filter(|limit| *limit < size)?)));
+        too_many
+            .map(|(name, size, limit)| {
+                format!("the factsheet says that {name} has {limit} elements at most, and {size} are needed")
+            })
+            .or_else(|| too_long(limits.get("maxStringLens"), send))
+    })
+}
+
+/// A limit of a factsheet; zero stands for none.
+fn limit(limits: Option<&Value>, name: &str) -> Option<u64> {
+    limits?.get(name).and_then(whole).filter(|limit| *limit > 0)
+}
+
+/// What is wrong with an id that a patch spells out, for a vehicle with such limits. All other ids take the form it wants.
+fn too_long(lengths: Option<&Value>, send: &Send) -> Option<String> {
+    let named = send.payload.iter().flat_map(|payload| match &payload.kind {
+        TermKind::Map(members) => members.as_slice(),
+        _ => &[],
+    });
+    let named = named.filter_map(|(name, value)| written(name, &value.kind));
+    let operations = match &send.patch {
+        Some(Patch::Operations(operations)) => match &operations.kind {
+            TermKind::List(operations) => operations.as_slice(),
+            _ => &[],
+        },
+        _ => &[],
+    };
+    let numerical = lengths?.get("idNumericalOnly").and_then(Value::as_bool) == Some(true);
+    let longest = limit(lengths, "idLen");
+    let mut ids = named.chain(operations.iter().filter_map(spelled));
+    ids.find_map(|(length, digits)| {
+        let longest = longest.filter(|longest| *longest < u64::try_from(length).unwrap_or(u64::MAX));
+        match longest {
+            Some(longest) => Some(format!(
+                "the factsheet says that an id has {longest} characters at most, and up to {length} are needed"
+            )),
+            None if numerical && !digits => {
+                Some("the factsheet says that ids are numbers, and one with letters is needed".to_owned())
+            }
+            None => None,
+        }
+    })
+}
+
+/// The length at most, and whether there are digits only, of an id that an operation writes partly letter by letter.
+fn spelled(operation: &Term) -> Option<(usize, bool)> {
+    let TermKind::Map(members) = &operation.kind else {
+        return None;
+    };
+    let member = |name: &str| {
+        members
+            .iter()
+            .find(|(member, _)| member == name)
+            .map(|(_, term)| &term.kind)
+    };
+    let TermKind::Literal(Value::String(path)) = member("path")? else {
+        return None;
+    };
+    written(path, member("value")?)
+}
+
+/// The same of a value under a name or at the end of a path.
+fn written(name: &str, value: &TermKind) -> Option<(usize, bool)> {
+    let TermKind::Text(pieces) = value else {
+        return None;
+    };
+    if !name.ends_with("Id") {
+        return None;
+    }
+    let length = pieces.iter().map(|piece| match piece {
+        Piece::Text(text) => text.chars().count(),
+        Piece::Variable(_) => VARIABLE,
+    });
+    let digits = pieces.iter().all(|piece| match piece {
+        Piece::Text(text) => text.bytes().all(|byte| byte.is_ascii_digit()),
+        Piece::Variable(_) => true,
+    });
+    Some((length.sum(), digits))
+}
+
+/// How long the arrays of a message are, by the names that factsheets have for them.
+fn sizes(send: &Send) -> Vec<(&'static str, u64)> {
+    let count = |length: usize| u64::try_from(length).unwrap_or(u64::MAX);
+    let mut all = vec![("instantActions", count(send.actions.len()))];
+    let mut parameters = send.actions.iter().map(|action| action.with.len()).max().unwrap_or(0);
+    if let Some(route) = &send.route {
+        let nodes = route.base.len() + route.horizon.len();
+        all.push(("order.nodes", count(nodes)));
+        all.push(("order.edges", count(nodes.saturating_sub(1))));
+        // What the vehicle is to list of it.
+        all.push(("state.nodeStates", count(nodes)));
+        all.push(("state.edgeStates", count(nodes.saturating_sub(1))));
+        for (place, actions) in &route.actions {
+            let name = match place {
+                RoutePlace::Node(_) => "node.actions",
+                RoutePlace::Edge(..) => "edge.actions",
+            };
+            all.push((name, count(actions.len())));
+            parameters = actions
+                .iter()
+                .map(|action| action.with.len())
+                .fold(parameters, usize::max);
+        }
+    }
+    all.push(("actions.actionsParameters", count(parameters)));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use tck_pack::Role;
+
+    /// Why this test is nothing for a vehicle with these limits.
+    fn why(limits: &Value, id: &str) -> Option<String> {
+        let library = tck_testing::library();
+        let tests = library.tests(Role::Agv, &library.rules.packs.latest().id);
+        let test = tests.iter().find(|test| test.id.as_str() == id).expect(id);
+        outgrown(&json!({ "protocolLimits": limits }), test)
+    }
+
+    #[test]
+    fn a_test_with_more_than_the_factsheet_allows_is_left_out() {
+        let id = "order-acceptance/long-action-id";
+        for fits in [
+            json!({}),
+            json!({ "maxArrayLens": { "order.nodes": 0, "node.actions": 1 } }),
+            json!({ "maxStringLens": { "idLen": 0 } }),
+            json!({ "maxStringLens": { "idLen": 200.0, "idNumericalOnly": false } }),
+        ] {
+            assert_eq!(why(&fits, id), None, "{fits}");
+        }
+        for outgrown in [
+            json!({ "maxStringLens": { "idLen": 40 } }),
+            json!({ "maxStringLens": { "idLen": 40.0 } }),
+            json!({ "maxStringLens": { "idNumericalOnly": true } }),
+        ] {
+            assert!(why(&outgrown, id).is_some(), "{outgrown}");
+        }
+        let nodes = |limit: Value| json!({ "maxArrayLens": { "order.nodes": limit } });
+        let id = "order-acceptance/node-by-node";
+        assert_eq!(why(&nodes(json!(100)), id), None);
+        for limit in [json!(1), json!(1.0)] {
+            assert!(
+                why(&nodes(limit), id)
+                    .expect("too many")
+                    .contains("order.nodes has 1 elements")
+            );
+        }
+    }
+}

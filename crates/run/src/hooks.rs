@@ -1,0 +1,378 @@
+//! Runs the hooks of a profile: a program, an HTTP request, a prompt to a person, or the restart of the
+//! device the harness itself has started.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::Stdio;
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::{Map, Value};
+use tokio::process::{Child, Command};
+
+use super::person::{Answer, Person, ask};
+use super::program::{ask_to_end, program};
+use tck_engine::{HookOutcome, Operator};
+use tck_net::bench::web;
+use tck_profile::{Hook, HookAction, Secrets, show_duration};
+
+/// Answers of a device that has understood what is wanted, and does not do it: in conflict with what it does now, not
+/// to be processed, not implemented.
+const REFUSALS: [u16; 3] = [409, 422, 501];
+
+/// How long a device may take to end in good order.
+const GOODBYE_LIMIT: Duration = Duration::from_secs(20);
+
+/// A device that the harness starts itself (`device.command`).
+#[derive(Debug)]
+pub struct DeviceProcess {
+    command: Vec<String>,
+    folder: PathBuf,
+    log: Option<PathBuf>,
+    child: Option<Child>,
+}
+
+impl DeviceProcess {
+    /// A device to be started with this program and these arguments in this folder. What it prints goes
+    /// into `log`.
+    #[must_use]
+    pub fn new(command: Vec<String>, folder: PathBuf, log: Option<PathBuf>) -> Self {
+        Self {
+            command,
+            folder,
+            log,
+            child: None,
+        }
+    }
+
+    /// Starts it.
+    ///
+    /// # Errors
+    /// What the operating system says, with the command.
+    pub fn start(&mut self) -> std::io::Result<()> {
+        let Some((program, arguments)) = self.command.split_first() else {
+            return Err(std::io::Error::other("device.command is empty"));
+        };
+        let output = |log: &Option<PathBuf>| -> std::io::Result<Stdio> {
+            let Some(path) = log else { return Ok(Stdio::null()) };
+            Ok(std::fs::File::options().create(true).append(true).open(path)?.into())
+        };
+        let child = Command::new(program)
+            .args(arguments)
+            .current_dir(if self.folder.as_os_str().is_empty() {
+                ".".into()
+            } else {
+                self.folder.clone()
+            })
+            .stdin(Stdio::null())
+            .stdout(output(&self.log)?)
+            .stderr(output(&self.log)?)
+            .kill_on_drop(true)
+            .spawn()
+            .map_err(|error| std::io::Error::other(format!("cannot start the device with `{program}`: {error}")))?;
+        self.child = Some(child);
+        Ok(())
+    }
+
+    /// Kills it, if it still runs, and starts it again.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub async fn restart(&mut self) -> std::io::Result<()> {
+        self.stop().await;
+        self.start()
+    }
+
+    /// Asks it to end in good order, and kills it when it does not. Says whether it ended by itself.
+    pub async fn end(&mut self) -> bool {
+        if !self.is_running() {
+            self.stop().await;
+            return true;
+        }
+        let Some(child) = &mut self.child else { return true };
+        if !ask_to_end(child) {
+            self.stop().await;
+            return false;
+        }
+        let ended = tokio::time::timeout(GOODBYE_LIMIT, child.wait()).await.is_ok();
+        self.stop().await;
+        ended
+    }
+
+    /// Whether it was started and not ended.
+    fn is_running(&mut self) -> bool {
+        let ended = self.child.as_mut().map(Child::try_wait);
+        matches!(ended, Some(Ok(None)))
+    }
+
+    /// Kills it.
+    pub async fn stop(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let _ = child.kill().await;
+        }
+    }
+}
+
+/// The hooks of a profile.
+#[derive(Debug)]
+pub struct ProfileHooks {
+    hooks: BTreeMap<String, Hook>,
+    common: BTreeMap<String, String>,
+    folder: PathBuf,
+    device: Option<DeviceProcess>,
+    /// Who may be asked.
+    person: Option<Arc<dyn Person>>,
+    means: Means,
+}
+
+/// What requests need, and what is kept out of everything that is told.
+#[derive(Clone, Debug, Default)]
+pub struct Means {
+    /// PEM file with an authority that is trusted beside those of the system.
+    pub authority: Option<PathBuf>,
+    /// What nobody may read.
+    pub secrets: Secrets,
+}
+
+impl ProfileHooks {
+    /// Hooks with the values of the placeholders every hook may use.
+    #[must_use]
+    pub fn new(
+        hooks: BTreeMap<String, Hook>,
+        common: BTreeMap<String, String>,
+        folder: PathBuf,
+        device: Option<DeviceProcess>,
+        person: Option<Arc<dyn Person>>,
+        means: Means,
+    ) -> Self {
+        Self {
+            hooks,
+            common,
+            folder,
+            device,
+            person,
+            means,
+        }
+    }
+
+    async fn carry_out(&mut self, hook: &Hook, values: &BTreeMap<String, String>) -> HookOutcome {
+        let action = hook.action.filled(values);
+        let outcome = match action {
+            HookAction::Run(arguments) => tokio::time::timeout(hook.timeout, program(&arguments, &self.folder)).await,
+            HookAction::Http {
+                method,
+                url,
+                body,
+                headers,
+            } => {
+                let headers = headers.into_iter().map(|(name, value)| (name, value.reveal()));
+                let request = Asked {
+                    method,
+                    url,
+                    body,
+                    headers: headers.collect(),
+                    authority: self.means.authority.clone(),
+                    within: hook.timeout,
+                };
+                let asked = tokio::task::spawn_blocking(move || request.send());
+                let answer = async {
+                    asked
+                        .await
+                        .unwrap_or_else(|error| HookOutcome::Failed(error.to_string()))
+                };
+                tokio::time::timeout(hook.timeout, answer).await
+            }
+            HookAction::Prompt(text) => {
+                let Some(person) = &self.person else {
+                    return HookOutcome::Missing;
+                };
+                return answered(ask(person, text, hook.timeout).await, hook.timeout);
+            }
+            // The engine waits for it itself.
+            HookAction::NaturalTraffic => Ok(HookOutcome::Done("left to natural traffic".to_owned())),
+            HookAction::RestartDevice | HookAction::StopDevice | HookAction::StartDevice => {
+                let Some(device) = &mut self.device else {
+                    return HookOutcome::Failed("the profile has no `device.command` that could be started".to_owned());
+                };
+                return match action {
+                    HookAction::StopDevice if device.end().await => {
+                        HookOutcome::Done("the device has ended".to_owned())
+                    }
+                    HookAction::StopDevice => HookOutcome::Failed(format!(
+                        "the device did not end within {} of SIGTERM, and was killed",
+                        show_duration(GOODBYE_LIMIT)
+                    )),
+                    HookAction::StartDevice if device.is_running() => HookOutcome::Done("the device runs".to_owned()),
+                    _ => match device.restart().await {
+                        Ok(()) => HookOutcome::Done("the device was started".to_owned()),
+                        Err(error) => HookOutcome::Failed(error.to_string()),
+                    },
+                };
+            }
+        };
+        outcome.unwrap_or_else(|_| HookOutcome::Failed(format!("not done within {}", show_duration(hook.timeout))))
+    }
+}
+
+impl Operator for ProfileHooks {
+    fn hooks(&self) -> Vec<String> {
+        let usable = self
+            .hooks
+            .values()
+            .filter(|hook| self.person.is_some() || hook.action.is_unattended());
+        usable.map(|hook| hook.name.clone()).collect()
+    }
+
+    fn unattended(&self) -> Vec<String> {
+        let prompts = self.hooks.values().filter(|hook| !hook.action.is_unattended());
+        let unattended = prompts.filter(|_| self.person.is_none());
+        unattended.map(|hook| hook.name.clone()).collect()
+    }
+
+    fn natural_traffic(&self, hook: &str) -> Option<Duration> {
+        let hook = self.hooks.get(hook)?;
+        (hook.action == HookAction::NaturalTraffic).then_some(hook.timeout)
+    }
+
+    async fn run(&mut self, name: &str, parameters: Map<String, Value>) -> HookOutcome {
+        let Some(hook) = self.hooks.get(name).cloned() else {
+            return HookOutcome::Missing;
+        };
+        let mut values = self.common.clone();
+        values.extend(parameters.into_iter().map(|(name, value)| match value {
+            Value::String(text) => (name, text),
+            other => (name, other.to_string()),
+        }));
+        let outcome = self.carry_out(&hook, &values).await;
+        let shown = |text: String| self.means.secrets.out_of(&text);
+        match outcome {
+            HookOutcome::Done(text) => HookOutcome::Done(shown(text)),
+            HookOutcome::Failed(text) => HookOutcome::Failed(shown(text)),
+            HookOutcome::Refused(text) => HookOutcome::Refused(shown(text)),
+            HookOutcome::Skipped(text) => HookOutcome::Skipped(shown(text)),
+            HookOutcome::Missing => HookOutcome::Missing,
+        }
+    }
+}
+
+/// A request of a hook.
+struct Asked {
+    method: String,
+    url: String,
+    body: Option<String>,
+    headers: Vec<(String, String)>,
+    authority: Option<PathBuf>,
+    within: Duration,
+}
+
+impl Asked {
+    fn send(self) -> HookOutcome {
+        let Self { method, url, .. } = &self;
+        let agent = web::agent(url, self.authority.as_ref(), |limits| {
+            limits.timeout_global(Some(self.within))
+        });
+        let agent = match agent {
+            Ok(agent) => agent,
+            Err(error) => return HookOutcome::Failed(format!("{method} {url}: {error}")),
+        };
+        let mut made = ureq::http::Request::builder().method(method.as_str()).uri(url);
+        let has_type = self
+            .headers
+            .iter()
+            .any(|(name, _)| name.eq_ignore_ascii_case("content-type"));
+        if self.body.is_some() && !has_type {
+            made = made.header("content-type", "application/json");
+        }
+        for (name, value) in &self.headers {
+            made = made.header(name, value);
+        }
+        let made = match made.body(self.body.clone().unwrap_or_default()) {
+            Ok(made) => made,
+            Err(error) => return HookOutcome::Failed(format!("{method} {url}: {error}")),
+        };
+        match agent.run(made) {
+            Ok(answer) => HookOutcome::Done(format!("{method} {url}: {}", answer.status())),
+            Err(ureq::Error::StatusCode(code)) if REFUSALS.contains(&code) => {
+                HookOutcome::Refused(format!("{method} {url}: {code}"))
+            }
+            Err(error) => HookOutcome::Failed(format!("{method} {url}: {error}")),
+        }
+    }
+}
+
+fn answered(answer: Answer, within: Duration) -> HookOutcome {
+    match answer {
+        Answer::Done => HookOutcome::Done("the operator answered: done".to_owned()),
+        Answer::Skip => HookOutcome::Skipped("the operator skipped the test".to_owned()),
+        Answer::End => HookOutcome::Failed("the operator ended the run".to_owned()),
+        Answer::Silence => HookOutcome::Failed(format!("nobody answered within {}", show_duration(within))),
+        Answer::GivenUp => HookOutcome::Failed("given up: the run ends".to_owned()),
+        Answer::Unasked(why) => HookOutcome::Failed(format!("the operator could not be asked: {why}")),
+    }
+}
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+    use tck_base::diagnostic::{Source, Span};
+
+    fn hook(action: HookAction) -> Hook {
+        Hook {
+            name: "shutdown".to_owned(),
+            action,
+            timeout: Duration::from_secs(30),
+            span: Span::new(&Source::new("device.toml", ""), 0, 0),
+        }
+    }
+
+    async fn outcomes(
+        script: &str,
+        folder: &std::path::Path,
+        actions: &[HookAction],
+    ) -> (Vec<HookOutcome>, ProfileHooks) {
+        let command = ["sh", "-c", script].map(str::to_owned).to_vec();
+        let mut device = DeviceProcess::new(command, folder.to_owned(), None);
+        device.start().unwrap();
+        let mut hooks = ProfileHooks::new(
+            BTreeMap::new(),
+            BTreeMap::new(),
+            folder.to_owned(),
+            Some(device),
+            None,
+            Means::default(),
+        );
+        let mut all = Vec::new();
+        for action in actions {
+            while !folder.join("ready").exists() {
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
+            all.push(hooks.carry_out(&hook(action.clone()), &BTreeMap::new()).await);
+        }
+        (all, hooks)
+    }
+
+    #[tokio::test]
+    async fn the_device_of_the_profile_is_asked_to_end_in_good_order_and_started_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let script = "trap 'echo goodbye >> said; exit 0' TERM; echo hello >> said; touch ready; \
+                      while true; do sleep 0.05; done";
+        let actions = [HookAction::StopDevice, HookAction::StopDevice, HookAction::StartDevice];
+        // The device ends with its hooks.
+        let (all, _hooks) = outcomes(script, folder.path(), &actions).await;
+        assert!(
+            all.iter().all(|outcome| matches!(outcome, HookOutcome::Done(_))),
+            "{all:?}"
+        );
+        while std::fs::read_to_string(folder.path().join("said"))
+            .unwrap()
+            .lines()
+            .count()
+            < 3
+        {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        let said = std::fs::read_to_string(folder.path().join("said")).unwrap();
+        assert_eq!(said, "hello\ngoodbye\nhello\n");
+    }
+}

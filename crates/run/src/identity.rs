@@ -1,0 +1,65 @@
+//! Whether the device that speaks is the one that the profile names.
+
+use tck_journal::Entry;
+use tck_journal::event::{Event, Packet, Payload};
+use tck_journal::json::Parsed;
+use tck_judge::RunJudge;
+use tck_pack::Role;
+
+/// Who speaks instead of the device of the profile, as long as that one says nothing; only the tap can see it.
+pub(super) fn somebody_else(judge: &RunJudge) -> Option<String> {
+    let ground = judge.ground();
+    if judge.role() != Role::Agv {
+        return None;
+    }
+    let rules = ground.pack.topics().iter().filter(|rule| rule.publisher == Role::Agv);
+    let names: Vec<&str> = rules.map(|rule| rule.name.as_str()).collect();
+    let mut found = None;
+    let timeline = judge.timeline();
+    for entry in timeline.of("mqtt/connect").iter().chain(timeline.of("mqtt/publish")) {
+        let Some((topic, payload)) = said(entry) else { continue };
+        if ground.topics.values().any(|own| own == topic) {
+            return None;
+        }
+        let levels: Vec<&str> = topic.split('/').collect();
+        let [.., manufacturer, serial, name] = levels[..] else {
+            continue;
+        };
+        let Some(name) = names.iter().find(|known| **known == name) else {
+            continue;
+        };
+        if found.is_none() {
+            found = Some(text(judge, topic, payload, (manufacturer, serial), name));
+        }
+    }
+    found
+}
+
+/// Where an entry of the tap says something, and what: as last will, or as message.
+fn said(entry: &Entry) -> Option<(&str, &Payload)> {
+    let Event::Packet { packet, .. } = entry.event() else {
+        return None;
+    };
+    match packet {
+        Packet::Connect { will: Some(will), .. } => Some((&will.topic, &will.payload)),
+        Packet::Publish { topic, payload, .. } => Some((topic, payload)),
+        _ => None,
+    }
+}
+
+fn text(judge: &RunJudge, topic: &str, payload: &Payload, levels: (&str, &str), name: &str) -> String {
+    let ground = judge.ground();
+    let parsed = Parsed::of(payload);
+    let header = |member: &str| parsed.value().and_then(|value| value.get(member)?.as_str());
+    let speaks = (
+        header("manufacturer").unwrap_or(levels.0),
+        header("serialNumber").unwrap_or(levels.1),
+    );
+    let (manufacturer, serial) = &ground.identity;
+    let expected = ground.topics.get(name).map_or("", String::as_str);
+    let short = |text: &str| text.chars().take(200).collect::<String>();
+    let (speaks, topic) = (short(&format!("{}/{}", speaks.0, speaks.1)), short(topic));
+    format!(
+        "a device speaks as {speaks} on {topic}; the profile says {manufacturer}/{serial}, who publishes on {expected}"
+    )
+}

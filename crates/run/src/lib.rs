@@ -1,0 +1,52 @@
+//! One run: admit the device, plan, drive the engine test by test, own the result bundle.
+//!
+//! What is sent in a test is the engine's business, what it means the judge's. This module decides which
+//! tests run, in which order, from where the vehicle stands, and what happens between two tests.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod admission;
+mod between;
+mod bindings;
+mod bundle;
+pub mod capabilities;
+mod claims;
+mod discover;
+mod dispatching;
+mod draft;
+mod draw;
+mod estimate;
+mod fits;
+mod header;
+pub mod hooks;
+mod identity;
+mod ladder;
+mod lasting;
+mod operators;
+mod outputs;
+mod over_sockets;
+mod pace;
+mod person;
+mod plan;
+mod presence;
+mod program;
+mod rest;
+mod risk;
+mod session;
+mod setup;
+mod site;
+mod strikes;
+mod virtual_run;
+
+pub use bundle::{Bundle, BundleError, JOURNAL, LATEST};
+pub use capabilities::Capabilities;
+pub use discover::{Device, Heard, Position, listen};
+pub use draft::{Wishes, draft};
+pub use header::HeaderParts;
+pub use outputs::{OutputError, sources, write_all, write_result};
+pub use over_sockets::{Place, RunError, SocketRun};
+pub use person::{Answer, Person, Wanted};
+pub use plan::{How, PlanLine, RunPlan, Use, Waits};
+pub use session::{End, Finished, Progress, Setup, run};
+pub use setup::{BenchFacts, DeviceUnderTest, Request};
+pub use virtual_run::{Silent, VirtualRun, going_on_at, run_silently, run_virtually};

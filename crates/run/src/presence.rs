@@ -1,0 +1,56 @@
+//! Whether the device is there, as far as the harness can see.
+
+use tck_engine::vehicle::{has_any_open_connection, has_open_connection};
+use tck_journal::Entry;
+use tck_journal::Vantage;
+use tck_journal::event::Event;
+use tck_judge::RunJudge;
+use tck_pack::Role;
+
+/// Whether the device is connected, as far as the harness can see.
+pub(super) enum Presence {
+    There,
+    Away,
+}
+
+impl Presence {
+    pub(super) fn of(judge: &RunJudge, vantage: Vantage) -> Self {
+        let there = match vantage {
+            Vantage::Tap if judge.role() == Role::MasterControl => has_any_open_connection(judge),
+            // A master control says nothing by itself, so nobody can tell.
+            Vantage::Subscriber if judge.role() == Role::MasterControl => true,
+            Vantage::Tap => has_open_connection(judge),
+            Vantage::Subscriber => {
+                let said = judge.timeline().of("connection").last();
+                let online = judge.ground().pack.word("connection.online");
+                let state = said.and_then(|entry| entry.json()?.get("connectionState")?.as_str());
+                let fresh = judge
+                    .timeline()
+                    .of("state")
+                    .last()
+                    .is_some_and(|entry| !is_stale(entry));
+                if said.is_some() { state == online } else { fresh }
+            }
+        };
+        if there { Self::There } else { Self::Away }
+    }
+
+    pub(super) fn is_there(&self) -> bool {
+        matches!(self, Self::There)
+    }
+}
+
+/// Whether the device says on its own connection topic that it is online. A device that never said anything
+/// there is not held to it here: that is for the tests to find.
+pub(super) fn says_online(judge: &RunJudge) -> bool {
+    let Some(said) = judge.timeline().of("connection").last() else {
+        return true;
+    };
+    let state = said.json().and_then(|message| message.get("connectionState")?.as_str());
+    state == judge.ground().pack.word("connection.online")
+}
+
+/// Stored by the broker before the run began.
+pub(super) fn is_stale(entry: &Entry) -> bool {
+    matches!(entry.event(), Event::Message { retain: true, .. })
+}

@@ -1,0 +1,277 @@
+//! Whether the vehicle is as a test may find it, and if not, what is in the way.
+//!
+//! This is the one judgement on which the preambles rely, the way back after a test, and the decision to restart a
+//! vehicle. Lasting mistakes that are known are read over.
+
+use serde_json::Value;
+
+use super::presence::says_online;
+use tck_base::clock::Moment;
+use tck_course::Layout;
+use tck_judge::RunJudge;
+use tck_pack::Pack;
+
+/// How far from its last node a vehicle may stand to be on it, in metres, unless the node allows more.
+const ON_NODE: f64 = 0.5;
+/// A place farther than this from the last node, in metres, is no place between two nodes; it is another measure.
+const AN_EDGE: f64 = 100.0;
+/// Words of the vocabulary for errors that only refuse something.
+const REFUSALS: [&str; 4] = [
+    "error.validation",
+    "error.order",
+    "error.outdatedUpdate",
+    "error.noOrderToCancel",
+];
+
+/// What keeps a vehicle from the next test.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Obstacle {
+    /// It does not say that it is online.
+    NotOnline,
+    /// It has sent no state in its present connection.
+    NoState,
+    /// It lists nodes or edges.
+    Order,
+    /// It says that it drives.
+    Driving,
+    /// An action is not over: its id.
+    Action(String),
+    /// It is paused.
+    Paused,
+    /// Another operating mode than the one it had.
+    Mode(String),
+    /// An emergency stop is active.
+    EmergencyStop,
+    /// A FATAL error that is no refusal.
+    Fatal(String),
+    /// It charges.
+    Charging,
+    /// It is on a map it was not on before, or does not know where it is.
+    Map(String),
+    /// It stands between two nodes.
+    Place,
+    /// It carries something it did not carry before.
+    Load,
+}
+
+impl Obstacle {
+    /// For people.
+    pub(super) fn describe(&self) -> String {
+        match self {
+            Self::NotOnline => "it does not say that it is online".to_owned(),
+            Self::NoState => "it has sent no state since it connected".to_owned(),
+            Self::Order => "nodeStates or edgeStates are not empty".to_owned(),
+            Self::Driving => "driving is true".to_owned(),
+            Self::Action(id) => format!("action {id:?} is not over"),
+            Self::Paused => "paused is true".to_owned(),
+            Self::Mode(mode) => format!("operatingMode is {mode:?}"),
+            Self::EmergencyStop => "an emergency stop is reported".to_owned(),
+            Self::Fatal(kind) => format!("the FATAL error {kind:?} is reported"),
+            Self::Charging => "it charges".to_owned(),
+            Self::Map(map) => format!("it is on map {map:?}, or does not know where it is"),
+            Self::Place => "it stands between two nodes".to_owned(),
+            Self::Load => "it carries a load".to_owned(),
+        }
+    }
+
+    /// Whether no test that moves the vehicle can be run in spite of it. The others are looked at by those tests that
+    /// need them.
+    pub(super) fn halts(&self) -> bool {
+        matches!(self, Self::Order | Self::Driving | Self::NoState)
+    }
+}
+
+/// What the vehicle was like when nothing had been asked of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Home {
+    /// Its first state.
+    pub(super) first: Option<Value>,
+    /// When the running test began.
+    pub(super) since: Moment,
+    /// Its state when the running test began.
+    pub(super) before: Option<Value>,
+}
+
+impl Home {
+    fn shown<'h>(&'h self, path: &str) -> Option<&'h Value> {
+        self.before.as_ref()?.pointer(path)
+    }
+
+    /// Everything that is in the way; empty for a vehicle at rest.
+    pub(super) fn obstacles(&self, judge: &RunJudge, layout: Option<&Layout>) -> Vec<Obstacle> {
+        let mut all = Vec::new();
+        if !says_online(judge) {
+            all.push(Obstacle::NotOnline);
+        }
+        let ever = judge.timeline().of("state").iter().any(|entry| entry.json().is_some());
+        let Some(state) = judge.state() else {
+            all.extend(ever.then_some(Obstacle::NoState));
+            return all;
+        };
+        self.of_state(&state, &judge.ground().pack, layout, &mut all);
+        all
+    }
+
+    fn of_state(&self, state: &Value, pack: &Pack, layout: Option<&Layout>, all: &mut Vec<Obstacle>) {
+        let text = |path: &str| state.pointer(path).and_then(Value::as_str);
+        let is = |path: &str| state.pointer(path).and_then(Value::as_bool).unwrap_or(false);
+        let list = |name: &str| state.get(name).and_then(Value::as_array).into_iter().flatten();
+        if list("nodeStates").chain(list("edgeStates")).next().is_some() {
+            all.push(Obstacle::Order);
+        }
+        if is("/driving") {
+            all.push(Obstacle::Driving);
+        }
+        all.extend(list("actionStates").filter(|action| !is_over(action)).map(|action| {
+            let id = action.get("actionId").and_then(Value::as_str).unwrap_or_default();
+            Obstacle::Action(id.chars().take(64).collect())
+        }));
+        if is("/paused") {
+            all.push(Obstacle::Paused);
+        }
+        let usual = ["operatingMode.automatic", "operatingMode.semiautomatic"];
+        if let Some(mode) = text("/operatingMode")
+            && !usual.iter().any(|word| pack.word(word) == Some(mode))
+        {
+            all.push(Obstacle::Mode(mode.chars().take(64).collect()));
+        }
+        if text("/safetyState/eStop").is_some_and(|stop| stop != "NONE") {
+            all.push(Obstacle::EmergencyStop);
+        }
+        let fatal = list("errors").filter(|error| error.get("errorLevel").and_then(Value::as_str) == Some("FATAL"));
+        let kinds = fatal.filter_map(|error| error.get("errorType").and_then(Value::as_str));
+        all.extend(
+            kinds
+                .filter(|kind| !REFUSALS.iter().any(|word| pack.word(word) == Some(kind)))
+                .map(|kind| Obstacle::Fatal(kind.chars().take(64).collect())),
+        );
+        let charged = self.shown("/batteryState/charging") == Some(&Value::Bool(true));
+        if is("/batteryState/charging") && !charged {
+            all.push(Obstacle::Charging);
+        }
+        let had_load = self
+            .shown("/loads")
+            .and_then(Value::as_array)
+            .is_some_and(|loads| !loads.is_empty());
+        if list("loads").next().is_some() && !had_load {
+            all.push(Obstacle::Load);
+        }
+        self.of_place(state, layout, all);
+    }
+
+    fn of_place(&self, state: &Value, layout: Option<&Layout>, all: &mut Vec<Obstacle>) {
+        let Some(layout) = layout else { return };
+        let initialized = |state: &Value| {
+            state
+                .pointer("/agvPosition/positionInitialized")
+                .and_then(Value::as_bool)
+        };
+        let map = |state: &Value| {
+            let map = state.pointer("/agvPosition/mapId").and_then(Value::as_str);
+            map.map(|map| map.chars().take(64).collect::<String>())
+        };
+        let was_known = self
+            .before
+            .as_ref()
+            .is_some_and(|before| initialized(before) == Some(true));
+        let now = map(state);
+        let lost = initialized(state) == Some(false) && was_known;
+        let strange = match (&now, self.before.as_ref().and_then(map)) {
+            (Some(now), Some(before)) => *now != before && !layout.nodes().any(|node| node.map_id == *now),
+            _ => false,
+        };
+        if lost || strange {
+            all.push(Obstacle::Map(now.unwrap_or_default()));
+        } else if self.is_between_nodes(state, layout) {
+            all.push(Obstacle::Place);
+        }
+    }
+
+    /// Whether the vehicle stands off its last node. A vehicle whose position did not fit its node to begin with, or
+    /// that always shows the same, is not measured by it.
+    pub(super) fn is_between_nodes(&self, state: &Value, layout: &Layout) -> bool {
+        let away = |state: &Value| {
+            let node = layout.node(state.get("lastNodeId")?.as_str()?)?;
+            let (x, y) = place_of(state)?;
+            let same_map = state.pointer("/agvPosition/mapId").and_then(Value::as_str) == Some(node.map_id.as_str());
+            let distance = node.distance(x, y);
+            same_map.then(|| (distance > node.deviation_xy.unwrap_or(0.0).max(ON_NODE), distance))
+        };
+        let fitted = self.first.as_ref().and_then(away).is_some_and(|(away, _)| !away);
+        let moved = self.first.as_ref().and_then(place_of) != place_of(state);
+        fitted && moved && away(state).is_some_and(|(away, distance)| away && distance < AN_EDGE)
+    }
+}
+
+/// Where a state shows the vehicle.
+pub(super) fn place_of(state: &Value) -> Option<(f64, f64)> {
+    let at = |path: &str| state.pointer(path).and_then(Value::as_f64);
+    Some((at("/agvPosition/x")?, at("/agvPosition/y")?))
+}
+
+/// Whether an action is over.
+pub(super) fn is_over(action: &Value) -> bool {
+    let status = action.get("actionStatus").and_then(Value::as_str);
+    matches!(status, Some("FINISHED" | "FAILED"))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn layout() -> Layout {
+        Layout::built_in()
+    }
+
+    fn at(node: &str, x: f64, y: f64) -> Value {
+        let map = layout().node(node).unwrap().map_id.clone();
+        json!({ "lastNodeId": node, "agvPosition": { "x": x, "y": y, "mapId": map, "positionInitialized": true } })
+    }
+
+    fn on(node: &str) -> Value {
+        let layout = layout();
+        let found = layout.node(node).unwrap();
+        at(node, found.x, found.y)
+    }
+
+    fn places(first: Value, now: &Value) -> Vec<Obstacle> {
+        let home = Home {
+            before: Some(first.clone()),
+            first: Some(first),
+            ..Home::default()
+        };
+        let mut all = Vec::new();
+        home.of_place(now, Some(&layout()), &mut all);
+        all
+    }
+
+    #[test]
+    fn a_vehicle_off_its_last_node_stands_between_two() {
+        let layout = layout();
+        let node = layout.nodes().next().unwrap();
+        let off = at(&node.id, node.x + 1.85, node.y);
+        assert_eq!(places(on(&node.id), &off), [Obstacle::Place]);
+        assert_eq!(places(on(&node.id), &at(&node.id, node.x + 0.1, node.y)), []);
+    }
+
+    #[test]
+    fn a_position_that_never_fitted_says_nothing() {
+        let layout = layout();
+        let node = layout.nodes().next().unwrap();
+        let odd = at(&node.id, node.x + 20.0, node.y);
+        assert_eq!(places(odd, &at(&node.id, node.x + 1.85, node.y)), []);
+        let in_millimetres = at(&node.id, node.x + 2000.0, node.y);
+        assert_eq!(places(on(&node.id), &in_millimetres), []);
+    }
+
+    #[test]
+    fn a_map_nobody_knows_is_in_the_way() {
+        let layout = layout();
+        let node = layout.nodes().next().unwrap();
+        let mut lost = on(&node.id);
+        lost["agvPosition"]["mapId"] = json!("no-such-map");
+        assert_eq!(places(on(&node.id), &lost), [Obstacle::Map("no-such-map".to_owned())]);
+    }
+}

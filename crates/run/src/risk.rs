@@ -1,0 +1,75 @@
+//! The order in which tests run: what needs nothing of a vehicle comes first, and what may strand or block it last.
+
+use tck_profile::SampleKind;
+use tck_suite::model::{Test, Verb};
+
+/// What a test may do to a vehicle at worst; more is later.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Risk {
+    /// It is only looked at.
+    Nothing,
+    /// It is driven, and stopped.
+    Driven,
+    /// It handles loads, or charges.
+    Loaded,
+    /// Its connection is disturbed.
+    Connection,
+    /// Something is done to it by hand.
+    ByHand,
+    /// Its maps or its place on them change.
+    Maps,
+    /// Its mode, its pause or its safety is changed.
+    Modes,
+    /// A fault is brought about.
+    Faults,
+    /// It is switched off.
+    Power,
+}
+
+/// The tests by what they may do to the vehicle; where that is the same, as they stood.
+pub(super) fn by_risk(tests: &mut [std::sync::Arc<Test>]) {
+    tests.sort_by_key(|test| risk(test));
+}
+
+fn risk(test: &Test) -> Risk {
+    let mut worst = if test.moves { Risk::Driven } else { Risk::Nothing };
+    if test
+        .course
+        .stations()
+        .any(|station| SampleKind::of_variable(station).is_some())
+    {
+        worst = worst.max(Risk::Loaded);
+    }
+    for step in test.sections().into_iter().flat_map(|(_, steps)| steps) {
+        let own = match &step.verb {
+            Verb::Link(_) => Risk::Connection,
+            Verb::Operator(operator) => of_hook(&operator.hook),
+            Verb::Serve(_) => Risk::Maps,
+            Verb::Send(_) => of_text(step.span.text()),
+            _ => Risk::Nothing,
+        };
+        worst = worst.max(own);
+    }
+    worst
+}
+
+fn of_hook(hook: &str) -> Risk {
+    match hook {
+        "power-cycle" | "shutdown" | "start" => Risk::Power,
+        "provoke-error" | "clear-error" | "emergency-stop" | "release-emergency-stop" => Risk::Faults,
+        "set-mode" | "drive-manually" | "push-out" | "enter-field" | "leave-field" => Risk::Modes,
+        "enable-map" | "use-lift" | "shift-position" => Risk::Maps,
+        _ => Risk::ByHand,
+    }
+}
+
+fn of_text(text: &str) -> Risk {
+    let maps = ["initPosition", "enableMap", "downloadMap", "deleteMap"];
+    if maps.iter().any(|word| text.contains(word)) {
+        Risk::Maps
+    } else if text.contains("startPause") {
+        Risk::Modes
+    } else {
+        Risk::Nothing
+    }
+}

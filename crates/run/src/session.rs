@@ -1,0 +1,478 @@
+//! The course of a run.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
+use super::bindings::{course_of, own_bindings};
+use super::capabilities::Capabilities;
+use super::draw::draw;
+use super::estimate::{self, Estimate};
+use super::presence::Presence;
+use super::rest::{Home, Obstacle};
+use super::risk::by_risk;
+use super::strikes::Strikes;
+use tck_base::verdict::Verdict;
+use tck_course::Layout;
+use tck_engine::{Engine, EngineError, Operator, Recorder, Watcher};
+use tck_journal::event::{Event, Gate, Plan, PlannedTest};
+use tck_judge::RunJudge;
+use tck_net::link::Link;
+use tck_net::link::mqtt::BenchInfo;
+use tck_pack::Role;
+use tck_result::{RunResult, TestResult};
+use tck_suite::model::Test;
+
+/// What a run is about.
+pub struct Setup {
+    /// The selected tests, in the order they should run.
+    pub tests: Vec<Arc<Test>>,
+    /// Whether that is every test there is for this role and version.
+    pub complete: bool,
+    /// Of the cases that come from a schema, those are run that this seed draws; all of them without one.
+    pub draw: Option<u64>,
+    /// What is known before the device is there.
+    pub capabilities: Capabilities,
+    /// Where the vehicle may drive.
+    pub layout: Option<Layout>,
+    /// How many mock AGVs the harness has; none when an AGV is tested.
+    pub vehicles: usize,
+    /// Map files the device can read; without one, ours are served.
+    pub maps: Vec<bytes::Bytes>,
+    /// Deviations the profile declares.
+    pub deviations: BTreeMap<String, String>,
+    /// What restricts the statement from the start.
+    pub limits: Vec<String>,
+    /// Identifier of the run; makes ids unique.
+    pub run: String,
+    /// Whether it ends after the first test that fails.
+    pub fail_fast: bool,
+    /// How often each test is run.
+    pub repeat: u32,
+}
+
+/// A finished run.
+pub struct Finished {
+    /// How it ended.
+    pub end: End,
+    /// What came out.
+    pub result: RunResult,
+    /// Journal and judge.
+    pub recorder: Recorder,
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub enum End {
+    /// The plan was carried out.
+    Completed,
+    /// The device never showed up; the text says how long was waited.
+    NoDevice(String),
+    /// Another device speaks than the one that was to be judged; the text says which. Nothing is judged.
+    Stranger(String),
+    /// The device went away, and did not come back.
+    Lost(String),
+    /// The user stopped it.
+    Interrupted,
+    /// The device sent more than can be kept.
+    Flooded(String),
+    /// Link, journal or host broke.
+    Broken(EngineError),
+}
+
+/// Tells a person how the run is getting on.
+pub trait Progress: Watcher {
+    /// The plan is made.
+    fn planned(&mut self, plan: &Plan);
+    /// A test begins.
+    fn test_begun(&mut self, test: &Test, number: usize, of: usize);
+    /// A test has ended.
+    fn test_ended(&mut self, result: &TestResult);
+    /// Something worth knowing.
+    fn note(&mut self, text: &str);
+    /// The bench stands, and a device that is not ours is expected there.
+    fn expects_device(&mut self, bench: &BenchInfo) {
+        let _ = bench;
+    }
+}
+
+/// Carries out a run. `saved` is called after every test, so that a crash loses nothing.
+pub async fn run<L: Link, O: Operator>(
+    engine: &mut Engine<L, O>,
+    mut setup: Setup,
+    progress: &mut dyn Progress,
+    saved: &mut dyn FnMut(&RunJudge),
+) -> End {
+    engine.map_files = std::mem::take(&mut setup.maps);
+    let end = match Session::new(engine, setup, progress).carry_out(saved).await {
+        Ok(end) => end,
+        Err(error) => End::Broken(error),
+    };
+    let (partial, reason) = match &end {
+        End::Completed => (false, None),
+        End::NoDevice(why) | End::Stranger(why) | End::Lost(why) | End::Flooded(why) => (true, Some(why.clone())),
+        End::Interrupted => (true, Some("interrupted by the user".to_owned())),
+        End::Broken(error) => (true, Some(error.to_string())),
+    };
+    let stranger = matches!(end, End::Stranger(_));
+    let recorded = engine.note(Event::RunEnded {
+        partial,
+        reason,
+        stranger,
+    });
+    let synced = engine.recorder.sync();
+    match (recorded, synced) {
+        (Ok(_), Ok(())) => end,
+        (Err(error), _) => End::Broken(error),
+        (_, Err(error)) => End::Broken(error.into()),
+    }
+}
+
+pub(super) struct Session<'a, L, O> {
+    pub(super) engine: &'a mut Engine<L, O>,
+    pub(super) setup: Setup,
+    pub(super) progress: &'a mut dyn Progress,
+    /// Why the vehicle is not moved any more.
+    pub(super) halted: Option<String>,
+    /// What the vehicle was like before.
+    pub(super) home: Home,
+    /// How often in a row the way back to rest was tried in vain.
+    pub(super) ladders: u32,
+    /// The id of the last cancelOrder on that way.
+    pub(super) cancelled: Option<String>,
+    /// The vehicle was found to refuse every order, until it was restarted.
+    pub(super) refuses: bool,
+    /// How often in a row a restart did not make it take orders again.
+    pub(super) unhelped: u32,
+    /// How many orders were sent on that way.
+    pub(super) orders: u32,
+    /// From which record on the device has what it needs after a start.
+    pub(super) ready_since: u64,
+    /// Preconditions that are not reached again and again.
+    strikes: Strikes,
+}
+
+impl<'a, L: Link, O: Operator> Session<'a, L, O> {
+    fn new(engine: &'a mut Engine<L, O>, mut setup: Setup, progress: &'a mut dyn Progress) -> Self {
+        if engine.recorder.judge().role() == Role::Agv {
+            by_risk(&mut setup.tests);
+        }
+        Self {
+            engine,
+            setup,
+            progress,
+            halted: None,
+            home: Home::default(),
+            ladders: 0,
+            cancelled: None,
+            refuses: false,
+            unhelped: 0,
+            orders: 0,
+            ready_since: 0,
+            strikes: Strikes::default(),
+        }
+    }
+
+    async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
+        let admitted = self.admit().await?;
+        self.draw();
+        if let Err(why) = admitted {
+            let end = self.stopped().unwrap_or_else(|| match self.somebody_else() {
+                Some(who) => End::Stranger(who),
+                None => End::NoDevice(why.clone()),
+            });
+            let tests = self.setup.tests.iter().map(|test| PlannedTest {
+                test: test.id.clone(),
+                gate: Gate::Unobservable(why.clone()),
+            });
+            let plan = self.plan(tests.collect());
+            self.record_plan(&plan)?;
+            saved(self.engine.recorder.judge());
+            return Ok(end);
+        }
+        let gates = self.setup.tests.iter().map(|test| PlannedTest {
+            test: test.id.clone(),
+            gate: self.setup.capabilities.gate(test),
+        });
+        let mut plan = self.plan(gates.collect());
+        self.record_plan(&plan)?;
+        self.progress.planned(&plan);
+        self.tell_estimate(&plan);
+        let tests = self.setup.tests.clone();
+        let runs = plan.tests.iter().filter(|planned| planned.gate == Gate::Runs).count();
+        let runs = runs * self.setup.repeat as usize;
+        let mut number = 0;
+        let mut gone: Option<String> = None;
+        let mut failed: Option<String> = None;
+        for (at, test) in tests.iter().enumerate() {
+            if plan.tests[at].gate != Gate::Runs {
+                continue;
+            }
+            if self.engine.interrupted() {
+                break;
+            }
+            if let Some(first) = &failed {
+                plan.tests[at].gate = Gate::Unobservable(format!("left out, because {first} failed (--fail-fast)"));
+                continue;
+            }
+            for repetition in 1..=self.setup.repeat {
+                if self.engine.interrupted() || failed.is_some() || repetition > 1 && gone.is_some() {
+                    break;
+                }
+                self.engine.repetition = (self.setup.repeat > 1).then_some(repetition);
+                number += 1;
+                if gone.is_none() {
+                    gone = self.be_there().await?;
+                }
+                if gone.is_none() && test.device == Role::MasterControl {
+                    self.let_it_finish().await?;
+                }
+                let aside = gone.clone().or_else(|| self.strikes.against(test));
+                let ready = match (&aside, &self.halted) {
+                    (Some(why), _) => Err(why.clone()),
+                    (None, Some(why)) if test.moves => Err(why.clone()),
+                    _ => self.bindings(test, number),
+                };
+                let ready = match ready {
+                    Err(_) if gone.is_none() && test.device == Role::MasterControl => {
+                        self.bring_back().await?;
+                        self.bindings(test, number)
+                    }
+                    ready => ready,
+                };
+                match ready {
+                    Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
+                    Ok(own) => {
+                        self.progress.test_begun(test, number, runs);
+                        gone = self.run_and_restore(test, own, number).await?;
+                        if let Some(result) = self.engine.recorder.judge().done().last() {
+                            self.progress.test_ended(result);
+                            if self.setup.fail_fast && result.verdict == Some(Verdict::Fail) {
+                                failed = Some(result.id.clone());
+                            }
+                        }
+                        saved(self.engine.recorder.judge());
+                    }
+                }
+            }
+        }
+        if let Some(first) = &failed {
+            let limit = format!("No test was run after {first}, which failed (--fail-fast).");
+            self.setup.limits.push(limit);
+        }
+        if let (Some(why), None) = (&gone, self.stopped()) {
+            self.record_plan(&plan)?;
+            return Ok(End::Lost(why.clone()));
+        }
+        self.record_plan(&plan)?;
+        Ok(self.stopped().unwrap_or(End::Completed))
+    }
+
+    /// Leaves out cases that come from a schema or a matrix, where the run need not be thorough.
+    fn draw(&mut self) {
+        let Some(seed) = self.setup.draw else { return };
+        let runs = |test: &Test| self.setup.capabilities.gate(test) == Gate::Runs;
+        let drawing = draw(&self.setup.tests, seed, runs);
+        if drawing.taken < drawing.of {
+            self.setup.limits.push(format!(
+                "Of {} cases from schemas and matrices, {} were to be tried, drawn by the seed {seed}; `--thorough` tries \
+                 all of them.",
+                drawing.of, drawing.taken
+            ));
+        }
+        self.setup.tests = drawing.tests;
+    }
+
+    /// How the run ended before its time, if it did.
+    fn stopped(&self) -> Option<End> {
+        let flooded = self.engine.recorder.flood().map(|why| End::Flooded(why.to_owned()));
+        flooded.or(self.engine.interrupted().then_some(End::Interrupted))
+    }
+
+    /// Says how long the run will take; in virtual time it is over before that is read.
+    fn tell_estimate(&mut self, plan: &Plan) {
+        if self.engine.operator.runs_on_the_link() {
+            return;
+        }
+        let times = self.engine.recorder.judge().ground().bindings.get("time");
+        let estimate = Estimate::of(
+            times,
+            self.setup.capabilities.factsheet.as_ref(),
+            self.setup.layout.as_ref(),
+            self.engine.operator.usual_time(),
+        );
+        let planned = self.setup.tests.iter().zip(&plan.tests);
+        let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);
+        let estimate = estimate.of_tests(running.map(|(test, _)| &**test));
+        self.progress.note(&format!(
+            "estimated time: {} (more if the device is slow)",
+            estimate::in_words(estimate)
+        ));
+    }
+
+    fn plan(&self, tests: Vec<PlannedTest>) -> Plan {
+        let series = self
+            .setup
+            .capabilities
+            .factsheet
+            .as_ref()
+            .and_then(|sheet| sheet.pointer("/typeSpecification/seriesName"));
+        let mut limits = self.setup.limits.clone();
+        if let Err(why) = &self.setup.capabilities.motion {
+            limits.push(format!("No test that moves the vehicle was run: {why}."));
+        }
+        limits.extend(self.halted.clone());
+        if !self.setup.complete {
+            limits.push("Only a selection of the tests was run.".to_owned());
+        }
+        Plan {
+            tests,
+            capabilities: self.setup.capabilities.list(),
+            limits,
+            deviations: self.setup.deviations.clone(),
+            series_name: series
+                .and_then(Value::as_str)
+                .map(|name| name.chars().take(200).collect()),
+            complete: self.setup.complete,
+        }
+    }
+
+    fn record_plan(&mut self, plan: &Plan) -> Result<(), EngineError> {
+        let mut plan = plan.clone();
+        plan.limits = self.plan(Vec::new()).limits;
+        self.engine.note(Event::Planned { plan: Box::new(plan) })?;
+        Ok(())
+    }
+
+    /// Makes sure the device is connected before a test; gives the reason when it stays away.
+    async fn be_there(&mut self) -> Result<Option<String>, EngineError> {
+        self.engine.drain().await?;
+        if Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there() {
+            return Ok(None);
+        }
+        self.progress.note("the device is not connected; waiting for it");
+        self.revive().await
+    }
+
+    fn bindings(&self, test: &Test, number: usize) -> Result<Map<String, Value>, String> {
+        let judge = self.engine.recorder.judge();
+        let course = course_of(test, self.setup.layout.as_ref(), judge, &self.home)?;
+        Ok(own_bindings(test, course, judge, &self.setup.run, number))
+    }
+
+    /// Runs a test and brings the vehicle back. One whose precondition was not reached is run once more, when something
+    /// was learned about the vehicle or it could be restarted. Gives the reason when the device stays away.
+    async fn run_and_restore(
+        &mut self,
+        test: &Arc<Test>,
+        own: Map<String, Value>,
+        number: usize,
+    ) -> Result<Option<String>, EngineError> {
+        let known = self.engine.recorder.judge().ground().waivers.len();
+        self.look_at_home();
+        self.engine
+            .run_test(test, own, &mut AsWatcher(&mut *self.progress))
+            .await?;
+        self.after(test).await?;
+        if test.device == Role::MasterControl {
+            return Ok(None);
+        }
+        let Some(place) = self.unreached(test) else {
+            self.strikes.reached(test);
+            return Ok(None);
+        };
+        if self.engine.interrupted() {
+            return Ok(None);
+        }
+        let learned = self.engine.recorder.judge().ground().waivers.len() > known;
+        if !learned && self.strikes.is_worth_a_restart(&place) {
+            let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
+            if !has_hook || !self.restart().await? {
+                self.strikes.missed(test, &place);
+                return Ok(None);
+            }
+        } else if !learned {
+            self.strikes.missed(test, &place);
+            return Ok(None);
+        }
+        if let Some(why) = self.be_there().await? {
+            return Ok(Some(why));
+        }
+        if let Ok(own) = self.bindings(test, number) {
+            self.progress
+                .note("the precondition was not reached; the test is tried once more");
+            self.look_at_home();
+            self.engine
+                .run_test(test, own, &mut AsWatcher(&mut *self.progress))
+                .await?;
+            self.after(test).await?;
+        }
+        match self.unreached(test) {
+            Some(place) => self.strikes.missed(test, &place),
+            None => self.strikes.reached(test),
+        }
+        Ok(None)
+    }
+
+    fn look_at_home(&mut self) {
+        self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        self.home.since = self.engine.link.now().moment;
+    }
+
+    /// Where the precondition of the test that ended last was not reached.
+    fn unreached(&self, test: &Test) -> Option<String> {
+        let result = self.engine.recorder.judge().done().last()?;
+        let mut steps = result.steps.iter();
+        let failed = steps.find(|step| step.path.starts_with("given") && step.outcome == "failed")?;
+        (result.id == test.id).then(|| failed.place.clone())
+    }
+
+    /// Restores the link, and makes sure the vehicle is at rest.
+    async fn after(&mut self, test: &Test) -> Result<(), EngineError> {
+        self.settle_link().await?;
+        self.engine.drain().await?;
+        if self.was_started()
+            && let Err(why) = self.after_start().await?
+        {
+            self.progress.note(&why);
+        }
+        if self.engine.recorder.judge().role() == Role::MasterControl {
+            return self.tidy_fleet(test).await;
+        }
+        if !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there() {
+            return Ok(());
+        }
+        self.read_over(self.engine.link.now().moment).await?;
+        let left = if self.obstacles().is_empty() {
+            Vec::new()
+        } else {
+            self.bring_to_rest().await?
+        };
+        if left.is_empty() {
+            self.still_takes_orders().await?;
+        }
+        if !left.iter().any(Obstacle::halts) {
+            self.halted = None;
+        } else if self.halted.is_none() {
+            let all: Vec<String> = left.iter().map(Obstacle::describe).collect();
+            let why = format!(
+                "After test {} the vehicle did not return to idle ({}); no test that moves it was run from then on.",
+                test.id,
+                all.join("; ")
+            );
+            self.progress.note(&why);
+            self.halted = Some(why);
+        }
+        Ok(())
+    }
+}
+
+/// Shows the engine only the part of the progress it needs.
+struct AsWatcher<'a>(&'a mut dyn Progress);
+
+impl Watcher for AsWatcher<'_> {
+    fn waiting(&mut self, step: &tck_suite::model::Step) {
+        self.0.waiting(step);
+    }
+}

@@ -1,0 +1,310 @@
+//! The one assembly of a run: what is known of the device beforehand, from a profile or because it is built in, and what
+//! follows from it for the first record and the course of the run, over sockets and in virtual time alike.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use serde_json::{Map, Value};
+
+use super::capabilities::Capabilities;
+use super::claims::{claims, statements};
+use super::header::HeaderParts;
+use super::session::Setup;
+use tck_base::diagnostic::Diagnostic;
+use tck_course::Layout;
+use tck_journal::Vantage;
+use tck_journal::event::{RunHeader, Setting};
+use tck_judge::Library;
+use tck_pack::Participant;
+use tck_pack::{Pack, Role};
+use tck_profile::{Effective, Profile, TimeLimits};
+use tck_simulate::BuiltIn;
+use tck_simulate::ReferenceAgv;
+use tck_simulate::{Fleet, USUAL_FLEET};
+use tck_suite::model::Test;
+
+/// What a run takes on, and what it is called.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// The tests, in order.
+    pub tests: Vec<Arc<Test>>,
+    /// Whether that is every test of the role and version.
+    pub complete: bool,
+    /// Which cases that come from a schema or a matrix are run; all of them without a seed.
+    pub draw: Option<u64>,
+    /// Identifier of the run; makes ids unique.
+    pub run: String,
+    /// The command line, for the record.
+    pub command: Vec<String>,
+    /// Whether the run ends after the first test that fails.
+    pub fail_fast: bool,
+    /// How often each test is run.
+    pub repeat: u32,
+    /// Whether nothing is left to choose: the run is for a certificate.
+    pub certifies: bool,
+}
+
+impl Request {
+    /// All tests of a role and version, with the cases that the seed 1 draws.
+    #[must_use]
+    pub fn all(role: Role, library: &Library, pack: &Pack) -> Self {
+        Self {
+            tests: library.tests(role, &pack.id),
+            complete: true,
+            draw: Some(1),
+            run: uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
+            command: Vec::new(),
+            fail_fast: false,
+            repeat: 1,
+            certifies: false,
+        }
+    }
+}
+
+/// What is known of the device under test before it is there.
+#[derive(Clone, Debug)]
+pub struct DeviceUnderTest {
+    /// Who it says it is.
+    pub subject: Participant,
+    /// The timing contract.
+    pub time: TimeLimits,
+    /// `device.*` beside identity and factsheet.
+    pub bindings: Map<String, Value>,
+    /// What it is like, by the words of a profile.
+    pub statements: BTreeMap<String, bool>,
+    /// What it can do beside its factsheet, or against it.
+    pub claims: BTreeMap<String, bool>,
+    /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
+    pub claims_add: bool,
+    /// Whether a vehicle under test may drive; `Err` says why not.
+    pub motion: Result<(), String>,
+    /// Where it may drive.
+    pub layout: Option<Layout>,
+    /// The mock AGVs it is tested with, when it is a master control.
+    pub fleet: Option<Fleet>,
+    /// Map files it can read; `Err` says why none is known.
+    pub maps: Result<Vec<Bytes>, String>,
+    /// Deviations it declares: requirement id to reason.
+    pub deviations: BTreeMap<String, String>,
+    /// What restricts the statement from the start, one sentence each.
+    pub limits: Vec<String>,
+    /// Effective settings, for the record.
+    pub settings: Vec<Setting>,
+}
+
+impl DeviceUnderTest {
+    /// A built-in device. It reads whatever it is served as a map.
+    #[must_use]
+    pub fn built_in(device: &BuiltIn, in_virtual_time: bool) -> Self {
+        Self {
+            subject: device.subject().clone(),
+            time: device.time().clone(),
+            bindings: device.device_bindings(),
+            statements: device.statements(),
+            claims: BTreeMap::new(),
+            claims_add: true,
+            motion: Ok(()),
+            layout: Some(device.layout().clone()),
+            fleet: device.fleet().cloned(),
+            maps: Ok(Vec::new()),
+            deviations: BTreeMap::new(),
+            limits: vec![device.limit(in_virtual_time)],
+            settings: Vec::new(),
+        }
+    }
+
+    /// The device of a profile. A master control gets at least so many mock AGVs, and those of the profile.
+    ///
+    /// # Errors
+    /// What the profile lacks, or a file that it names and that cannot be read.
+    pub fn of_profile(effective: &Effective, pack: &Pack, vehicles: Option<usize>) -> Result<Self, Vec<Diagnostic>> {
+        let profile = &effective.profile;
+        let device = &profile.device;
+        let subject = subject(profile)?;
+        let layout = Layout::of_profile(profile)?;
+        let fleet = match subject.role {
+            Role::Agv => None,
+            Role::MasterControl => Some(fleet(profile, layout.as_ref(), vehicles.unwrap_or(USUAL_FLEET), pack)),
+        };
+        let motion = if fleet.is_some() || profile.motion.allowed {
+            // The vehicles of a fleet are the harness's own.
+            Ok(())
+        } else {
+            Err("the profile does not allow motion ([motion] allowed = true)".to_owned())
+        };
+        let deviations = profile.deviations.iter();
+        Ok(Self {
+            time: profile.time.clone(),
+            bindings: device.bindings(),
+            statements: statements(device),
+            claims: claims(device),
+            claims_add: true,
+            motion,
+            layout: layout.or_else(|| fleet.is_some().then(Layout::built_in)),
+            maps: map_files(effective, fleet.is_some())?,
+            deviations: deviations
+                .map(|deviation| (deviation.requirement.as_str().to_owned(), deviation.reason.clone()))
+                .collect(),
+            limits: profile.time.contract().iter().map(ToString::to_string).collect(),
+            settings: effective.settings.clone(),
+            subject,
+            fleet,
+        })
+    }
+
+    /// Rules motion out. The mock AGVs of a fleet are the harness's own, and go on driving.
+    pub fn stand_still(&mut self, why: &str) {
+        if self.fleet.is_none() {
+            self.motion = Err(why.to_owned());
+        }
+    }
+
+    /// The topics that this side publishes.
+    #[must_use]
+    pub fn published(&self, pack: &Pack) -> Vec<String> {
+        match &self.fleet {
+            Some(fleet) => fleet.commanded(pack),
+            None => self.subject.published(pack),
+        }
+    }
+
+    /// The topics that the harness publishes: those of the other side.
+    #[must_use]
+    pub fn told(&self, pack: &Pack) -> Vec<String> {
+        match &self.fleet {
+            Some(fleet) => fleet.published(pack),
+            None => {
+                let other_side = Participant {
+                    role: Role::MasterControl,
+                    ..self.subject.clone()
+                };
+                other_side.published(pack)
+            }
+        }
+    }
+
+    /// The first record of the run, and its set-up, on a bench that can do so much.
+    #[must_use]
+    pub fn on(self, bench: BenchFacts, request: Request, library: &Library, pack: &Pack) -> (RunHeader, Setup) {
+        let mocks = self
+            .fleet
+            .as_ref()
+            .map_or_else(Vec::new, |fleet| fleet.mock_vehicles(pack));
+        let vehicles = mocks.len();
+        let header = HeaderParts {
+            subject: &self.subject,
+            pack,
+            run: &request.run,
+            certifies: request.certifies,
+            vantage: bench.vantage,
+            suites: &library.rules.sha256,
+            modified: library.assets.modified(),
+            time: self.time.bindings(),
+            device: self.bindings.clone(),
+            vehicles: mocks,
+            fleet: self.fleet.as_ref().map_or_else(Vec::new, Fleet::bindings),
+            settings: self.settings,
+            command: request.command,
+        };
+        let header = header.header();
+        let (map_file, maps) = match self.maps {
+            Ok(files) => (Ok(()), files),
+            Err(why) => (Err(why), Vec::new()),
+        };
+        let capabilities = Capabilities {
+            factsheet: None,
+            statements: self.statements,
+            samples: self.bindings,
+            claims: self.claims,
+            vantage: bench.vantage,
+            hooks: bench.hooks,
+            unattended: bench.unattended,
+            maps: bench.maps,
+            map_file,
+            motion: self.motion,
+            claims_add: self.claims_add,
+        };
+        let setup = Setup {
+            tests: request.tests,
+            complete: request.complete,
+            draw: request.draw,
+            capabilities,
+            layout: self.layout,
+            vehicles,
+            maps,
+            deviations: self.deviations,
+            limits: [self.limits, bench.limits].concat(),
+            run: request.run,
+            fail_fast: request.fail_fast,
+            repeat: request.repeat.max(1),
+        };
+        (header, setup)
+    }
+}
+
+/// What a bench can do.
+#[derive(Clone, Debug)]
+pub struct BenchFacts {
+    /// From where the harness sees.
+    pub vantage: Vantage,
+    /// Names of the hooks that can be run.
+    pub hooks: Vec<String>,
+    /// Names of the hooks that are prompts, where nobody can be asked.
+    pub unattended: Vec<String>,
+    /// Whether the device can reach the map server; `Err` says why not.
+    pub maps: Result<(), String>,
+    /// What the broker does not allow, and what cannot be said therefore.
+    pub limits: Vec<String>,
+}
+
+fn subject(profile: &Profile) -> Result<Participant, Vec<Diagnostic>> {
+    let missing = |setting: &str, flag: &str| {
+        let title = format!("the device is not named: `{setting}` is missing");
+        let hint = format!("set it in the profile, or with {flag}");
+        vec![Diagnostic::whole("missing-setting", title).hint(hint)]
+    };
+    let device = &profile.device;
+    let named = |name: &Option<String>, setting, flag| name.clone().ok_or_else(|| missing(setting, flag));
+    Ok(Participant {
+        role: device.role,
+        manufacturer: named(&device.manufacturer, "device.manufacturer", "--manufacturer")?,
+        serial_number: named(&device.serial_number, "device.serial-number", "--serial")?,
+        topic_template: device.topic_template.clone(),
+    })
+}
+
+/// The mock AGVs of a profile.
+fn fleet(profile: &Profile, layout: Option<&Layout>, vehicles: usize, pack: &Pack) -> Fleet {
+    let mut like = ReferenceAgv::new(pack);
+    if let Some(layout) = layout {
+        like.live_on(layout.clone());
+    }
+    like.furnish(&profile.device.sample_actions);
+    like.subject.topic_template.clone_from(&profile.device.topic_template);
+    let wanted = &profile.vehicles;
+    let count = vehicles.max(wanted.serial_numbers.len());
+    let mut fleet = Fleet::new(&like, &wanted.manufacturer, &wanted.serial_numbers, count, pack);
+    if let (Some(vehicle), Some(node)) = (fleet.vehicles.first_mut(), &wanted.start_node) {
+        vehicle.config.start_node.clone_from(node);
+    }
+    fleet
+}
+
+/// The files of `[maps]`. A vehicle that is not ours is not judged by a file that nobody said it can read; mock AGVs
+/// read any.
+fn map_files(effective: &Effective, by_mock_vehicles: bool) -> Result<Result<Vec<Bytes>, String>, Vec<Diagnostic>> {
+    let read = effective.profile.maps.iter().map(|file| {
+        std::fs::read(file).map(Bytes::from).map_err(|error| {
+            let title = format!("the map file {} cannot be read: {error}", file.display());
+            vec![effective.complain("maps.files", "unreadable", title, "named here")]
+        })
+    });
+    let files: Vec<Bytes> = read.collect::<Result<_, _>>()?;
+    if files.is_empty() && !by_mock_vehicles {
+        return Ok(Err(
+            "the profile names no map file that the device can read ([maps] files)".to_owned(),
+        ));
+    }
+    Ok(Ok(files))
+}

@@ -1,0 +1,28 @@
+//! The built-in devices: reference devices as devices under test and as mock AGVs, over real sockets and on the bench in
+//! memory, and the hooks they understand.
+//!
+//! How they behave is the business of `reference`; what they are like to a run stands here.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod built_in;
+pub mod driver;
+mod fetching;
+mod fleet;
+mod hook_server;
+mod peer;
+mod reference_agv;
+mod reference_master_control;
+mod running_fleet;
+mod site;
+mod unknown;
+mod witness;
+
+pub use built_in::BuiltIn;
+pub use fleet::{Fleet, USUAL_FLEET};
+pub use hook_server::HookServer;
+pub use reference_agv::{ReferenceAgv, Vehicle};
+pub use reference_master_control::ReferenceMasterControl;
+pub use running_fleet::WithFleet;
+pub use site::{Injected, KINDS, Kind, Messages, Site, SiteMessage};
+pub use unknown::UnknownName;

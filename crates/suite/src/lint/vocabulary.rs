@@ -1,0 +1,149 @@
+//! What the linter asks the packs, the catalogue and the list of hooks.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use serde_json::Value;
+
+use tck_pack::{Breakage, Catalogue, Ground, Packs, Role, Shape, Version};
+
+/// What the catalogue says about one requirement.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RequirementFacts {
+    /// The sides it obliges.
+    pub roles: Vec<Role>,
+    /// The packs that have it, as indices into [`Vocabulary::versions`].
+    pub packs: Vec<usize>,
+}
+
+/// A hook that `operator:` can name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HookFacts {
+    /// Its name.
+    pub name: &'static str,
+    /// The side it is for.
+    pub role: Role,
+    /// The parameters it takes.
+    pub parameters: &'static [&'static str],
+}
+
+/// The names a suite may use. A pack is meant by its index into [`Vocabulary::versions`].
+pub trait Vocabulary {
+    /// The version of every pack.
+    fn versions(&self) -> Vec<Version>;
+    /// The topics of a pack and who publishes them.
+    fn topics(&self, pack: usize) -> Vec<(String, Role)>;
+    /// What the schema of a topic says about a path of member names; lists are entered without an index.
+    fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Rc<Shape>>;
+    /// The members below a path.
+    fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String>;
+    /// Every way to break a message of a topic; `None` if there is no such topic.
+    fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>>;
+    /// A word of the vocabulary: `error.outdatedUpdate`.
+    fn word(&self, pack: usize, path: &str) -> Option<Value>;
+    /// A requirement.
+    fn requirement(&self, id: &str) -> Option<RequirementFacts>;
+    /// Every requirement id.
+    fn requirements(&self) -> Vec<String>;
+    /// The hooks of one side.
+    fn hooks(&self, role: Role) -> Vec<HookFacts>;
+}
+
+/// The names of the real packs and catalogue.
+pub struct PackVocabulary<'a> {
+    packs: &'a Packs,
+    catalogue: &'a Catalogue,
+    hooks: &'a [HookFacts],
+    /// Suites ask for the same few paths over and over, and a schema takes its time to answer.
+    shapes: RefCell<HashMap<String, Option<Rc<Shape>>>>,
+}
+
+impl<'a> PackVocabulary<'a> {
+    /// The names of these packs, this catalogue and the hooks a profile can have.
+    #[must_use]
+    pub fn new(packs: &'a Packs, catalogue: &'a Catalogue, hooks: &'a [HookFacts]) -> Self {
+        Self {
+            packs,
+            catalogue,
+            hooks,
+            shapes: RefCell::default(),
+        }
+    }
+}
+
+impl Vocabulary for PackVocabulary<'_> {
+    fn versions(&self) -> Vec<Version> {
+        self.packs.all().iter().map(|pack| pack.version).collect()
+    }
+
+    fn topics(&self, pack: usize) -> Vec<(String, Role)> {
+        let pack = self.packs.all().get(pack);
+        pack.map(|pack| pack.topics())
+            .unwrap_or_default()
+            .iter()
+            .map(|topic| (topic.name.as_str().to_owned(), topic.publisher))
+            .collect()
+    }
+
+    fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Rc<Shape>> {
+        let schema = self.packs.all().get(pack)?.schema(topic)?;
+        // Member names of our schemas have no line breaks; those of a suite may, and then only miss the memory.
+        let mut key = format!("{pack}\n{topic}");
+        for name in path {
+            key.push('\n');
+            key.push_str(name);
+        }
+        if path.iter().any(|name| name.contains('\n')) {
+            return schema.shape(path).map(Rc::new);
+        }
+        self.shapes
+            .borrow_mut()
+            .entry(key)
+            .or_insert_with(|| schema.shape(path).map(Rc::new))
+            .clone()
+    }
+
+    fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String> {
+        let schema = self.packs.all().get(pack).and_then(|pack| pack.schema(topic));
+        schema.map(|schema| schema.members(path)).unwrap_or_default()
+    }
+
+    fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>> {
+        let schema = self.packs.all().get(pack)?.schema(topic)?;
+        Some(schema.breakages(ground))
+    }
+
+    fn word(&self, pack: usize, path: &str) -> Option<Value> {
+        path.split('.')
+            .filter(|part| !part.is_empty())
+            .try_fold(self.packs.all().get(pack)?.vocabulary(), |value, part| value.get(part))
+            .cloned()
+    }
+
+    fn requirement(&self, id: &str) -> Option<RequirementFacts> {
+        let requirement = self.catalogue.get(id)?;
+        let has = |pack: &usize| {
+            let pack = self.packs.all().get(*pack);
+            pack.is_some_and(|pack| requirement.in_version(pack).is_some())
+        };
+        Some(RequirementFacts {
+            roles: [Role::Agv, Role::MasterControl]
+                .into_iter()
+                .filter(|role| requirement.role.concerns(*role))
+                .collect(),
+            packs: (0..self.packs.all().len()).filter(has).collect(),
+        })
+    }
+
+    fn requirements(&self) -> Vec<String> {
+        self.catalogue
+            .all()
+            .map(|requirement| requirement.id.to_string())
+            .collect()
+    }
+
+    fn hooks(&self, role: Role) -> Vec<HookFacts> {
+        self.hooks.iter().copied().filter(|hook| hook.role == role).collect()
+    }
+}

@@ -1,0 +1,70 @@
+//! What is always judged: a test without stimulus.
+
+use std::sync::Arc;
+
+use super::{Binding, CheckUse, Need};
+use tck_base::diagnostic::Source;
+use tck_base::pattern::Pattern;
+use tck_pack::{Role, VersionRange};
+
+/// An always-on check.
+#[derive(Clone, Debug)]
+pub struct Monitor {
+    /// Path below `suites/monitors/` without extension.
+    pub id: String,
+    /// One sentence.
+    pub title: String,
+    /// Which side it judges.
+    pub device: Option<Role>,
+    /// Protocol versions it is written for.
+    pub spec: VersionRange,
+    /// What must be given for it to apply.
+    pub needs: Vec<Need>,
+    /// What it decides.
+    pub checks: Vec<Binding>,
+    /// What must have come by for a requirement to be decided; one that is not listed is decided by anything judged.
+    pub about: Vec<About>,
+    /// Why anybody cares.
+    pub why: String,
+    /// The rule.
+    pub rule: Rule,
+    /// Members of the state that show nothing any more once it has found something: what a test has waited for there
+    /// in vain could not be observed.
+    pub hides: Vec<String>,
+    /// The file.
+    pub source: Arc<Source>,
+}
+
+/// What a requirement is about: without such a message nothing is known of it.
+#[derive(Clone, Debug)]
+pub struct About {
+    /// The requirement.
+    pub requirement: Binding,
+    /// Topic name or `mqtt/…`.
+    pub topic: String,
+    /// What a message must show.
+    pub pattern: Pattern,
+}
+
+/// What a monitor holds true.
+#[derive(Clone, Debug)]
+pub enum Rule {
+    /// Every message on the topic that matches `when` matches `pattern`.
+    Always {
+        /// Topic name or `mqtt/…`.
+        topic: String,
+        /// Which messages are judged; absent is all.
+        when: Option<Pattern>,
+        /// What they must show.
+        pattern: Pattern,
+    },
+    /// No message on the topic matches.
+    Never {
+        /// Topic name or `mqtt/…`.
+        topic: String,
+        /// What must not come.
+        pattern: Pattern,
+    },
+    /// A named check sees everything.
+    Check(CheckUse),
+}

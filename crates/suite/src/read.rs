@@ -1,0 +1,560 @@
+//! One file into tests or a monitor: header keys, the rows of a table, the rule.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::CheckInfo;
+use super::course::course_need;
+use super::drawn;
+use super::expand::Fill;
+use super::fields::{Fields, Problems, text_of};
+use super::filed::{maturity, tags};
+use super::grammar::need;
+use super::lint::{self, HeaderPlaces, Vocabulary};
+use super::matrix;
+use super::model::{About, Binding, CourseNeed, Drawn, Monitor, Need, Rule, Test};
+use super::said::conversation;
+use super::source::{States, parse};
+use super::steps::{StepReader, check_use, checks, version_range};
+use super::terms::pattern;
+use tck_base::diagnostic::{Diagnostic, Source, Span};
+use tck_base::yaml::{Kind, Node};
+use tck_pack::{RequirementId, Role, VersionRange};
+
+const TEST_KEYS: &[&str] = &[
+    "test",
+    "title",
+    "device",
+    "spec",
+    "needs",
+    "moves",
+    "reviewed",
+    "watchlist",
+    "tags",
+    "conversation",
+    "why",
+    "cases",
+    "given",
+    "steps",
+    "finally",
+];
+const MONITOR_KEYS: &[&str] = &[
+    "monitor", "title", "device", "spec", "needs", "why", "checks", "about", "check", "with", "topic", "always",
+    "when", "never", "hides",
+];
+const ROLES: [(&str, Role); 2] = [("agv", Role::Agv), ("master-control", Role::MasterControl)];
+
+/// The first line of a file: where what is missing is shown.
+pub(super) fn start(root: &Node) -> Span {
+    match root.map().and_then(<[(Node, Node)]>::first) {
+        Some((key, _)) => key.span.clone(),
+        None => root.span.clone(),
+    }
+}
+
+/// Checks the name of a file against its path.
+pub(super) fn named(fields: &Fields<'_>, key: &str, name: &str, at: &Span, problems: &mut Problems) {
+    let Some(text) = fields.need_text(key, at, problems) else {
+        return;
+    };
+    if text != name
+        && let Some(node) = fields.get(key, problems)
+    {
+        problems.add(
+            Diagnostic::new(
+                "wrong-name",
+                node.span.clone(),
+                format!("`{key}` is not the path of the file"),
+                "named otherwise than its file",
+            )
+            .hint(format!("write `{key}: {name}`")),
+        );
+    }
+}
+
+/// What tests and monitors have in common.
+struct Header {
+    title: String,
+    device: Option<Role>,
+    spec: Option<VersionRange>,
+    needs: Vec<(Need, Span)>,
+    why: String,
+}
+
+fn header(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Header {
+    let owned = |text: Option<&str>| text.map(|text| text.trim().to_owned()).unwrap_or_default();
+    Header {
+        title: owned(fields.need_text("title", at, problems)),
+        device: fields.word("device", "unknown-device", &ROLES, problems),
+        spec: fields
+            .need("spec", at, problems)
+            .and_then(|node| version_range(node, problems)),
+        needs: fields
+            .list("needs", problems)
+            .iter()
+            .filter_map(|node| Some((need(node, problems)?, node.span.clone())))
+            .collect(),
+        why: owned(fields.need_text("why", at, problems)),
+    }
+}
+
+/// The tests of one file: one, or one per row of its table. `place` is the name and role that its path asks for.
+pub(super) fn read_test(
+    source: &Arc<Source>,
+    place: Option<(&str, Option<Role>)>,
+    states: &States,
+    vocabulary: &dyn Vocabulary,
+    known: &[CheckInfo],
+    problems: &mut Problems,
+) -> Vec<Test> {
+    let before = problems.len();
+    let Some(root) = parse(source, problems) else {
+        return Vec::new();
+    };
+    let Some(fields) = Fields::of(&root, problems) else {
+        return Vec::new();
+    };
+    fields.only(&[TEST_KEYS], problems);
+    let at = start(&root);
+    if let Some((name, _)) = place {
+        named(&fields, "test", name, &at, problems);
+    } else {
+        fields.need_text("test", &at, problems);
+    }
+    let role = place.and_then(|(_, role)| role);
+    let reader = TestReader {
+        source,
+        states,
+        vocabulary,
+        known,
+        role,
+        before,
+    };
+    let nothing: &[(Node, Node)] = &[];
+    let Some(cases) = fields.get("cases", problems) else {
+        let root = Fill::new("case", nothing).apply_to(&root, problems);
+        let root = Fill::new("with", nothing).apply_to(&root, problems);
+        return reader.read(&root, Case::Whole, problems).into_iter().collect();
+    };
+    if cases.get(drawn::FROM_SCHEMA).is_some() {
+        return reader.draw(&fields, &root, cases, problems);
+    }
+    let before_rows = problems.len();
+    let cells = match cases.get(matrix::MATRIX) {
+        Some(_) => matrix::cells(cases, rows, problems),
+        None => Vec::new(),
+    };
+    let rows = match cases.get(matrix::MATRIX) {
+        Some(_) => Vec::new(),
+        None => rows(cases, problems),
+    };
+    if problems.len() > before_rows {
+        return Vec::new();
+    }
+    let written = rows.iter().map(|(name, values)| (Case::Row(name), *values));
+    let crossed = cells.iter().map(|cell| (Case::cell(cell), &cell.values[..]));
+    let without_cases = without_cases(&fields, &root);
+    let mut used: BTreeMap<&str, (bool, &Span)> = BTreeMap::new();
+    let mut tests = Vec::new();
+    for (case, values) in written.chain(crossed) {
+        let mut fill = Fill::new("case", values);
+        let filled = fill.apply(&without_cases, problems);
+        let filled = Fill::new("with", nothing).apply_to(&filled, problems);
+        for ((key, value), is_used) in values.iter().zip(&fill.used) {
+            // The name of a row need not be used; it has the place of its axis.
+            used.entry(key.text().unwrap_or_default())
+                .or_insert((false, &key.span))
+                .0 |= *is_used || key.span == value.span;
+        }
+        tests.extend(reader.read(&filled, case, problems));
+    }
+    for (name, (is_used, span)) in used {
+        if !is_used {
+            problems.at(
+                "unused-value",
+                span,
+                format!("the case value `{name}` is not used"),
+                format!("no `${{case.{name}}}` in this test"),
+            );
+        }
+    }
+    tests
+}
+
+/// A test without its table.
+fn without_cases(fields: &Fields<'_>, root: &Node) -> Node {
+    let others = fields.entries().iter().filter(|(key, _)| key.text() != Some("cases"));
+    Node {
+        kind: Kind::Map(others.cloned().collect()),
+        span: root.span.clone(),
+    }
+}
+
+/// The rows of a table of cases, each with the same names.
+fn rows<'a>(cases: &'a Node, problems: &mut Problems) -> Vec<(&'a str, &'a [(Node, Node)])> {
+    let Some(fields) = Fields::of(cases, problems) else {
+        return Vec::new();
+    };
+    if fields.entries().is_empty() {
+        problems.at(
+            "empty-cases",
+            &cases.span,
+            "a table without rows",
+            "no test comes out of it",
+        );
+    }
+    let mut rows: Vec<(&str, &[(Node, Node)])> = Vec::new();
+    for (key, row) in fields.entries() {
+        let name = key.text().unwrap_or_default();
+        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+            problems.at(
+                "bad-name",
+                &key.span,
+                format!("`{}` cannot be the name of a case", super::fields::short(name)),
+                "letters, digits, `-`, `_` and `.`",
+            );
+        }
+        let Some(values) = row.map() else {
+            problems.wrong_type(row, "a mapping of values");
+            continue;
+        };
+        rows.push((name, values));
+    }
+    let names: Vec<&str> = {
+        let mut names = Vec::new();
+        for (key, _) in rows.iter().flat_map(|(_, values)| *values) {
+            let name = key.text().unwrap_or_default();
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    };
+    for (key, row) in fields.entries() {
+        for name in &names {
+            if row.map().is_some() && row.get(name).is_none() {
+                problems.at(
+                    "missing-case-value",
+                    &key.span,
+                    format!("this row has no value for `{name}`"),
+                    "every row has the same names",
+                );
+            }
+        }
+    }
+    rows
+}
+
+struct TestReader<'a> {
+    source: &'a Arc<Source>,
+    states: &'a States,
+    vocabulary: &'a dyn Vocabulary,
+    known: &'a [CheckInfo],
+    role: Option<Role>,
+    /// How many problems there were before this file.
+    before: usize,
+}
+
+/// Which test of a file is read.
+enum Case<'a> {
+    /// The only one.
+    Whole,
+    /// A row of its table.
+    Row(&'a str),
+    /// One of many of which a run takes some.
+    Drawn {
+        name: &'a str,
+        /// The versions that have it; those of the test unless said.
+        spec: Option<&'a VersionRange>,
+        drawn: &'a Drawn,
+        /// Whether it is linted.
+        lint: bool,
+    },
+}
+
+impl<'a> Case<'a> {
+    fn cell(cell: &'a matrix::Cell) -> Self {
+        Self::Drawn {
+            name: &cell.name,
+            spec: None,
+            drawn: &cell.drawn,
+            lint: true,
+        }
+    }
+}
+
+impl TestReader<'_> {
+    /// The tests of a table that comes from a schema.
+    fn draw(&self, fields: &Fields<'_>, root: &Node, cases: &Node, problems: &mut Problems) -> Vec<Test> {
+        let spec = fields.get("spec", &mut Problems::default());
+        let rows = drawn::rows(cases, spec, self.vocabulary, problems);
+        if !fields
+            .entries()
+            .iter()
+            .any(|(_, value)| value.span.text().contains("${case.patch}"))
+            && !rows.is_empty()
+        {
+            problems.at(
+                "unused-value",
+                &cases.span,
+                "the cases of the schema are not used",
+                "no `${case.patch}` in this test",
+            );
+        }
+        let without_cases = without_cases(fields, root);
+        let mut tests = Vec::new();
+        let mut linted = BTreeSet::new();
+        for row in &rows {
+            let filled = Fill::new("case", &row.values).apply(&without_cases, problems);
+            let filled = Fill::new("with", &[]).apply_to(&filled, problems);
+            // The rows differ in what they break, which only the first of each way and length can do wrong.
+            let length = row
+                .values
+                .first()
+                .and_then(|(_, patch)| patch.list())
+                .map_or(0, <[Node]>::len);
+            let lint = linted.insert((row.drawn.kind.clone(), length, row.spec.is_some()));
+            let case = Case::Drawn {
+                name: &row.name,
+                spec: row.spec.as_ref(),
+                drawn: &row.drawn,
+                lint,
+            };
+            tests.extend(self.read(&filled, case, problems));
+        }
+        tests
+    }
+
+    fn read(&self, root: &Node, case: Case<'_>, problems: &mut Problems) -> Option<Test> {
+        let fields = Fields::of(root, problems)?;
+        let at = start(root);
+        let header = header(&fields, &at, problems);
+        fields.need("device", &at, problems);
+        if let (Some(device), Some(role), Some(node)) = (header.device, self.role, fields.get("device", problems))
+            && device != role
+        {
+            problems.at(
+                "wrong-name",
+                &node.span,
+                format!("a test for `{device}` among those for `{role}`"),
+                format!("the folder says `{role}`"),
+            );
+        }
+        let maturity = maturity(&fields, problems);
+        let tags = tags(&fields, problems);
+        let moves = fields.flag("moves", problems);
+        let mut reader = StepReader {
+            states: self.states,
+            inside: Vec::new(),
+            problems: &mut *problems,
+        };
+        let mut section = |key: &str| match fields.get(key, reader.problems) {
+            Some(node) => reader.steps(node, key, None),
+            None => Vec::new(),
+        };
+        let (given, steps, finally) = (section("given"), section("steps"), section("finally"));
+        if let Some(node) = fields.need("steps", &at, problems)
+            && node.list().is_some_and(<[Node]>::is_empty)
+        {
+            problems.at("empty-steps", &node.span, "a test without steps", "decides nothing");
+        }
+        let conversation = conversation(&fields, steps.len(), problems);
+        let id = fields.text("test", &mut Problems::default())?.to_owned();
+        let group = id.split('/').next().unwrap_or_default().to_owned();
+        let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
+        let (name, drawn, lint): (_, Option<Drawn>, _) = match case {
+            Case::Whole => (None, None, true),
+            Case::Row(name) => (Some(name), None, true),
+            Case::Drawn { name, drawn, lint, .. } => (Some(name), Some(drawn.clone()), lint),
+        };
+        let mut test = Test {
+            id: name.map_or_else(|| id.clone(), |name| format!("{id}[{name}]")),
+            group,
+            title: header.title,
+            device: header.device.or(self.role)?,
+            spec: match case {
+                Case::Drawn { spec: Some(spec), .. } => spec.clone(),
+                _ => header.spec?,
+            },
+            needs,
+            moves,
+            tags,
+            conversation,
+            maturity,
+            why: header.why,
+            given,
+            steps,
+            finally,
+            source: Arc::clone(self.source),
+            course: CourseNeed::default(),
+            drawn,
+        };
+        test.course = course_need(&test);
+        if !lint {
+            return Some(test);
+        }
+        let value_place = |key: &str| fields.get(key, &mut Problems::default()).map(|node| node.span.clone());
+        let places = HeaderPlaces {
+            hides: Vec::new(),
+            start: at,
+            spec: value_place("spec"),
+            moves: value_place("moves"),
+            needs: need_places,
+            complete: problems.len() == self.before,
+        };
+        lint::test(&test, &places, self.vocabulary, self.known, problems);
+        Some(test)
+    }
+}
+
+/// The monitor of a file. `name` is what its path asks for.
+pub(super) fn read_monitor(
+    source: &Arc<Source>,
+    name: Option<&str>,
+    vocabulary: &dyn Vocabulary,
+    known: &[CheckInfo],
+    problems: &mut Problems,
+) -> Option<Monitor> {
+    let root = parse(source, problems)?;
+    let fields = Fields::of(&root, problems)?;
+    fields.only(&[MONITOR_KEYS], problems);
+    let at = start(&root);
+    if let Some(name) = name {
+        named(&fields, "monitor", name, &at, problems);
+    }
+    let id = fields.need_text("monitor", &at, problems).map(str::to_owned);
+    let header = header(&fields, &at, problems);
+    let bindings = checks(&fields, problems);
+    if fields.need("checks", &at, problems).is_some() && bindings.is_empty() {
+        problems.at(
+            "decides-nothing",
+            &at,
+            "a monitor that decides nothing",
+            "`checks` is empty",
+        );
+    }
+    let rule = rule(&fields, &at, problems);
+    let hides: Vec<&Node> = fields.list("hides", problems).iter().collect();
+    let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
+    let monitor = Monitor {
+        id: id?,
+        title: header.title,
+        device: header.device,
+        spec: header.spec?,
+        needs,
+        checks: bindings,
+        about: about(&fields, problems),
+        why: header.why,
+        rule: rule?,
+        hides: hides
+            .iter()
+            .filter_map(|node| text_of(node, problems).map(str::to_owned))
+            .collect(),
+        source: Arc::clone(source),
+    };
+    let places = HeaderPlaces {
+        hides: hides.iter().map(|node| node.span.clone()).collect(),
+        spec: fields
+            .get("spec", &mut Problems::default())
+            .map(|node| node.span.clone()),
+        start: at,
+        moves: None,
+        needs: need_places,
+        complete: true,
+    };
+    let topic_place = fields
+        .get("topic", &mut Problems::default())
+        .map(|node| node.span.clone());
+    lint::monitor(&monitor, &places, topic_place.as_ref(), vocabulary, known, problems);
+    Some(monitor)
+}
+
+/// Requirement id to topic to picture.
+fn about(fields: &Fields<'_>, problems: &mut Problems) -> Vec<About> {
+    let Some(inner) = fields
+        .get("about", problems)
+        .and_then(|node| Fields::of(node, problems))
+    else {
+        return Vec::new();
+    };
+    let mut all = Vec::new();
+    for (key, value) in inner.entries() {
+        let Some(id) = text_of(key, problems) else { continue };
+        let Some(subject) = Fields::of(value, problems) else {
+            continue;
+        };
+        let [(topic, picture)] = subject.entries() else {
+            let label = "one topic, and what a message on it shows";
+            problems.at(
+                "about-one-topic",
+                &value.span,
+                format!("`{id}` is about one topic"),
+                label,
+            );
+            continue;
+        };
+        let (Some(topic), Some(pattern)) = (text_of(topic, problems), pattern(picture, problems)) else {
+            continue;
+        };
+        all.push(About {
+            requirement: Binding {
+                requirement: RequirementId::from(id),
+                span: key.span.clone(),
+            },
+            topic: topic.to_owned(),
+            pattern,
+        });
+    }
+    all
+}
+
+fn rule(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Option<Rule> {
+    let written: Vec<&str> = ["check", "always", "never"]
+        .into_iter()
+        .filter(|key| fields.has(key))
+        .collect();
+    if written.len() != 1 {
+        problems.at(
+            "monitor-rule",
+            at,
+            "a monitor has one rule",
+            "needs one of `check:`, `always:` and `never:`",
+        );
+        return None;
+    }
+    let unneeded: &[&str] = match written[0] {
+        "check" => &["topic", "when"],
+        "always" => &["with"],
+        _ => &["with", "when"],
+    };
+    for key in unneeded {
+        if let Some(name) = fields.key(key) {
+            problems.at(
+                "conflicting-keys",
+                &name.span,
+                format!("`{key}` beside `{}`", written[0]),
+                "has no meaning here",
+            );
+        }
+    }
+    if written[0] == "check" {
+        return check_use(fields, problems).map(Rule::Check);
+    }
+    let topic = text_of(fields.need("topic", at, problems)?, problems)?.to_owned();
+    let picture = pattern(fields.get(written[0], problems)?, problems);
+    if written[0] == "never" {
+        return Some(Rule::Never {
+            topic,
+            pattern: picture?,
+        });
+    }
+    let when = match fields.get("when", problems) {
+        Some(node) => Some(pattern(node, problems)?),
+        None => None,
+    };
+    Some(Rule::Always {
+        topic,
+        when,
+        pattern: picture?,
+    })
+}

@@ -1,0 +1,293 @@
+//! What is worth knowing of a vehicle at present.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde_json::Value;
+
+use super::Notice;
+use tck_audit::Address;
+use tck_base::clock::{Moment, Stamp};
+use tck_base::pattern::whole;
+use tck_base::verdict::Verdict;
+
+/// Upper ends of the buckets of reaction times, in seconds.
+pub const BUCKETS: [f64; 9] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0];
+/// How many commands may wait for the state that shows them.
+const WAITING: usize = 32;
+/// How many kinds of findings are kept.
+const KINDS: usize = 256;
+/// The largest message that is kept beside a finding.
+const LARGEST: usize = 16 << 10;
+/// How long a text of a message may be that is shown.
+const TEXT: usize = 64;
+
+/// How long a vehicle takes until a state shows a command.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reactions {
+    /// How many there were.
+    pub count: u64,
+    /// Their sum in seconds.
+    pub sum: f64,
+    /// How many were not above each end of [`BUCKETS`].
+    pub up_to: [u64; BUCKETS.len()],
+}
+
+impl Reactions {
+    fn add(&mut self, time: Duration) {
+        let seconds = time.as_secs_f64();
+        self.count += 1;
+        self.sum += seconds;
+        for (count, end) in self.up_to.iter_mut().zip(BUCKETS) {
+            *count += u64::from(seconds <= end);
+        }
+    }
+}
+
+/// Findings of one kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kind {
+    /// `agv` or `master-control`.
+    pub role: String,
+    /// Id of the monitor.
+    pub monitor: String,
+    /// The requirement.
+    pub requirement: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// How often.
+    pub count: u64,
+    /// When it was found first.
+    pub first: String,
+    /// When it was found last.
+    pub last: String,
+    /// What is wrong, of the last one.
+    pub text: String,
+    /// Topic and payload of the last one, if it is not too large.
+    pub message: Option<(String, Bytes)>,
+}
+
+/// A command that no state shows yet.
+#[derive(Clone, Debug)]
+enum Command {
+    Order { id: String, update: u64 },
+    Actions(Vec<String>),
+}
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub struct Glance {
+    /// Manufacturer.
+    pub manufacturer: String,
+    /// Serial number.
+    pub serial_number: String,
+    /// Protocol version it names.
+    pub version: Option<String>,
+    /// Connection state.
+    pub connection: Option<String>,
+    /// Operating mode.
+    pub mode: Option<String>,
+    /// Order and update of the last state.
+    pub order: Option<(String, u64)>,
+    /// Nodes of the base and of the horizon that are left.
+    pub nodes: (usize, usize),
+    /// The last node.
+    pub last_node: Option<String>,
+    /// Whether it says that it drives.
+    pub driving: bool,
+    /// Actions that are not over.
+    pub actions: usize,
+    /// Charge of the battery in percent.
+    pub charge: Option<f64>,
+    /// Errors of the last state: level and type.
+    pub errors: Vec<(String, String)>,
+    /// The last state.
+    pub state: Option<Bytes>,
+    /// When it was heard last.
+    pub heard: Option<Stamp>,
+    /// Messages by topic name.
+    pub messages: BTreeMap<String, u64>,
+    /// By topic of the command: how fast it is shown.
+    pub reactions: BTreeMap<&'static str, Reactions>,
+    /// What was found, by kind.
+    pub kinds: BTreeMap<(String, String, String, Verdict), Kind>,
+    waiting: VecDeque<(Moment, Command)>,
+}
+
+impl Glance {
+    /// Nothing is known yet.
+    #[must_use]
+    pub fn new(address: &Address) -> Self {
+        Self {
+            manufacturer: address.manufacturer.clone(),
+            serial_number: address.serial_number.clone(),
+            version: None,
+            connection: None,
+            mode: None,
+            order: None,
+            nodes: (0, 0),
+            last_node: None,
+            driving: false,
+            actions: 0,
+            charge: None,
+            errors: Vec::new(),
+            state: None,
+            heard: None,
+            messages: BTreeMap::new(),
+            reactions: BTreeMap::new(),
+            kinds: BTreeMap::new(),
+            waiting: VecDeque::new(),
+        }
+    }
+
+    /// Takes in a message of its topic of this name; `stored` ones tell of the past.
+    pub fn take(&mut self, name: &str, at: Stamp, stored: bool, payload: &Bytes) {
+        *self.messages.entry(name.to_owned()).or_default() += 1;
+        self.heard = Some(at);
+        let Ok(message) = serde_json::from_slice::<Value>(payload) else {
+            return;
+        };
+        match name {
+            "order" if !stored => {
+                let id = message.get("orderId").and_then(Value::as_str);
+                let update = message.get("orderUpdateId").and_then(whole);
+                if let (Some(id), Some(update)) = (id, update) {
+                    let id = id.to_owned();
+                    self.wait(at.moment, Command::Order { id, update });
+                }
+            }
+            "instantActions" if !stored => {
+                let list = ["actions", "instantActions"].iter().find_map(|list| message.get(*list));
+                let ids = elements(list).filter_map(|action| text(action, "actionId"));
+                self.wait(at.moment, Command::Actions(ids.collect()));
+            }
+            "connection" => self.connection = short(&message, "connectionState"),
+            "state" => {
+                self.state(&message, payload);
+                if !stored {
+                    self.shown(&message, at.moment);
+                }
+            }
+            _ => {}
+        }
+        if !matches!(name, "order" | "instantActions") {
+            self.version = short(&message, "version").or(self.version.take());
+        }
+    }
+
+    /// Keeps a finding.
+    pub fn note(&mut self, notice: &Notice) {
+        let found = &notice.found;
+        if !matches!(found.verdict, Verdict::Fail | Verdict::Warning) {
+            return;
+        }
+        let key = (
+            found.role.clone(),
+            found.monitor.clone(),
+            found.requirement.clone(),
+            found.verdict,
+        );
+        if !self.kinds.contains_key(&key) && self.kinds.len() >= KINDS {
+            return;
+        }
+        let kind = self.kinds.entry(key).or_insert_with(|| Kind {
+            role: found.role.clone(),
+            monitor: found.monitor.clone(),
+            requirement: found.requirement.clone(),
+            verdict: found.verdict,
+            count: 0,
+            first: found.at.clone(),
+            last: String::new(),
+            text: String::new(),
+            message: None,
+        });
+        kind.count += found.count - found.before;
+        kind.last.clone_from(&found.at);
+        kind.text.clone_from(&found.text);
+        let is_small = |(_, payload): &&(String, Bytes)| payload.len() <= LARGEST;
+        // A copy, so that the rest of what came with it is not kept as well.
+        let copied = |(topic, payload): &(String, Bytes)| (topic.clone(), Bytes::copy_from_slice(payload));
+        kind.message = notice.message.as_ref().filter(is_small).map(copied);
+    }
+
+    /// How many kinds of this verdict were found.
+    #[must_use]
+    pub fn found(&self, verdict: Verdict) -> usize {
+        self.kinds.values().filter(|kind| kind.verdict == verdict).count()
+    }
+
+    fn wait(&mut self, since: Moment, command: Command) {
+        if self.waiting.len() == WAITING {
+            self.waiting.pop_front();
+        }
+        self.waiting.push_back((since, command));
+    }
+
+    /// What a state shows is answered.
+    fn shown(&mut self, state: &Value, now: Moment) {
+        if self.waiting.is_empty() {
+            return;
+        }
+        let order = state.get("orderId").and_then(Value::as_str);
+        let update = state.get("orderUpdateId").and_then(whole);
+        let ids: Vec<&str> = elements(state.get("actionStates"))
+            .filter_map(|action| action.get("actionId").and_then(Value::as_str))
+            .collect();
+        for (since, command) in std::mem::take(&mut self.waiting) {
+            let topic = match &command {
+                Command::Order { id, update: wanted } => {
+                    (order == Some(id.as_str()) && update.is_some_and(|update| update >= *wanted)).then_some("order")
+                }
+                Command::Actions(wanted) => wanted
+                    .iter()
+                    .all(|wanted| ids.contains(&wanted.as_str()))
+                    .then_some("instantActions"),
+            };
+            match topic {
+                Some(topic) => self.reactions.entry(topic).or_default().add(now.since(since)),
+                None => self.waiting.push_back((since, command)),
+            }
+        }
+    }
+
+    fn state(&mut self, state: &Value, payload: &Bytes) {
+        self.state = (payload.len() <= LARGEST).then(|| payload.clone());
+        self.mode = short(state, "operatingMode").or(self.mode.take());
+        let order = text(state, "orderId").filter(|id| !id.is_empty());
+        let update = state.get("orderUpdateId").and_then(whole);
+        self.order = order.map(|order| (cut(&order), update.unwrap_or_default()));
+        let (base, horizon): (Vec<_>, Vec<_>) = elements(state.get("nodeStates"))
+            .partition(|node| node.get("released").and_then(Value::as_bool).unwrap_or(true));
+        self.nodes = (base.len(), horizon.len());
+        self.last_node = short(state, "lastNodeId").filter(|id| !id.is_empty());
+        self.driving = state.get("driving").and_then(Value::as_bool).unwrap_or(false);
+        let is_open = |action: &&Value| {
+            let status = action.get("actionStatus").and_then(Value::as_str);
+            !matches!(status, Some("FINISHED" | "FAILED"))
+        };
+        self.actions = elements(state.get("actionStates")).filter(is_open).count();
+        self.charge = state.pointer("/batteryState/batteryCharge").and_then(Value::as_f64);
+        let named = |error: &Value| {
+            let text = |member: &str| short(error, member).unwrap_or_default();
+            (text("errorLevel"), text("errorType"))
+        };
+        self.errors = elements(state.get("errors")).take(16).map(named).collect();
+    }
+}
+
+fn elements(list: Option<&Value>) -> impl Iterator<Item = &Value> {
+    list.and_then(Value::as_array).into_iter().flatten()
+}
+
+fn text(message: &Value, member: &str) -> Option<String> {
+    message.get(member)?.as_str().map(str::to_owned)
+}
+
+fn short(message: &Value, member: &str) -> Option<String> {
+    text(message, member).map(|text| cut(&text))
+}
+
+fn cut(text: &str) -> String {
+    text.chars().take(TEXT).collect()
+}

@@ -1,0 +1,173 @@
+//! Live traffic, judged by the monitors as recorded traffic is.
+//!
+//! [`Watch`] is shown message after message and tells each finding with the message that shows it. [`glance`] keeps what
+//! is worth knowing of every vehicle at present, [`metrics`] writes it for a scraper, [`recorder`] keeps a journal that an
+//! audit judges alike, and [`listener`] stays connected to a broker. [`session`] brings them together. What is kept is
+//! bounded, so a watch may go on for weeks.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod glance;
+mod listener;
+mod metrics;
+mod recorder;
+mod served;
+pub mod session;
+
+use std::collections::{BTreeMap, VecDeque};
+
+use bytes::Bytes;
+
+use glance::Glance;
+use tck_audit::result::AuditResult;
+use tck_audit::{Audit, AuditError, Found, Options};
+use tck_base::clock::Stamp;
+use tck_capture::{Message, Wire};
+use tck_judge::Rules;
+
+pub use recorder::Rotation;
+
+/// How many bytes of messages are kept beside the findings to come.
+const RECENT: usize = 8 << 20;
+/// How many vehicles are kept in view.
+const IN_VIEW: usize = 10_000;
+
+/// A finding with the message that shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Notice {
+    /// What was found.
+    pub found: Found,
+    /// Topic and payload, if they are still known.
+    pub message: Option<(String, Bytes)>,
+}
+
+impl Notice {
+    /// Whether this is worth a line: the first one, and then the tenth, the hundredth and so on.
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        let digits = |count: u64| count.checked_ilog10();
+        self.found.before == 0 || digits(self.found.before) < digits(self.found.count)
+    }
+}
+
+/// The last messages by number, bounded by their size.
+#[derive(Debug, Default)]
+struct Recent {
+    all: VecDeque<(u64, String, Bytes)>,
+    bytes: usize,
+}
+
+impl Recent {
+    fn keep(&mut self, number: u64, topic: String, payload: Bytes) {
+        self.bytes += payload.len() + topic.len();
+        self.all.push_back((number, topic, payload));
+        while self.bytes > RECENT {
+            let Some((_, topic, payload)) = self.all.pop_front() else {
+                break;
+            };
+            self.bytes -= payload.len() + topic.len();
+        }
+    }
+
+    fn get(&self, number: u64) -> Option<(String, Bytes)> {
+        let at = self.all.binary_search_by_key(&number, |(number, ..)| *number).ok()?;
+        self.all
+            .get(at)
+            .map(|(_, topic, payload)| (topic.clone(), payload.clone()))
+    }
+}
+
+/// See the module.
+pub struct Watch<'r> {
+    audit: Audit<'r>,
+    recent: Recent,
+    glances: BTreeMap<String, Glance>,
+    /// By manufacturer and serial number: which of them it is.
+    names: BTreeMap<(String, String), String>,
+    elsewhere: u64,
+}
+
+impl<'r> Watch<'r> {
+    /// Begins.
+    ///
+    /// # Errors
+    /// What is wrong with the options.
+    pub fn new(rules: &'r Rules, options: Options) -> Result<Self, AuditError> {
+        Ok(Self {
+            audit: Audit::new(rules, options)?.live(),
+            recent: Recent::default(),
+            glances: BTreeMap::new(),
+            names: BTreeMap::new(),
+            elsewhere: 0,
+        })
+    }
+
+    /// Takes in a message; tells what is found by now.
+    pub fn take(&mut self, at: Stamp, message: Message) -> Vec<Notice> {
+        let number = self.audit.messages() + 1;
+        match self.audit.address(&message.topic) {
+            Some(address) => {
+                self.recent.keep(number, message.topic.clone(), message.payload.clone());
+                let is_known = self.glances.contains_key(&address.vehicle);
+                if is_known || self.glances.len() < IN_VIEW {
+                    let name = (address.manufacturer.clone(), address.serial_number.clone());
+                    self.names.entry(name).or_insert_with(|| address.vehicle.clone());
+                    let glance = self
+                        .glances
+                        .entry(address.vehicle.clone())
+                        .or_insert_with(|| Glance::new(&address));
+                    let stored = message.retain == Some(true);
+                    glance.take(&address.name, at, stored, &message.payload);
+                }
+            }
+            None => self.elsewhere += 1,
+        }
+        self.audit.observe(message);
+        self.notices()
+    }
+
+    /// Takes in what was seen of a connection; tells what is found by now.
+    pub fn take_wire(&mut self, wire: Wire) -> Vec<Notice> {
+        self.audit.wire(wire);
+        self.notices()
+    }
+
+    fn notices(&mut self) -> Vec<Notice> {
+        let news = self.audit.news();
+        let notices: Vec<Notice> = news
+            .into_iter()
+            .map(|found| Notice {
+                message: self.recent.get(found.message),
+                found,
+            })
+            .collect();
+        for notice in &notices {
+            let name = (notice.found.manufacturer.clone(), notice.found.serial_number.clone());
+            let glance = self.names.get(&name).and_then(|key| self.glances.get_mut(key));
+            if let Some(glance) = glance {
+                glance.note(notice);
+            }
+        }
+        notices
+    }
+
+    /// The vehicles that were heard.
+    pub fn glances(&self) -> impl ExactSizeIterator<Item = &Glance> {
+        self.glances.values()
+    }
+
+    /// Messages on topics of no vehicle, or of one that is not wanted.
+    #[must_use]
+    pub fn elsewhere(&self) -> u64 {
+        self.elsewhere
+    }
+
+    /// What came out of all.
+    #[must_use]
+    pub fn finish(self) -> AuditResult {
+        self.audit.finish(Vec::new())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,79 @@
+//! The suites and schemas the program was built with, and the library made of them and of a user's own.
+
+use std::path::Path;
+
+use include_dir::{Dir, DirEntry, include_dir};
+
+use tck_base::diagnostic::Diagnostic;
+use tck_judge::Library;
+use tck_pack::{AssetFile, Assets};
+
+static SUITES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/suites");
+static SCHEMAS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/schemas");
+
+/// A folder of suites, laid out like `suites/`.
+#[derive(Clone, Copy, Debug)]
+pub enum Own<'a> {
+    /// Its files stand beside the built-in ones.
+    Added(&'a Path),
+    /// Its files take the place of the built-in ones.
+    Alone(&'a Path),
+}
+
+/// The files the program was built with.
+#[must_use]
+pub fn embedded() -> Assets {
+    let mut files = Vec::new();
+    embedded_files("suites", &SUITES, &mut files);
+    embedded_files("schemas", &SCHEMAS, &mut files);
+    Assets::of_files(files)
+}
+
+/// The suites the program was built with and those of a folder, ready to judge by.
+///
+/// # Errors
+/// Every mistake in the files of the folder.
+pub fn library(own: Option<Own<'_>>) -> Result<Library, Vec<Diagnostic>> {
+    let unreadable = |folder: &Path, error: std::io::Error| {
+        let title = format!("the suites in {} cannot be read: {error}", folder.display());
+        let hint = match error.kind() {
+            std::io::ErrorKind::AlreadyExists => {
+                "give the file another name, or use the folder alone, without the built-in suites, by --replace-suites"
+            }
+            _ => "give a folder that is laid out like `suites/` (`vda5050-tck init --suites DIR` writes one)",
+        };
+        vec![Diagnostic::whole("unreadable", title).hint(hint)]
+    };
+    let built_in = embedded();
+    let assets = match own {
+        None => built_in,
+        Some(Own::Added(folder)) => built_in.with_added(folder).map_err(|error| unreadable(folder, error))?,
+        Some(Own::Alone(folder)) => built_in
+            .with_suites(folder)
+            .map_err(|error| unreadable(folder, error))?,
+    };
+    Library::load(assets, tck_checks::REGISTRY)
+}
+
+fn embedded_files(root: &str, dir: &Dir<'static>, files: &mut Vec<AssetFile>) {
+    for entry in dir.entries() {
+        match entry {
+            DirEntry::Dir(inner) => embedded_files(root, inner, files),
+            DirEntry::File(file) => files.push(AssetFile {
+                path: format!("{root}/{}", file.path().to_string_lossy().replace('\\', "/")),
+                text: String::from_utf8_lossy(file.contents()).into_owned(),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_program_carries_the_files_of_its_source_tree() {
+        let own = Assets::of_folder(Path::new(env!("CARGO_MANIFEST_DIR"))).expect("suites and schemas");
+        assert_eq!(embedded().sha256(), own.sha256());
+    }
+}
