@@ -26,7 +26,7 @@ pub fn embedded() -> Assets {
     let mut files = Vec::new();
     embedded_files("suites", &SUITES, &mut files);
     embedded_files("schemas", &SCHEMAS, &mut files);
-    Assets::of_files(files)
+    Assets::built_in(files)
 }
 
 /// The suites the program was built with and those of a folder, ready to judge by.
@@ -75,5 +75,8 @@ mod tests {
     fn the_program_carries_the_files_of_its_source_tree() {
         let own = Assets::of_folder(Path::new(env!("CARGO_MANIFEST_DIR"))).expect("suites and schemas");
         assert_eq!(embedded().sha256(), own.sha256());
+        // The program does not lint what it carries; as files of a folder they are.
+        let linted = Library::load(own, crate::checks::REGISTRY);
+        assert!(linted.is_ok_and(|library| !library.rules.suites.tests.is_empty()));
     }
 }

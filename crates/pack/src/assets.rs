@@ -1,5 +1,6 @@
 //! The files of `suites/` and `schemas/`, replaceable by a directory.
 
+use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 
@@ -23,15 +24,25 @@ pub struct AssetFile {
 #[derive(Clone, Debug)]
 pub struct Assets {
     files: Vec<AssetFile>,
+    /// Paths of files that were checked before the program was built.
+    checked: BTreeSet<String>,
     sha256: String,
     modified: bool,
 }
 
 impl Assets {
-    /// These files, as built in; hidden ones are left out.
+    /// The files that the program carries, without hidden ones. They were checked before it was built.
     #[must_use]
-    pub fn of_files(files: impl IntoIterator<Item = AssetFile>) -> Self {
-        Self::new(files.into_iter().filter(|file| !hidden(&file.path)).collect())
+    pub fn built_in(files: impl IntoIterator<Item = AssetFile>) -> Self {
+        let mut assets = Self::new(files.into_iter().filter(|file| !hidden(&file.path)).collect());
+        assets.checked = assets.files.iter().map(|file| file.path.clone()).collect();
+        assets
+    }
+
+    /// Whether a file was checked before the program was built, so that nobody has to look for mistakes in it again.
+    #[must_use]
+    pub fn is_checked(&self, path: &str) -> bool {
+        self.checked.contains(path)
     }
 
     /// The folders `suites/` and `schemas/` of a source tree.
@@ -56,6 +67,8 @@ impl Assets {
         files.extend(self.under("schemas/").cloned());
         let mut assets = Self::new(files);
         assets.modified = assets.sha256 != self.sha256;
+        let same = |path: &&String| assets.get(path) == self.get(path);
+        assets.checked = self.checked.iter().filter(same).cloned().collect();
         Ok(assets)
     }
 
@@ -79,6 +92,8 @@ impl Assets {
         }
         let mut assets = Self::new(files);
         assets.modified = assets.sha256 != self.sha256;
+        let same = |path: &&String| assets.get(path) == self.get(path);
+        assets.checked = self.checked.iter().filter(same).cloned().collect();
         Ok(assets)
     }
 
@@ -111,6 +126,7 @@ impl Assets {
             });
         Self {
             files,
+            checked: BTreeSet::new(),
             sha256,
             modified: false,
         }
