@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 37] = [
+const LAYERS: [(&str, u8); 38] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -48,6 +48,7 @@ const LAYERS: [(&str, u8); 37] = [
     ("nurbs", 0),
     ("pattern", 0),
     ("secrets", 0),
+    ("view", 0),
     ("lib", 7),
 ];
 
