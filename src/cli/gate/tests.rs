@@ -9,7 +9,7 @@ use super::*;
 use tck_base::diagnostic::{Source, Span};
 use tck_net::bench::LinkError;
 use tck_report::junit::{self, Flavour, Inconclusive};
-use tck_result::{Decision, DeviceIdentity, MonitorFinding, MonitorResult, Repetition, RequirementResult, TestResult};
+use tck_result::{Decision, DeviceIdentity, MonitorFinding, MonitorResult, ProgramResult, Repetition, RequirementResult, TestResult};
 
 /// A run that is being put together.
 struct Case {
@@ -71,7 +71,7 @@ const TESTS: [Way<TestResult>; 12] = [
 ];
 
 /// What can be around the tests.
-const AROUND: [(&str, bool, fn(&mut Case)); 7] = [
+const AROUND: [(&str, bool, fn(&mut Case)); 11] = [
     ("nothing", true, |_| {}),
     ("monitors passed", true, |case| {
         case.result.monitors.push(monitor(Verdict::Pass, "HDR-01"))
@@ -84,6 +84,10 @@ const AROUND: [(&str, bool, fn(&mut Case)); 7] = [
     }),
     ("the report could not be written", false, |case| case.written = false),
     ("the run ended early", false, |case| case.result.partial = true),
+    ("somebody else may have been judged", false, |case| case.result.mixed = Some("another".to_owned())),
+    ("the program ran until it was ended", true, |case| case.result.program = Some(program(0, 0))),
+    ("the program ended by itself", false, |case| case.result.program = Some(program(1, 0))),
+    ("the program ended, perhaps by somebody else", false, |case| case.result.program = Some(program(1, 1))),
     ("what is known has expired", false, |case| {
         "2000-01-01".clone_into(&mut case.known[0].until)
     }),
@@ -91,6 +95,16 @@ const AROUND: [(&str, bool, fn(&mut Case)); 7] = [
 
 /// The requirement whose failure is known.
 const KNOWN: &str = "ORD-02";
+
+/// The program of `device.command`: how often it ended by itself, and how often somebody else may have ended it.
+fn program(ends: u64, excused: u64) -> ProgramResult {
+    ProgramResult {
+        starts: 1 + ends,
+        ends,
+        excused,
+        shown: Vec::new(),
+    }
+}
 
 fn of(verdict: Option<Verdict>, requirement: &str) -> TestResult {
     let decisions = verdict.map(|verdict| {
@@ -163,6 +177,8 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             partial: false,
             partial_reason: None,
             verdict: None,
+            program: None,
+            mixed: None,
             device: DeviceIdentity::default(),
             vantage: "tap".to_owned(),
             suites_sha256: String::new(),
@@ -192,7 +208,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
     let result = &mut case.result;
     let tests = result.tests.iter().map(|test| test.verdict);
     let monitors = result.monitors.iter().map(|monitor| monitor.verdict);
-    result.verdict = tests.chain(monitors).flatten().reduce(Verdict::join);
+    result.verdict = tests.chain(monitors).flatten().chain(result.aside()).reduce(Verdict::join);
     for test in &result.tests {
         result
             .requirements
