@@ -24,6 +24,7 @@ mod maps;
 mod modes;
 mod parameters;
 mod place;
+mod stitching;
 #[cfg(test)]
 mod tests;
 mod trajectories;
