@@ -5,13 +5,14 @@
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::process::Command;
 
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Role;
 use vda5050_tck::reference::Fault;
 use vda5050_tck::simulate::BuiltIn;
 
-use crate::seed::{git, share};
+use crate::seed::share;
 
 /// One in so many is tried.
 const SHARE: u64 = 8;
@@ -41,6 +42,21 @@ pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
         touched.len()
     );
     tried
+}
+
+/// What git answers in this folder; `None` where there is no git, or where git refuses.
+fn git(arguments: &[&str]) -> Option<String> {
+    let folder = env!("CARGO_MANIFEST_DIR");
+    let output = Command::new("git")
+        .arg("-C")
+        .arg(folder)
+        .args(arguments)
+        .output()
+        .ok()?;
+    output
+        .status
+        .success()
+        .then(|| String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
 /// The faults that a change names, and those that are about a requirement of a test or monitor whose file is in it.

@@ -9,7 +9,9 @@ use super::*;
 use tck_base::diagnostic::{Source, Span};
 use tck_net::bench::LinkError;
 use tck_report::junit::{self, Flavour, Inconclusive};
-use tck_result::{Decision, DeviceIdentity, MonitorFinding, MonitorResult, ProgramResult, Repetition, RequirementResult, TestResult};
+use tck_result::{
+    Decision, DeviceIdentity, MonitorFinding, MonitorResult, ProgramResult, Repetition, RequirementResult, TestResult,
+};
 
 /// A run that is being put together.
 struct Case {
@@ -84,10 +86,18 @@ const AROUND: [(&str, bool, fn(&mut Case)); 11] = [
     }),
     ("the report could not be written", false, |case| case.written = false),
     ("the run ended early", false, |case| case.result.partial = true),
-    ("somebody else may have been judged", false, |case| case.result.mixed = Some("another".to_owned())),
-    ("the program ran until it was ended", true, |case| case.result.program = Some(program(0, 0))),
-    ("the program ended by itself", false, |case| case.result.program = Some(program(1, 0))),
-    ("the program ended, perhaps by somebody else", false, |case| case.result.program = Some(program(1, 1))),
+    ("somebody else may have been judged", false, |case| {
+        case.result.mixed = Some("another".to_owned())
+    }),
+    ("the program ran until it was ended", true, |case| {
+        case.result.program = Some(program(0, 0))
+    }),
+    ("the program ended by itself", false, |case| {
+        case.result.program = Some(program(1, 0))
+    }),
+    ("the program ended, perhaps by somebody else", false, |case| {
+        case.result.program = Some(program(1, 1))
+    }),
     ("what is known has expired", false, |case| {
         "2000-01-01".clone_into(&mut case.known[0].until)
     }),
@@ -173,7 +183,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             started: "2026-03-02T08:15:00.000Z".to_owned(),
             seconds: 1.0,
             role: "agv".to_owned(),
-            protocol: "2.1.0".to_owned(),
+            protocol: "9.0.0".to_owned(),
             partial: false,
             partial_reason: None,
             verdict: None,
@@ -208,7 +218,11 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
     let result = &mut case.result;
     let tests = result.tests.iter().map(|test| test.verdict);
     let monitors = result.monitors.iter().map(|monitor| monitor.verdict);
-    result.verdict = tests.chain(monitors).flatten().chain(result.aside()).reduce(Verdict::join);
+    result.verdict = tests
+        .chain(monitors)
+        .flatten()
+        .chain(result.aside())
+        .reduce(Verdict::join);
     for test in &result.tests {
         result
             .requirements
