@@ -99,7 +99,9 @@ impl World {
 
     /// From now on these facts are read. It has to be said before the first record.
     pub fn reads(&mut self, facts: &[Fact]) {
-        facts.iter().for_each(|fact| self.learned.add(*fact));
+        for fact in facts {
+            self.learned.add(*fact);
+        }
     }
 
     /// Learns from the next record.

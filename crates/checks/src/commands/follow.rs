@@ -351,7 +351,7 @@ impl Follow {
                 told.resent.judged = resent(&order, update, &mut Found::new(record, &mut told.resent.findings));
                 told.updates.judged = true;
                 let mut found = Found::new(record, &mut told.updates.findings);
-                self.update(&order, message, update, record, context, &mut found);
+                updated(&order, message, update, record, context, &mut found);
             }
             order.take(message, update, record);
         }
@@ -379,71 +379,6 @@ impl Follow {
             );
         }
         continues
-    }
-
-    fn update(
-        &self,
-        order: &Order,
-        message: &Value,
-        update: u64,
-        record: &Observation<'_>,
-        context: &CheckContext<'_>,
-        found: &mut Found<'_>,
-    ) {
-        let newest = order.newest().unwrap_or_default();
-        if order.has(update) {
-            found.broken(
-                "ORD-UPD-04",
-                format!("orderUpdateId {update} comes again with other content"),
-            );
-        } else if update < newest {
-            found.broken("ORD-UPD-04", format!("orderUpdateId {update} comes after {newest}"));
-        } else if update > newest + 1 {
-            found.remark(
-                "ORD-UPD-04",
-                format!("orderUpdateId {update} comes directly after {newest}"),
-            );
-        }
-        let Some(first) = in_sequence(message, "nodes").into_iter().next() else {
-            return;
-        };
-        counted_back(message, first, found);
-        // An update that the vehicle has not taken over may be replaced by one that begins where it began.
-        let vehicle = context.world.mock();
-        let confirmed = vehicle
-            .recent(record, context)
-            .filter(|shown| shown.order == order.id)
-            .map(|shown| shown.update)
-            .min()
-            .unwrap_or_default();
-        let sequence = number(first, "sequenceId");
-        let is_end = |end: &&BaseEnd| Some(end.sequence) == sequence && text(first, "nodeId") == end.id;
-        // The end of an update that was refused is nowhere on the vehicle.
-        let refused = |sent: &Sent| sent.update > confirmed && knows_refused(&order.id, sent.update, record, context);
-        let candidates = order
-            .sent
-            .iter()
-            .rev()
-            .filter(|sent| (sent.update >= confirmed || sent.update == newest) && !refused(sent));
-        let stitching = candidates.filter_map(|sent| sent.end.as_ref()).find(is_end);
-        if let Some(end) = stitching {
-            stitched(&end.node, first, found);
-            return;
-        }
-        // The last one that was sent, by the letter, and unknown to the vehicle: by a ruling a warning.
-        let refused_end = order.sent.iter().rev().filter(|sent| refused(sent));
-        if let Some(end) = refused_end.filter_map(|sent| sent.end.as_ref()).find(is_end) {
-            let end = quote(&end.id);
-            found.remark(
-                "ORD-UPD-05",
-                format!("the update begins at {end}, the end of an update that the vehicle has refused"),
-            );
-            return;
-        }
-        let newest = order.sent.iter().rev().find(|sent| !refused(sent));
-        if let Some(end) = newest.and_then(|sent| sent.end.as_ref()) {
-            elsewhere(&order.base, (&end.id, end.sequence), message, first, found);
-        }
     }
 
     /// Learns from a record; gives back what it shows.
@@ -495,6 +430,71 @@ impl Follow {
             _ => self.parked = None,
         }
         self.orders.clear();
+    }
+}
+
+/// An update of the order that was sent last.
+fn updated(
+    order: &Order,
+    message: &Value,
+    update: u64,
+    record: &Observation<'_>,
+    context: &CheckContext<'_>,
+    found: &mut Found<'_>,
+) {
+    let newest = order.newest().unwrap_or_default();
+    if order.has(update) {
+        found.broken(
+            "ORD-UPD-04",
+            format!("orderUpdateId {update} comes again with other content"),
+        );
+    } else if update < newest {
+        found.broken("ORD-UPD-04", format!("orderUpdateId {update} comes after {newest}"));
+    } else if update > newest + 1 {
+        found.remark(
+            "ORD-UPD-04",
+            format!("orderUpdateId {update} comes directly after {newest}"),
+        );
+    }
+    let Some(first) = in_sequence(message, "nodes").into_iter().next() else {
+        return;
+    };
+    counted_back(message, first, found);
+    // An update that the vehicle has not taken over may be replaced by one that begins where it began.
+    let vehicle = context.world.mock();
+    let confirmed = vehicle
+        .recent(record, context)
+        .filter(|shown| shown.order == order.id)
+        .map(|shown| shown.update)
+        .min()
+        .unwrap_or_default();
+    let sequence = number(first, "sequenceId");
+    let is_end = |end: &&BaseEnd| Some(end.sequence) == sequence && text(first, "nodeId") == end.id;
+    // The end of an update that was refused is nowhere on the vehicle.
+    let refused = |sent: &Sent| sent.update > confirmed && knows_refused(&order.id, sent.update, record, context);
+    let candidates = order
+        .sent
+        .iter()
+        .rev()
+        .filter(|sent| (sent.update >= confirmed || sent.update == newest) && !refused(sent));
+    let stitching = candidates.filter_map(|sent| sent.end.as_ref()).find(is_end);
+    if let Some(end) = stitching {
+        stitched(&end.node, first, found);
+        return;
+    }
+    // The last one that was sent, by the letter, and unknown to the vehicle: by a ruling a warning.
+    let refused_end = order.sent.iter().rev().filter(|sent| refused(sent));
+    if let Some(end) = refused_end.filter_map(|sent| sent.end.as_ref()).find(is_end) {
+        let end = quote(&end.id);
+        found.remark(
+            "ORD-UPD-05",
+            format!("the update begins at {end}, the end of an update that the vehicle has refused"),
+        );
+        return;
+    }
+    let newest = order.sent.iter().rev().find(|sent| !refused(sent));
+    if let Some(end) = newest.and_then(|sent| sent.end.as_ref()) {
+        elsewhere(&order.base, (&end.id, end.sequence), message, first, found);
     }
 }
 
