@@ -211,11 +211,10 @@ fn cut_off(bench: &Bench) {
 fn a_run_that_is_gone_on_with_is_about_the_same_profile_firmware_program_and_files() {
     let bench = Bench::new();
     fs::write(bench.path().join("vehicle.sh"), "sleep 60\n").unwrap();
-    let with = |more: &str, firmware: &str| {
-        let mut profile = Profile::default();
-        profile.device = format!("command = [\"sh\", \"vehicle.sh\"]\n{more}");
-        profile.more = format!("[certificate]\nfirmware-version = \"{firmware}\"\n");
-        profile
+    let with = |more: &str, firmware: &str| Profile {
+        device: format!("command = [\"sh\", \"vehicle.sh\"]\n{more}"),
+        more: format!("[certificate]\nfirmware-version = \"{firmware}\"\n"),
+        ..Profile::default()
     };
     let profile = with("", "4.2");
     let (run, port) = bench.start(&profile, &[QUICK, REFUSAL, "--no-motion"]);
