@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use resume::{Earlier, Subject};
+use resume::{AboutRun, Earlier};
 
 use super::args::{self, Shard};
 use super::device::{check_faults, pack_of, tolerate};
@@ -272,7 +272,7 @@ impl Job {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
         let settings = reference::settings(&Asked::of_run(arguments));
-        self.is_resumable(&Subject {
+        self.is_resumable(&AboutRun {
             subject: device.subject(),
             vantage: Vantage::Tap.word(),
             settings: &settings,
@@ -378,7 +378,7 @@ impl Job {
             } else {
                 Vantage::Subscriber
             };
-            let about = Subject {
+            let about = AboutRun {
                 subject: &run.device.subject,
                 vantage: vantage.word(),
                 settings: &run.device.settings,
@@ -418,11 +418,10 @@ impl Job {
     /// Why a run could not begin, at the place of the profile that it comes from.
     fn could_not_begin(&self, error: RunError) -> Problem {
         let setting = match &error {
-            RunError::Profile(_) | RunError::Unknown(_) => None,
             RunError::Device(_) => Some("device.command"),
             RunError::Bench(LinkError::Listen { .. }) => Some("bench.listen"),
             RunError::Bench(_) => Some("bench.broker"),
-            RunError::Record(_) | RunError::Engine(_) => None,
+            RunError::Profile(_) | RunError::Unknown(_) | RunError::Record(_) | RunError::Engine(_) => None,
         };
         match (error, setting) {
             (RunError::Profile(all), _) => Problem::Usage(all),
@@ -445,7 +444,7 @@ impl Job {
     }
 
     /// Whether the run before this one, if there is one, was about the same.
-    fn is_resumable(&self, about: &Subject<'_>) -> Result<(), Problem> {
+    fn is_resumable(&self, about: &AboutRun<'_>) -> Result<(), Problem> {
         let Some(earlier) = &self.earlier else { return Ok(()) };
         earlier.is_about(about, &self.pack, &self.library)?;
         let (kept, left) = (earlier.kept, self.request.tests.len());

@@ -85,7 +85,7 @@ fn a_run_that_decides_less_never_compares_as_green() {
     compare("two", "one")
         .code(1)
         .prints("  lost    pass -> absent")
-        .prints(REFUSAL);
+        .prints("order-rejection/unreadable[…]");
     compare("one", "two").code(0).prints("  other   absent -> pass");
     // What could not be tried is lost, and a failure that could not be tried is not mended.
     reported(&bench, "good", &[DRIVES, QUICK], 0);
@@ -211,11 +211,10 @@ fn cut_off(bench: &Bench) {
 fn a_run_that_is_gone_on_with_is_about_the_same_profile_firmware_program_and_files() {
     let bench = Bench::new();
     fs::write(bench.path().join("vehicle.sh"), "sleep 60\n").unwrap();
-    let with = |more: &str, firmware: &str| {
-        let mut profile = Profile::default();
-        profile.device = format!("command = [\"sh\", \"vehicle.sh\"]\n{more}");
-        profile.more = format!("[certificate]\nfirmware-version = \"{firmware}\"\n");
-        profile
+    let with = |more: &str, firmware: &str| Profile {
+        device: format!("command = [\"sh\", \"vehicle.sh\"]\n{more}"),
+        more: format!("[certificate]\nfirmware-version = \"{firmware}\"\n"),
+        ..Profile::default()
     };
     let profile = with("", "4.2");
     let (run, port) = bench.start(&profile, &[QUICK, REFUSAL, "--no-motion"]);

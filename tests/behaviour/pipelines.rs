@@ -173,8 +173,10 @@ fn a_start_that_failed_leaves_no_bundle_and_the_failures_before_it_are_still_kno
     let fault = ["run", "--virtual", "--fault", "validation-error-fatal"];
     bench.run(&[&fault[..], &[REFUSAL, QUICK]].concat()).code(1);
     let before = bundles(&bench.path().join("reports"));
-    let mut profile = Profile::default();
-    profile.device = "command = [\"no-such-program\"]".to_owned();
+    let profile = Profile {
+        device: "command = [\"no-such-program\"]".to_owned(),
+        ..Profile::default()
+    };
     fs::write(bench.path().join("device.toml"), profile.text()).unwrap();
     bench
         .run(&["run", "--profile", "device.toml", QUICK])
@@ -239,8 +241,10 @@ fn what_goes_wrong_before_a_run_is_an_annotation_with_file_and_line() {
     on_github(&["run", "--profile", "device.toml"])
         .code(2)
         .says("::error file=device.toml,line=2,title=vda5050-tck::");
-    let mut profile = Profile::default();
-    profile.device = "command = [\"no-such-program\"]".to_owned();
+    let profile = Profile {
+        device: "command = [\"no-such-program\"]".to_owned(),
+        ..Profile::default()
+    };
     let text = profile.text();
     let line = text.lines().position(|line| line.starts_with("command")).unwrap() + 1;
     fs::write(bench.path().join("device.toml"), text).unwrap();

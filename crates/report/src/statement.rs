@@ -310,7 +310,7 @@ pub fn trouble(result: &RunResult) -> Option<String> {
     }
     // What monitors found is about the traffic. Were all tests skipped, nothing would be red.
     match result.tests.len() {
-        0 => None,
+        0 => Some("no test was selected".to_owned()),
         _ if tests.none == result.tests.len() => Some("none of the selected tests applies to the device".to_owned()),
         1 if tests.decided() == 0 => Some("the selected test was not decided".to_owned()),
         all if tests.decided() == 0 => Some(format!("none of the {all} selected tests was decided")),

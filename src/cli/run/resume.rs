@@ -41,7 +41,7 @@ pub(super) const ONE_THING: &str =
 const WHERE: &str = "bench.listen";
 
 /// What a run is about, beside its suites.
-pub(super) struct Subject<'a> {
+pub(super) struct AboutRun<'a> {
     pub(super) subject: &'a Participant,
     pub(super) vantage: &'a str,
     pub(super) settings: &'a [Setting],
@@ -100,7 +100,7 @@ impl Earlier {
     }
 
     /// Refuses to join what is about something else.
-    pub(super) fn is_about(&self, now: &Subject<'_>, pack: &Pack, library: &Library) -> Result<(), Problem> {
+    pub(super) fn is_about(&self, now: &AboutRun<'_>, pack: &Pack, library: &Library) -> Result<(), Problem> {
         let header = &self.header;
         let facts = [
             ("manufacturer", &header.manufacturer, &now.subject.manufacturer),
@@ -129,7 +129,7 @@ impl Earlier {
     }
 
     /// What nobody can say of a device that the harness does not start, and of which no version is named.
-    pub(super) fn limit(now: &Subject<'_>) -> Option<String> {
+    pub(super) fn limit(now: &AboutRun<'_>) -> Option<String> {
         let says = |name: &str| {
             now.settings
                 .iter()
