@@ -37,8 +37,8 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    /// Sees the next entry. `doubt` says why what happens now may stem from somebody else; nothing is held against the
-    /// device once the run is interrupted.
+    /// Sees the next entry. `doubt` says why somebody else may have harmed the device; nothing is held against it once
+    /// the run is interrupted.
     pub(super) fn observe(&mut self, entry: &Entry, doubt: Option<&str>, is_interrupted: bool) {
         let now = entry.at().moment;
         match entry.event() {
@@ -166,11 +166,21 @@ mod tests {
     #[test]
     fn a_program_that_ends_by_itself_is_a_failure_and_stays_one_when_it_is_started_again() {
         let watched = seen(&[started(), ended()]);
-        assert!(watched.is_down().is_some_and(|story| story.contains("signal 9 (SIGKILL)") && story.contains("boom")));
-        assert_eq!(watched.result().and_then(|result| result.verdict()), Some(Verdict::Fail));
+        assert!(
+            watched
+                .is_down()
+                .is_some_and(|story| story.contains("signal 9 (SIGKILL)") && story.contains("boom"))
+        );
+        assert_eq!(
+            watched.result().and_then(|result| result.verdict()),
+            Some(Verdict::Fail)
+        );
         let watched = seen(&[started(), ended(), asked(), started(), hook()]);
         assert_eq!(watched.is_down(), None);
-        assert_eq!(watched.result().and_then(|result| result.verdict()), Some(Verdict::Fail));
+        assert_eq!(
+            watched.result().and_then(|result| result.verdict()),
+            Some(Verdict::Fail)
+        );
     }
 
     #[test]

@@ -190,7 +190,11 @@ pub const HOOKS: &[HookInfo] = &[
         "Set the master control up for what comes next.",
     )),
     master_control("start", &["vehicle"], "Start the master control."),
-    ending(master_control("shutdown", &["vehicle"], "Shut the master control down.")),
+    ending(master_control(
+        "shutdown",
+        &["vehicle"],
+        "Shut the master control down.",
+    )),
     master_control(
         "confirm",
         &["vehicle", "question"],

@@ -70,7 +70,11 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
             }
         }
     }
-    if let Some(program) = result.program.as_ref().filter(|program| program.verdict() == Some(Verdict::Fail)) {
+    if let Some(program) = result
+        .program
+        .as_ref()
+        .filter(|program| program.verdict() == Some(Verdict::Fail))
+    {
         all.push(Finding {
             requirement: PROGRAM,
             verdict: Verdict::Fail,

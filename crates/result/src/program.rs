@@ -86,7 +86,9 @@ impl ProgramResult {
             ends => format!("; it ended so {ends} times in all"),
         };
         let excuse = first.excuse.as_ref();
-        let excuse = excuse.map_or_else(String::new, |why| format!("; whether by itself cannot be told, since {why}"));
+        let excuse = excuse.map_or_else(String::new, |why| {
+            format!("; whether by itself cannot be told, since {why}")
+        });
         Some(format!("{}{more}{excuse}", first.story()))
     }
 

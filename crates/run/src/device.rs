@@ -273,9 +273,7 @@ impl DeviceProcess {
 
 async fn report(surroundings: &Surroundings, program: Program) {
     if let Some(reporter) = &surroundings.reporter {
-        reporter
-            .report(Source::Harness, None, Event::Program { program })
-            .await;
+        reporter.report(Source::Harness, None, Event::Program { program }).await;
     }
 }
 
@@ -356,7 +354,11 @@ impl Witness {
     fn last_words(&self) -> String {
         let text = self.log.as_ref().and_then(|(log, begins)| end_of(log, *begins).ok());
         let text = text.unwrap_or_default();
-        let lines: Vec<&str> = text.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
+        let lines: Vec<&str> = text
+            .lines()
+            .map(str::trim_end)
+            .filter(|line| !line.is_empty())
+            .collect();
         let last = lines[lines.len().saturating_sub(LINES)..].join("\n");
         let last = self.surroundings.secrets.out_of(&last);
         let long = last.chars().count();

@@ -180,7 +180,8 @@ pub async fn run<L: Link, O: Operator>(
 }
 
 /// Why a run has ended whose end was not waited for.
-const GIVEN_UP: &str = "interrupted by the user; what the device was given was not called off to the end, and it may go on with it";
+const GIVEN_UP: &str =
+    "interrupted by the user; what the device was given was not called off to the end, and it may go on with it";
 
 pub(super) struct Session<'a, L, O> {
     pub(super) engine: &'a mut Engine<L, O>,

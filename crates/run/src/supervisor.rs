@@ -107,9 +107,7 @@ mod system {
     use std::process::{Child, Command, ExitCode, Stdio};
     use std::time::Duration;
 
-    use rustix::process::{
-        Pid, Signal, WaitOptions, kill_process, kill_process_group, test_kill_process_group, wait,
-    };
+    use rustix::process::{Pid, Signal, WaitOptions, kill_process, kill_process_group, test_kill_process_group, wait};
 
     use super::{ASK, Told, cannot_start, log};
     use tck_journal::event::Ending;
@@ -302,7 +300,11 @@ mod system {
             _ => (Stdio::null(), Stdio::null()),
         };
         let mut command = Command::new(program);
-        command.args(arguments).stdin(Stdio::null()).stdout(output).stderr(errors);
+        command
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(output)
+            .stderr(errors);
         let mut child = match command.spawn() {
             Ok(child) => child,
             Err(error) => {
@@ -317,7 +319,9 @@ mod system {
             let mut rest = Vec::new();
             let _ = std::io::stdin().read_to_end(&mut rest);
             let mut end = Command::new("taskkill");
-            end.args(["/T", "/F", "/PID", &tree]).stdout(Stdio::null()).stderr(Stdio::null());
+            end.args(["/T", "/F", "/PID", &tree])
+                .stdout(Stdio::null())
+                .stderr(Stdio::null());
             let _ = end.status();
         });
         let how = child.wait().map_or(Ending::Unknown, Ending::of);

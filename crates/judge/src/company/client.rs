@@ -154,7 +154,9 @@ impl Stranger {
 
     /// It is not what was started: another program has it.
     pub fn is_of(&mut self, origin: &Origin) {
-        let Origin::Other { process, name } = origin else { return };
+        let Origin::Other { process, name } = origin else {
+            return;
+        };
         let name = name.as_deref().unwrap_or("whose name may not be seen");
         self.program = Some(match process {
             Some(process) => format!("process {process}, {name:?}"),

@@ -65,7 +65,9 @@ impl Rivals {
             double.times += 1;
             double.last = now;
         }
-        format!("a client at {peer} connected as {id:?} while the connection of {former} under that id was open (#{seq})")
+        format!(
+            "a client at {peer} connected as {id:?} while the connection of {former} under that id was open (#{seq})"
+        )
     }
 
     /// A client publishes on a topic on which another one that is connected has published. One that only takes the place of

@@ -215,7 +215,11 @@ fn a_device_may_come_back_while_its_former_connection_seems_open() {
     let mut tap = Tap::vehicle();
     assert!(tap.connect(2, "agv", Some("connection")) && tap.publish(2, "state", "2"));
     assert!(tap.disturbs(), "there may be two");
-    assert!(tap.limits().contains("either the device came back, or there are two"), "{}", tap.limits());
+    assert!(
+        tap.limits().contains("either the device came back, or there are two"),
+        "{}",
+        tap.limits()
+    );
     assert_eq!(tap.company.mixed(), None);
     let before = tap.limits();
     tap.see(Event::Fault {
@@ -237,7 +241,11 @@ fn two_that_throw_each_other_out_are_not_one_device() {
         assert!(tap.connect(connection, "agv", Some("connection")));
         assert!(tap.publish(connection, "state", "1"));
     }
-    assert!(tap.company.mixed().is_some_and(|why| why.contains("agv")), "{:?}", tap.company.mixed());
+    assert!(
+        tap.company.mixed().is_some_and(|why| why.contains("agv")),
+        "{:?}",
+        tap.company.mixed()
+    );
     let mut tap = Tap::vehicle();
     for connection in 2..4 {
         tap.seconds += 600;
@@ -277,7 +285,10 @@ fn whoever_is_not_what_was_started_is_a_stranger_whatever_it_says_and_however_it
     assert!(!tap.subscribe(1, "v/order"));
     assert!(!tap.publish(1, "connection", "online") && !tap.delivered("connection", "online"));
     assert!(!tap.publish(1, "state", "1") && !tap.delivered("state", "1"));
-    assert!(!tap.delivered("connection", "gone"), "the broker has said its last will");
+    assert!(
+        !tap.delivered("connection", "gone"),
+        "the broker has said its last will"
+    );
     origin(&mut tap, 2, Origin::Started { process: 9 });
     assert!(tap.connect(2, "agv", Some("connection")), "it has the same client id");
     assert!(tap.publish(2, "state", "2") && tap.delivered("state", "2"));

@@ -216,9 +216,7 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
         }
         Event::Program { program } => {
             let (title, detail) = match program {
-                Program::Started { process, .. } => {
-                    ("the program is started".to_owned(), format!("process {process}"))
-                }
+                Program::Started { process, .. } => ("the program is started".to_owned(), format!("process {process}")),
                 Program::Asked { by } => ("the program is asked to end".to_owned(), format!("by {}", text(by))),
                 Program::Ended { how, words } => (format!("the program has ended: {how}"), text(words)),
             };
