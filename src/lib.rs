@@ -75,5 +75,6 @@ pub use tck_result as result;
 pub use tck_run as run;
 pub use tck_simulate as simulate;
 pub use tck_suite as suite;
+pub use tck_view as view;
 pub use tck_watch as watch;
 pub use tck_wire as wire;

@@ -13,10 +13,12 @@ mod explained;
 mod explore;
 mod expression;
 mod follow;
+mod gate;
 mod language;
 mod list;
 mod log;
 mod messages;
+mod outputs;
 mod papers;
 mod pieces;
 mod pipeline;
@@ -24,6 +26,7 @@ mod plan;
 mod problem;
 mod qualify;
 mod recordings;
+mod reference;
 mod report;
 mod run;
 mod screen;
@@ -42,6 +45,7 @@ use std::sync::Arc;
 use clap::Parser as _;
 
 use args::{Cli, Command, Format};
+use exit::Exit;
 use list::print;
 use problem::Problem;
 use tck_base::diagnostic::Diagnostic;
@@ -65,27 +69,14 @@ pub fn main() -> ExitCode {
             } else {
                 let _ = error.print();
             }
+            if error.use_stderr() {
+                let words: Vec<String> = std::env::args().collect();
+                outputs::Owed::by_words(&words).settle(&mistyped(&error));
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let logs = log::begin(cli.log_file.as_deref(), cli.command.verbose());
-    let outcome = logs.and_then(|()| match &cli.command {
-        Command::Run(arguments) => run::run_command(arguments),
-        Command::Certify(arguments) => certify::certify(arguments),
-        Command::List(arguments) => list::list(arguments),
-        Command::Explain(arguments) => list::explain(arguments),
-        Command::Audit(arguments) => audit::audit(arguments),
-        Command::Watch(arguments) => watch::watch(arguments),
-        Command::Explore(arguments) => explore::explore(arguments),
-        Command::Validate(arguments) => validate::validate(arguments),
-        Command::Simulate(arguments) => simulate::simulate(arguments),
-        Command::Report(arguments) => report::report(arguments),
-        Command::Qualify(arguments) => qualify::qualify(arguments),
-        Command::Discover(arguments) => discover::discover(arguments),
-        Command::Init(arguments) => discover::init(arguments),
-        Command::Completions(arguments) => shell::completions(arguments),
-        Command::Man(arguments) => shell::man(arguments),
-    });
+    let outcome = outputs::Owed::by(&cli.command).around(|outputs| dispatch(&cli, outputs));
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();
         match cli.command.format() {
@@ -95,6 +86,28 @@ pub fn main() -> ExitCode {
         problem.exit()
     });
     ExitCode::from(exit.code())
+}
+
+/// Calls the command.
+fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> {
+    log::begin(cli.log_file.as_deref(), cli.command.verbose())?;
+    match &cli.command {
+        Command::Run(arguments) => run::run_command(arguments, outputs),
+        Command::Certify(arguments) => certify::certify(arguments, outputs),
+        Command::List(arguments) => list::list(arguments),
+        Command::Explain(arguments) => list::explain(arguments),
+        Command::Audit(arguments) => audit::audit(arguments),
+        Command::Watch(arguments) => watch::watch(arguments),
+        Command::Explore(arguments) => explore::explore(arguments),
+        Command::Validate(arguments) => validate::validate(arguments),
+        Command::Simulate(arguments) => simulate::simulate(arguments),
+        Command::Report(arguments) => report::report(arguments, outputs),
+        Command::Qualify(arguments) => qualify::qualify(arguments),
+        Command::Discover(arguments) => discover::discover(arguments),
+        Command::Init(arguments) => discover::init(arguments),
+        Command::Completions(arguments) => shell::completions(arguments),
+        Command::Man(arguments) => shell::man(arguments),
+    }
 }
 
 /// Whether a command line that cannot be read asks for JSON.

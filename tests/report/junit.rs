@@ -101,7 +101,8 @@ fn a_partial_run_an_empty_one_and_a_test_without_decision_are_not_green() {
     assert_eq!(errors(|_| ()), 0);
     assert_eq!(errors(|result| result.partial = true), 1);
     assert_eq!(errors(|result| result.verdict = None), 1);
-    assert_eq!(errors(|result| result.tests[0].verdict = None), 1);
+    // The only test, and the run, of which no selected test was decided.
+    assert_eq!(errors(|result| result.tests[0].verdict = None), 2);
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::rules::{JudgeError, Rules};
 use super::test::Ground;
+use tck_base::time::TimeLimits;
 use tck_journal::event::RunHeader;
 use tck_pack::Role;
 
@@ -38,6 +39,7 @@ impl Grounds {
             role,
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: Arc::clone(&bindings),
+            time: TimeLimits::of_bindings(&bindings),
             waivers: Vec::new(),
             interference: None,
             is_interrupted: false,

@@ -28,6 +28,7 @@ use super::timeline::Timeline;
 use super::unheard::Unheard;
 use super::watches::Watches;
 use tck_base::clock::{Moment, Stamp};
+use tck_base::time::TimeLimits;
 use tck_base::verdict::Verdict;
 use tck_journal::Entry;
 use tck_journal::event::{Event, Occurrence, Plan, Reading, RunHeader, Waiver};
@@ -168,6 +169,7 @@ impl RunJudge {
                 let mut bindings = tck_base::pattern::Bindings::above(vec![Arc::clone(&self.ground.bindings)]);
                 bindings.set(name, value.clone());
                 self.ground.bindings = Arc::new(bindings.to_map());
+                self.ground.time = TimeLimits::of_bindings(&self.ground.bindings);
             }
             Event::TestBegun {
                 test,

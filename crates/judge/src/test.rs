@@ -18,6 +18,7 @@ use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
 use tck_base::pattern::Bindings;
+use tck_base::time::TimeLimits;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::Check;
 use tck_journal::Entry;
@@ -25,6 +26,7 @@ use tck_journal::event::{Event, StepEnd, Waiver};
 use tck_pack::{Catalogue, Pack, Role};
 use tck_result::{Decision, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
+use tck_world::Setting;
 
 /// What does not change during a run.
 pub struct Ground {
@@ -42,12 +44,28 @@ pub struct Ground {
     pub identity: (String, String),
     /// `time`, `device`.
     pub bindings: Arc<Map<String, Value>>,
+    /// The limits among them.
+    pub time: TimeLimits,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
     /// Why what is found at present may stem from somebody else: one on the tap, or who has interrupted the run.
     pub interference: Option<Arc<str>>,
     /// Whether the run was interrupted. Then nothing is held against the device any more, not even as a remark.
     pub is_interrupted: bool,
+}
+
+impl Ground {
+    /// What monitors and facts may know besides the records.
+    pub(super) fn setting(&self) -> Setting<'_> {
+        Setting {
+            pack: &self.pack,
+            topics: &self.topics,
+            role: self.role,
+            identity: (&self.identity.0, &self.identity.1),
+            bindings: &self.bindings,
+            time: &self.time,
+        }
+    }
 }
 
 /// What is only preferred by a ruling of the catalogue: broken is a warning.
@@ -230,6 +248,7 @@ impl TestJudge {
             role: ground.role,
             identity: (&ground.identity.0, &ground.identity.1),
             run_bindings: &ground.bindings,
+            time: &ground.time,
             bindings: &self.bindings,
             timeline,
             entries: &self.entries,

@@ -21,7 +21,6 @@ mod secret;
 mod surroundings;
 #[cfg(test)]
 mod tests;
-mod time;
 mod value;
 mod vehicle;
 
@@ -43,8 +42,9 @@ pub use placeholder::{fill, placeholders};
 pub use secret::{PasswordError, PasswordSource, SecretText};
 pub use surroundings::Surroundings;
 pub use tck_base::secrets::{Password, Secrets};
+use tck_base::time;
+pub use tck_base::time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 pub use tck_journal::event::Setting;
-pub use time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 pub use vehicle::{VEHICLE_WORDS, VehicleWord, find as find_vehicle_word};
 
 use tck_base::diagnostic::Span;

@@ -293,6 +293,31 @@ fn anything_failed(result: &RunResult) -> bool {
     !program_failed(result) || tests(result).fail > 0 || monitors(result).fail > 0
 }
 
+/// Why nobody may take a run for a green one, whatever stands in its tests: it ended early, or decided nothing of what was
+/// selected.
+#[must_use]
+pub fn trouble(result: &RunResult) -> Option<String> {
+    let tests = tests(result);
+    if result.partial {
+        let reason = result.partial_reason.as_deref();
+        return Some(reason.unwrap_or("the run ended before its plan did").to_owned());
+    }
+    if result.verdict.is_none() {
+        return Some("nothing was decided".to_owned());
+    }
+    if requirements(result).decided() == 0 {
+        return Some("no requirement was decided".to_owned());
+    }
+    // What monitors found is about the traffic. Were all tests skipped, nothing would be red.
+    match result.tests.len() {
+        0 => Some("no test was selected".to_owned()),
+        _ if tests.none == result.tests.len() => Some("none of the selected tests applies to the device".to_owned()),
+        1 if tests.decided() == 0 => Some("the selected test was not decided".to_owned()),
+        all if tests.decided() == 0 => Some(format!("none of the {all} selected tests was decided")),
+        _ => None,
+    }
+}
+
 /// What restricts the statement, one sentence each: what follows from the result itself, then what the run
 /// noted. Clean, but not escaped for a format.
 #[must_use]

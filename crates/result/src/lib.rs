@@ -275,17 +275,31 @@ pub struct Repetition {
     /// Why the verdict is not a pass, in one line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// First and last journal number.
+    /// First and last journal number; absent when it was asked for and not done.
     pub journal: Option<(u64, u64)>,
 }
 
+impl Repetition {
+    /// Whether it was carried out, and not only asked for.
+    #[must_use]
+    pub fn was_done(&self) -> bool {
+        self.journal.is_some()
+    }
+}
+
 impl TestResult {
-    /// Whether its repetitions have different verdicts.
+    /// Whether the repetitions that were carried out have different verdicts.
     #[must_use]
     pub fn is_flaky(&self) -> bool {
-        self.repetitions
-            .windows(2)
-            .any(|pair| pair[0].verdict != pair[1].verdict)
+        let mut done = self.repetitions.iter().filter(|one| one.was_done());
+        let first = done.next();
+        first.is_some_and(|first| done.any(|other| other.verdict != first.verdict))
+    }
+
+    /// How many of its repetitions were asked for and not carried out.
+    #[must_use]
+    pub fn left_out(&self) -> usize {
+        self.repetitions.iter().filter(|one| !one.was_done()).count()
     }
 
     /// The decisions that are not a pass.

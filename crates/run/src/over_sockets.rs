@@ -8,6 +8,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::device::{Surroundings as Onlookers, Tell};
+use super::files::files;
 use super::hooks::Means;
 use super::operators::{Commands, hooks_of};
 use super::person::Person;
@@ -148,7 +149,8 @@ impl SocketRun {
         place: Place,
     ) -> Result<Self, Vec<Diagnostic>> {
         let profile = &effective.profile;
-        let device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
+        let mut device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
+        device.files = files(effective, place.profile.as_deref(), &place.folder);
         let topics = Topics {
             device: device.published(pack),
             harness: device.told(pack),
@@ -305,6 +307,8 @@ impl SocketRun {
 /// What belongs to a profile and does not stand in it.
 #[derive(Clone, Debug, Default)]
 pub struct Place {
+    /// The file, if there is one.
+    pub profile: Option<PathBuf>,
     /// Where its commands are run.
     pub folder: PathBuf,
     /// Who can be asked.

@@ -73,6 +73,9 @@ pub enum End {
     NoDevice(String),
     /// Another device speaks than the one that was to be judged; the text says which. Nothing is judged.
     Stranger(String),
+    /// The run goes on with another one, and the device is not what it was then; the text says what differs. Nothing of it
+    /// is judged.
+    Changed(String),
     /// The device went away, and did not come back.
     Lost(String),
     /// The user stopped it.
@@ -160,12 +163,14 @@ pub async fn run<L: Link, O: Operator>(
     }
     let (partial, reason) = match &end {
         End::Completed => (false, None),
-        End::NoDevice(why) | End::Stranger(why) | End::Lost(why) | End::Flooded(why) => (true, Some(why.clone())),
+        End::NoDevice(why) | End::Stranger(why) | End::Changed(why) | End::Lost(why) | End::Flooded(why) => {
+            (true, Some(why.clone()))
+        }
         End::Interrupted if is_given_up => (true, Some(GIVEN_UP.to_owned())),
         End::Interrupted => (true, Some("interrupted by the user".to_owned())),
         End::Broken(error) => (true, Some(error.to_string())),
     };
-    let stranger = matches!(end, End::Stranger(_));
+    let stranger = matches!(end, End::Stranger(_) | End::Changed(_));
     let recorded = engine.note(Event::RunEnded {
         partial,
         reason,
@@ -232,10 +237,13 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let admitted = self.admit().await?;
         self.draw();
         if let Err(why) = admitted {
-            let end = self.stopped().unwrap_or_else(|| match self.somebody_else() {
-                Some(who) => End::Stranger(who),
-                None => End::NoDevice(why.clone()),
-            });
+            let end = self
+                .stopped()
+                .unwrap_or_else(|| match (self.is_another(), self.somebody_else()) {
+                    (Some(what), _) => End::Changed(what),
+                    (None, Some(who)) => End::Stranger(who),
+                    (None, None) => End::NoDevice(why.clone()),
+                });
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
                 gate: Gate::Unobservable(why.clone()),
@@ -389,6 +397,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 .and_then(Value::as_str)
                 .map(|name| name.chars().take(200).collect()),
             complete: self.setup.complete,
+            repeat: (self.setup.repeat > 1).then_some(self.setup.repeat),
         }
     }
 

@@ -157,6 +157,7 @@ impl OnStage {
             fail_fast: false,
             repeat: 1,
             certifies: false,
+            limits: Vec::new(),
         }
     }
 
@@ -220,6 +221,7 @@ impl OnStage {
                 still,
             } => {
                 let place = Place {
+                    profile: None,
                     folder: folder.clone(),
                     person: person(&self.desk),
                     vehicles: None,

@@ -30,6 +30,9 @@ impl RunJudge {
             Vec::new()
         } else {
             let mut tests = joined::repetitions(&self.done);
+            if self.end.is_some() {
+                self.complain_of_left_out(&mut tests);
+            }
             tests.extend(self.set_aside());
             tests
         };
@@ -65,7 +68,8 @@ impl RunJudge {
             None => (true, Some("the run has not ended yet".to_owned())),
         };
         // Nobody knows what the rest would have shown. A failure stands on its evidence.
-        let unknown = (partial && !self.is_stranger).then_some(Verdict::Inconclusive);
+        let says_nothing = self.is_stranger && self.earlier.is_none();
+        let unknown = (partial && !says_nothing).then_some(Verdict::Inconclusive);
         let header = &self.header;
         let joined = self.joined();
         let fleet = match &self.earlier {
@@ -157,6 +161,19 @@ impl RunJudge {
         let before: Vec<String> = before.filter(|limit| !limits.contains(limit)).collect();
         limits.extend(before);
         limits
+    }
+
+    /// A repetition that was asked for and not done is undecided, and so is its test.
+    fn complain_of_left_out(&self, tests: &mut [TestResult]) {
+        let Some(repeat) = self.plan.repeat else { return };
+        for test in tests {
+            let planned = self.plan.tests.iter().find(|planned| planned.test == test.id);
+            let why = match planned.map(|planned| &planned.gate) {
+                Some(Gate::Unobservable(why) | Gate::NotApplicable(why)) => why.as_str(),
+                Some(Gate::Runs) | None => "the run ended before",
+            };
+            joined::left_out(test, repeat, why);
+        }
     }
 
     /// The planned tests that did not run, with the reason.

@@ -5,23 +5,22 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
 use serde_json::Value;
-
-use super::{ELEMENTS, said};
-use crate::traffic::{elements, text};
 use tck_base::clock::Moment;
 use tck_base::pattern::whole;
-use tck_check::CheckContext;
-use tck_journal::Entry;
-use tck_journal::event::{Event, LinkFault};
+
+use crate::members::{ELEMENTS, elements, text};
+use crate::observation::Observation;
+use crate::setting::Setting;
+use crate::topic::Topic;
 
 /// What a factsheet says about an action.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Offered {
+pub struct Offered {
+    /// actionScopes.
     pub scopes: Vec<String>,
-    /// `None`: not said.
+    /// blockingTypes; `None`: not said.
     pub blocking: Option<Vec<String>>,
     /// Key and whether it may be left out; `None`: not said.
     pub parameters: Option<BTreeMap<String, bool>>,
@@ -31,19 +30,24 @@ pub(super) struct Offered {
 
 /// What a factsheet says.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sheet {
+pub struct Factsheet {
     /// Whether the vehicle is bound to lines, or the factsheet does not say how it finds its way.
     pub line_guided: bool,
     /// Whether it finds itself only at marks on nodes.
     pub on_nodes_only: bool,
-    /// `None`: not said.
+    /// optionalParameters; `None`: not said.
     pub supported: Option<Vec<String>>,
+    /// Those of them that are REQUIRED.
     pub required: Vec<String>,
     /// By actionType; `None`: not said.
     pub actions: Option<BTreeMap<String, Offered>>,
+    /// loadPositions.
     pub load_positions: Vec<String>,
+    /// maxStringLens, without those that are 0.
     pub strings: BTreeMap<String, u64>,
+    /// idNumericalOnly.
     pub numerical: bool,
+    /// maxArrayLens, without those that are 0.
     pub arrays: BTreeMap<String, u64>,
     /// minOrderInterval in seconds.
     pub interval: f64,
@@ -86,7 +90,7 @@ impl Offered {
     }
 }
 
-impl Sheet {
+impl Factsheet {
     fn read(value: &Value) -> Self {
         let at = |pointer: &str| value.pointer(pointer);
         let navigation = texts(at("/typeSpecification/navigationTypes")).unwrap_or_default();
@@ -124,49 +128,23 @@ impl Sheet {
 
 /// The factsheets that count now.
 #[derive(Debug, Default)]
-pub(super) struct Sheets {
-    now: Option<Arc<Sheet>>,
-    said: u64,
+pub struct Factsheets {
+    now: Option<Arc<Factsheet>>,
+    said: Option<u64>,
     since: Option<Moment>,
     /// Those before, until when they count.
-    before: Vec<(Arc<Sheet>, Moment)>,
+    before: Vec<(Arc<Factsheet>, Moment)>,
     /// While nobody knows which one the master control has.
     unknown: bool,
-    disturbed: bool,
 }
 
-impl Sheets {
-    /// Learns from an entry.
-    pub fn note(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        if let Event::Fault { fault } = entry.event() {
-            self.disturbed = *fault != LinkFault::Restore;
-        }
-        let Some(value) = said("factsheet", entry, context) else {
-            return;
-        };
-        // It may get lost; the next one tells.
-        self.unknown = self.disturbed;
-        let print = super::content(value);
-        if self.now.is_some() && self.said == print {
-            return;
-        }
-        let now = entry.at().moment;
-        self.before.retain(|(_, until)| *until > now);
-        if self.before.len() == 8 {
-            self.before.remove(0);
-        }
-        let until = now + grace(context);
-        let new = Arc::new(Sheet::read(value));
-        self.before.extend(self.now.replace(new).map(|old| (old, until)));
-        self.said = print;
-        self.since = Some(now);
-    }
-
+impl Factsheets {
     /// All factsheets the master control may go by; none when that is not known.
-    pub fn valid(&self, entry: &Entry, context: &CheckContext<'_>) -> Vec<Arc<Sheet>> {
-        let now = entry.at().moment;
+    #[must_use]
+    pub fn valid(&self, record: &Observation<'_>, setting: &Setting<'_>) -> Vec<Arc<Factsheet>> {
+        let now = record.at().moment;
         // The very first one takes a while to be read, too.
-        let fresh = self.before.is_empty() && self.since.is_some_and(|since| now.since(since) < grace(context));
+        let fresh = self.before.is_empty() && self.since.is_some_and(|since| now.since(since) < setting.time.notice);
         if self.unknown || fresh {
             return Vec::new();
         }
@@ -179,7 +157,27 @@ impl Sheets {
     }
 }
 
-/// How long a message may be under way and lie with the master control.
-pub(super) fn grace(context: &CheckContext<'_>) -> Duration {
-    context.time("notice").unwrap_or(Duration::from_secs(10))
+impl Factsheets {
+    /// Learns from the next record.
+    pub(crate) fn learn(&mut self, record: &Observation<'_>, setting: &Setting<'_>) {
+        let Some(value) = record.said(Topic::Factsheet) else {
+            return;
+        };
+        // It may get lost; the next one tells.
+        self.unknown = record.link.disturbed;
+        let print = record.content();
+        if self.now.is_some() && self.said == print {
+            return;
+        }
+        let now = record.at().moment;
+        self.before.retain(|(_, until)| *until > now);
+        if self.before.len() == 8 {
+            self.before.remove(0);
+        }
+        let until = now + setting.time.notice;
+        let new = Arc::new(Factsheet::read(value));
+        self.before.extend(self.now.replace(new).map(|old| (old, until)));
+        self.said = print;
+        self.since = Some(now);
+    }
 }

@@ -3,26 +3,28 @@
 use std::f64::consts::PI;
 
 use serde_json::Value;
-
-use super::pose::{Pose, finite};
-use crate::orders::number;
-use crate::traffic::{elements, text};
 use tck_base::nurbs::{Beside, Curve, Path};
 
+use crate::members::{elements, kept, number, text};
+use crate::pose::{Pose, finite};
+
 /// An angle brought into -π … π.
-pub(super) fn wrapped(angle: f64) -> f64 {
+#[must_use]
+pub fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(2.0 * PI);
     if turned > PI { turned - 2.0 * PI } else { turned }
 }
 
 /// How far two orientations are apart, the short way, in radians.
-pub(super) fn apart(one: f64, other: f64) -> f64 {
+#[must_use]
+pub fn apart(one: f64, other: f64) -> f64 {
     wrapped(one - other).abs()
 }
 
 /// nodePosition of an ordered node.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Place {
+pub struct OrderedPlace {
+    /// mapId.
     pub map: String,
     /// Metres.
     pub x: f64,
@@ -38,31 +40,34 @@ pub(super) struct Place {
 
 /// An ordered node.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Stop {
+pub struct OrderedNode {
+    /// sequenceId.
     pub sequence: u64,
+    /// nodeId.
     pub id: String,
     /// `None` where the order gives no position, or one that cannot be calculated with.
-    pub place: Option<Place>,
+    pub place: Option<OrderedPlace>,
     /// Whether it has actions, which may move the vehicle.
     pub acts: bool,
 }
 
-impl Stop {
+impl OrderedNode {
     /// Reads a node of an order.
+    #[must_use]
     pub fn read(node: &Value) -> Option<Self> {
         Some(Self {
             sequence: number(node, "sequenceId")?,
-            id: text(node, "nodeId").chars().take(512).collect(),
-            place: node.get("nodePosition").and_then(Place::read),
+            id: kept(node, "nodeId"),
+            place: node.get("nodePosition").and_then(OrderedPlace::read),
             acts: elements(node, "actions").next().is_some(),
         })
     }
 }
 
-impl Place {
+impl OrderedPlace {
     fn read(position: &Value) -> Option<Self> {
         Some(Self {
-            map: text(position, "mapId").chars().take(512).collect(),
+            map: kept(position, "mapId"),
             x: finite(position, "x")?,
             y: finite(position, "y")?,
             theta: finite(position, "theta"),
@@ -72,6 +77,7 @@ impl Place {
     }
 
     /// Metres to a point.
+    #[must_use]
     pub fn distance(&self, x: f64, y: f64) -> f64 {
         (self.x - x).hypot(self.y - y)
     }
@@ -84,7 +90,8 @@ impl Place {
 
 /// What an edge demands.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Demands {
+pub struct Demands {
+    /// sequenceId.
     pub sequence: u64,
     /// Metres per second.
     pub max_speed: Option<f64>,
@@ -92,18 +99,21 @@ pub(super) struct Demands {
     pub max_rotation_speed: Option<f64>,
     /// Radians; against the map if `global`, else against the way.
     pub orientation: Option<f64>,
+    /// Whether the orientation is against the map.
     pub global: bool,
+    /// rotationAllowed.
     pub rotation_allowed: Option<bool>,
     /// Whether the way may be no straight line.
     pub curved: bool,
     /// Its trajectory, if it has one that can be calculated with.
     pub path: Option<Path>,
+    /// How far it may be left.
     pub corridor: Option<Corridor>,
 }
 
 /// How far the vehicle may leave the trajectory of an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Corridor {
+pub struct Corridor {
     /// Metres.
     pub left: f64,
     /// Metres.
@@ -125,6 +135,7 @@ impl Corridor {
 
 impl Demands {
     /// Reads an edge of an order.
+    #[must_use]
     pub fn read(edge: &Value) -> Option<Self> {
         let kind = text(edge, "orientationType");
         Some(Self {
@@ -147,15 +158,18 @@ impl Demands {
 
 /// The edge a vehicle is on, with its ends.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Lane {
+pub struct Lane {
+    /// What the edge demands.
     pub demands: Demands,
-    pub from: Stop,
-    pub to: Stop,
+    /// The node it begins at.
+    pub from: OrderedNode,
+    /// The node it ends at.
+    pub to: OrderedNode,
 }
 
 /// Where a position is beside the straight line between two nodes, in metres.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Along {
+pub struct Along {
     /// Way made from the start node on; negative before it.
     pub made: f64,
     /// Length of the line.
@@ -168,17 +182,20 @@ pub(super) struct Along {
 
 impl Along {
     /// Whether the position is on the edge and on neither node, and on the straight line.
+    #[must_use]
     pub fn is_mid_edge(&self) -> bool {
         let near_line = self.off <= (0.05 * self.length).clamp(0.15, 0.3);
         near_line && self.made > self.reach.0 && self.length - self.made > self.reach.1
     }
 
     /// Whether the position may still be on the start node.
+    #[must_use]
     pub fn is_at_start(&self) -> bool {
         self.made.hypot(self.off) <= self.reach.0
     }
 
     /// The way made on the edge alone.
+    #[must_use]
     pub fn made_on_edge(&self) -> f64 {
         let half = self.length / 2.0;
         self.made
@@ -188,7 +205,7 @@ impl Along {
 
 /// Where a position is beside the trajectory of an edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bend {
+pub struct Bend {
     /// The nearest place of the trajectory.
     pub beside: Beside,
     /// Length of the trajectory in metres.
@@ -201,6 +218,7 @@ pub(super) struct Bend {
 
 impl Lane {
     /// Where a position is beside the trajectory.
+    #[must_use]
     pub fn bend(&self, pose: &Pose) -> Option<Bend> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
         let path = self
@@ -221,12 +239,14 @@ impl Lane {
     }
 
     /// The direction of the straight line from node to node, in radians.
+    #[must_use]
     pub fn heading(&self) -> Option<f64> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
         (from.map == to.map && from.distance(to.x, to.y) > 0.2).then(|| (to.y - from.y).atan2(to.x - from.x))
     }
 
     /// Where a position is along the line.
+    #[must_use]
     pub fn along(&self, pose: &Pose) -> Option<Along> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
         let heading = self.heading()?;
@@ -243,11 +263,13 @@ impl Lane {
     }
 
     /// Whether the pose is on the straight edge alone.
+    #[must_use]
     pub fn is_mid_edge(&self, pose: &Pose) -> bool {
         !self.demands.curved && self.along(pose).is_some_and(|along| along.is_mid_edge())
     }
 
     /// The orientation the vehicle has to have on the straight line, in radians.
+    #[must_use]
     pub fn wanted_orientation(&self) -> Option<f64> {
         let orientation = self.demands.orientation?;
         if self.demands.global {

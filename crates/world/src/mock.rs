@@ -3,31 +3,38 @@
 use std::collections::VecDeque;
 
 use serde_json::Value;
-
-use super::{ELEMENTS, said, short};
-use crate::orders::{is_taken_out, number};
-use crate::traffic::{elements, text};
 use tck_base::clock::Moment;
-use tck_check::CheckContext;
-use tck_journal::Entry;
 use tck_journal::event::Event;
+
+use crate::members::{ELEMENTS, elements, number, released, short, text};
+use crate::observation::Observation;
+use crate::setting::Setting;
+use crate::shown::is_taken_out;
+use crate::topic::Topic;
 
 /// How many states are kept.
 const STATES: usize = 64;
 
 /// One state of the vehicle.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Seen {
+pub struct ShownState {
+    /// When it was sent.
     pub at: Moment,
+    /// orderId.
     pub order: String,
+    /// orderUpdateId.
     pub update: u64,
+    /// lastNodeId.
     pub last_node: String,
     /// Position and map, where the vehicle knows them.
     pub pose: Option<(f64, f64, String)>,
+    /// Whether it says that it drives.
     pub driving: bool,
-    /// Released elements that are left, and the others.
+    /// Released elements that are left.
     pub base: usize,
+    /// Elements that are left and not released.
     pub horizon: usize,
+    /// operatingMode.
     pub mode: String,
     /// Whether it shows something that may end an order without a word; of a failed action its states tell the rest.
     pub taken_out: bool,
@@ -37,12 +44,12 @@ pub(super) struct Seen {
     pub refused: Vec<u64>,
 }
 
-impl Seen {
+impl ShownState {
     fn read(state: &Value, at: Moment) -> Self {
         let left = |wanted: bool| {
             let of = |list| elements(state, list).take(ELEMENTS);
             let all = of("nodeStates").chain(of("edgeStates"));
-            all.filter(|element| super::released(element) == Some(wanted)).count()
+            all.filter(|element| released(element) == Some(wanted)).count()
         };
         let position = state
             .get("agvPosition")
@@ -75,6 +82,7 @@ impl Seen {
     }
 
     /// Whether nothing is left of an order.
+    #[must_use]
     pub fn is_idle(&self) -> bool {
         self.base + self.horizon == 0 && !self.driving
     }
@@ -131,7 +139,7 @@ const DEVIATES: [&str; 11] = [
 
 /// What happened to the vehicle from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Outside {
+pub enum Outside {
     /// Nothing.
     No,
     /// It deviates from now on.
@@ -142,40 +150,41 @@ pub(super) enum Outside {
     Lost,
 }
 
-/// The vehicle of this monitor.
+/// A mock vehicle of the harness: what it showed of late, and what the harness did to it.
 #[derive(Debug, Default)]
-pub(super) struct Vehicle {
+pub struct MockVehicle {
     number: Option<usize>,
-    pub states: VecDeque<Seen>,
-    /// When something happened to it from outside.
-    pub outside: Option<Moment>,
+    states: VecDeque<ShownState>,
+    /// When something happened to it from outside, and with which record.
+    outside: Option<(Moment, u64, Outside)>,
 }
 
-impl Vehicle {
-    /// Learns from an entry; says whether something happened from outside.
-    pub fn note(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Outside {
-        let outside = self.outside(entry, context);
+impl MockVehicle {
+    /// Learns from the next record.
+    pub(crate) fn learn(&mut self, record: &Observation<'_>, setting: &Setting<'_>) {
+        let outside = self.outside(record, setting);
         if outside != Outside::No {
-            self.outside = Some(entry.at().moment);
+            self.outside = Some((record.at().moment, record.seq(), outside));
         }
         if matches!(outside, Outside::Moved | Outside::Lost) {
             self.states.clear();
         }
-        if let Some(state) = said("state", entry, context) {
+        if let Some(state) = record.said(Topic::State) {
             if self.states.len() == STATES {
                 self.states.pop_front();
             }
-            self.states.push_back(Seen::read(state, entry.at().moment));
+            self.states.push_back(ShownState::read(state, record.at().moment));
         }
-        outside
     }
+}
 
-    fn outside(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Outside {
-        match entry.event() {
+impl MockVehicle {
+    fn outside(&mut self, record: &Observation<'_>, setting: &Setting<'_>) -> Outside {
+        match record.event() {
             Event::RunBegun { header } => {
                 let mut all = header.vehicles.iter();
                 self.number =
-                    all.position(|one| (one.manufacturer.as_str(), one.serial_number.as_str()) == context.identity);
+                    all.position(|one| (one.manufacturer.as_str(), one.serial_number.as_str()) == setting.identity);
                 Outside::No
             }
             Event::Vehicle { vehicle, what, .. } if self.number.is_none_or(|number| number == *vehicle) => {
@@ -194,28 +203,55 @@ impl Vehicle {
         }
     }
 
-    pub fn last(&self) -> Option<&Seen> {
+    /// What happens to it from outside with this record.
+    #[must_use]
+    pub fn now(&self, record: &Observation<'_>) -> Outside {
+        match self.outside {
+            Some((_, seq, outside)) if seq == record.seq() => outside,
+            _ => Outside::No,
+        }
+    }
+
+    /// Whether it is moved, restarted or lost from sight with this record.
+    #[must_use]
+    pub fn is_lost(&self, record: &Observation<'_>) -> bool {
+        matches!(self.now(record), Outside::Moved | Outside::Lost)
+    }
+
+    /// The last state, if nothing has happened to it since.
+    #[must_use]
+    pub fn last(&self) -> Option<&ShownState> {
         self.states.back()
+    }
+
+    /// The states since something happened to it, oldest first; bounded.
+    pub fn states(&self) -> impl Iterator<Item = &ShownState> {
+        self.states.iter()
     }
 
     /// Whether something happened from outside that the master control may not have seen yet: a moment ago, or so that
     /// only states of this moment show what it has come to.
-    pub fn unsettled(&self, entry: &Entry, context: &CheckContext<'_>) -> bool {
-        let (now, grace) = (entry.at().moment, super::sheet::grace(context));
+    #[must_use]
+    pub fn unsettled(&self, record: &Observation<'_>, setting: &Setting<'_>) -> bool {
+        let (now, notice) = (record.at().moment, setting.time.notice);
         let first = self.states.front();
-        self.outside.is_some_and(|at| {
-            now.since(at) < grace || first.is_none_or(|first| first.at >= at && now.since(first.at) < grace)
+        self.outside.is_some_and(|(at, ..)| {
+            now.since(at) < notice || first.is_none_or(|first| first.at >= at && now.since(first.at) < notice)
         })
     }
 
     /// The states a master control may go by, newest first: those that may still be under way, and the one before.
-    pub fn recent<'a>(&'a self, entry: &Entry, context: &CheckContext<'_>) -> impl Iterator<Item = &'a Seen> + use<'a> {
-        let (now, grace) = (entry.at().moment, super::sheet::grace(context));
+    pub fn recent<'a>(
+        &'a self,
+        record: &Observation<'_>,
+        setting: &Setting<'_>,
+    ) -> impl Iterator<Item = &'a ShownState> + use<'a> {
+        let (now, notice) = (record.at().moment, setting.time.notice);
         let fresh = self
             .states
             .iter()
             .rev()
-            .take_while(|seen| now.since(seen.at) < grace)
+            .take_while(|seen| now.since(seen.at) < notice)
             .count();
         self.states.iter().rev().take(fresh + 1)
     }

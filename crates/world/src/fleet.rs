@@ -6,7 +6,7 @@ use std::time::Duration;
 use tck_base::clock::Moment;
 use tck_base::pattern::whole;
 use tck_journal::Entry;
-use tck_journal::event::{Direction, Event, Packet, Payload};
+use tck_journal::event::{Direction, Event, Packet};
 
 /// How many orders are remembered.
 const ORDERS: usize = 4096;
@@ -42,7 +42,7 @@ struct Link {
 impl FleetSeen {
     /// Learns from an entry that belongs to the topic of that name of a vehicle.
     pub fn note(&mut self, entry: &Entry, vehicle: usize, name: &str) {
-        let published = device_publish(entry).is_some();
+        let published = is_published(entry);
         self.tap |= published;
         let delivered = matches!(entry.event(), Event::Message { retain: false, .. });
         if published || (delivered && !self.tap) {
@@ -133,28 +133,16 @@ fn begins(order: &serde_json::Value) -> bool {
     })
 }
 
-/// A PUBLISH packet of the device: connection, topic, QoS, RETAIN, DUP and payload.
-#[must_use]
-pub fn device_publish(entry: &Entry) -> Option<(u64, &str, u8, bool, bool, &Payload)> {
-    if entry.record.direction == Some(Direction::ToDevice) {
-        return None;
-    }
-    let Event::Packet {
-        connection,
-        packet:
-            Packet::Publish {
-                topic,
-                qos,
-                retain,
-                dup,
-                payload,
-                ..
-            },
-    } = entry.event()
-    else {
-        return None;
-    };
-    Some((*connection, topic, *qos, *retain, *dup, payload))
+/// Whether an entry is a PUBLISH packet of the device.
+fn is_published(entry: &Entry) -> bool {
+    let publish = matches!(
+        entry.event(),
+        Event::Packet {
+            packet: Packet::Publish { .. },
+            ..
+        }
+    );
+    publish && entry.record.direction != Some(Direction::ToDevice)
 }
 
 /// Whether a topic filter takes a topic.
@@ -175,4 +163,19 @@ pub fn takes(filter: &str, topic: &str) -> bool {
         }
     }
     levels.next().is_none()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_take_what_mqtt_says() {
+        for filter in ["#", "a/#", "a/+/c", "a/b/c", "a/b/c/#", "$share/g/a/+/c"] {
+            assert!(takes(filter, "a/b/c"), "{filter}");
+        }
+        for filter in ["a/b", "a/b/c/d", "+", "a/+", "b/#"] {
+            assert!(!takes(filter, "a/b/c"), "{filter}");
+        }
+    }
 }

@@ -5,28 +5,31 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::Value;
-
-use super::lane::{Demands, Lane, Stop};
-use super::pose::{Pose, finite};
-use crate::orders::{number, read_elements};
-use crate::state::route::Shown;
-use crate::traffic::{Traffic, elements, text, to_vehicle};
 use tck_base::clock::Moment;
-use tck_check::CheckContext;
-use tck_journal::Entry;
+
+use crate::lane::{Demands, Lane, OrderedNode};
+use crate::members::{elements, kept, number, text};
+use crate::observation::Observation;
+use crate::orders::{Element, OrdersSent, read_elements};
+use crate::pose::{Pose, finite};
+use crate::shown::ShownOrder;
+use crate::topic::Topic;
 
 /// How many order messages are kept, and how many elements of each.
 const MESSAGES: usize = 64;
 const ELEMENTS: usize = 1024;
 
 /// Slower than this is at rest, in metres and radians per second.
-pub(super) const AT_REST: f64 = 0.02;
+pub const AT_REST: f64 = 0.02;
 
 /// velocity in vehicle coordinates; each member is optional.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Velocity {
+pub struct Velocity {
+    /// Metres per second, forwards.
     pub vx: Option<f64>,
+    /// Metres per second, to the left.
     pub vy: Option<f64>,
+    /// Radians per second.
     pub omega: Option<f64>,
 }
 
@@ -41,6 +44,7 @@ impl Velocity {
     }
 
     /// Metres per second, whatever the direction.
+    #[must_use]
     pub fn speed(&self) -> Option<f64> {
         self.vx.map(|vx| vx.hypot(self.vy.unwrap_or_default()))
     }
@@ -48,22 +52,28 @@ impl Velocity {
 
 /// What one state shows.
 #[derive(Clone, Debug)]
-pub(super) struct View {
+pub struct View {
+    /// The record.
     pub seq: u64,
+    /// When it came.
     pub moment: Moment,
     /// `timestamp` of the header, if it can be read.
     stamped: Option<jiff::Timestamp>,
+    /// orderId.
     pub order: String,
     /// The last node.
-    pub node: Stop,
+    pub node: OrderedNode,
     /// Whether this is the first state that shows this last node of this order.
     pub fresh: bool,
     /// The released edge behind the last node, while the state lists it with its end node.
     pub lane: Option<Lane>,
-    /// The same, released or only planned.
+    /// The edge behind the last node, released or only planned.
     pub ahead: Option<Lane>,
+    /// Where the vehicle is.
     pub pose: Option<Pose>,
+    /// How fast it is.
     pub velocity: Velocity,
+    /// Whether it says that it drives.
     pub driving: Option<bool>,
     /// Whether no released node is left.
     pub base_done: bool,
@@ -71,18 +81,21 @@ pub(super) struct View {
 
 impl View {
     /// Whether the vehicle stands, by its own account.
+    #[must_use]
     pub fn stands(&self) -> bool {
         let still = |speed: Option<f64>| speed.is_none_or(|speed| speed.abs() <= AT_REST);
         self.driving == Some(false) && still(self.velocity.speed()) && still(self.velocity.omega)
     }
 
     /// Whether an earlier view shows the same last node of the same order.
+    #[must_use]
     pub fn same_lane(&self, earlier: &Self) -> bool {
         (&self.order, self.node.sequence) == (&earlier.order, earlier.node.sequence) && self.lane == earlier.lane
     }
 
     /// The longest time that can lie between what two states show: late delivery makes the time between the
     /// arrivals shorter than it was, a coarse clock that between the timestamps.
+    #[must_use]
     pub fn time_since(&self, earlier: &Self) -> Duration {
         let arrived = self.moment.since(earlier.moment);
         let stamped = self.stamped.zip(earlier.stamped).and_then(|(now, then)| {
@@ -97,7 +110,7 @@ impl View {
 struct Plan {
     order: String,
     update: u64,
-    stops: Vec<Stop>,
+    stops: Vec<OrderedNode>,
     edges: Vec<Demands>,
     /// sequenceIds of what is only planned.
     planned: Vec<u64>,
@@ -106,11 +119,11 @@ struct Plan {
 impl Plan {
     fn read(message: &Value) -> Option<Self> {
         Some(Self {
-            order: text(message, "orderId").chars().take(512).collect(),
+            order: kept(message, "orderId"),
             update: number(message, "orderUpdateId")?,
             stops: elements(message, "nodes")
                 .take(ELEMENTS)
-                .filter_map(Stop::read)
+                .filter_map(OrderedNode::read)
                 .collect(),
             edges: elements(message, "edges")
                 .take(ELEMENTS)
@@ -131,49 +144,28 @@ impl Plan {
     }
 }
 
-/// What a state shows, if the vehicle can be held to its order. All checks that look at the same entries look over the
-/// same shoulder, so that each state is read once for all of them.
-pub(super) fn step(entry: &Entry, context: &CheckContext<'_>) -> Option<Arc<Step>> {
-    context.shared.of::<Walked>().borrow_mut().step(entry, context)
-}
-
-/// The way as far as it was followed, and what the newest entry showed.
-#[derive(Default)]
-pub(crate) struct Walked {
-    walk: Walk,
-    newest: Option<u64>,
-    step: Option<Arc<Step>>,
-}
-
-impl Walked {
-    fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Arc<Step>> {
-        if self.newest != Some(entry.seq()) {
-            self.newest = Some(entry.seq());
-            self.step = self.walk.step(entry, context).map(Arc::new);
-        }
-        self.step.clone()
-    }
-}
-
-#[derive(Default)]
-struct Walk {
-    shown: Shown,
-    traffic: Traffic,
+/// The way as far as it was followed.
+#[derive(Debug, Default)]
+pub struct Way {
     plans: VecDeque<Plan>,
     before: Option<View>,
+    /// What the last record showed that showed anything.
+    step: Option<(u64, Arc<Step>)>,
 }
 
 /// A state, and the one before it if both belong to one order and nothing came in between.
-pub(super) struct Step {
+#[derive(Debug)]
+pub struct Step {
+    /// What it shows.
     pub now: View,
+    /// What the one before showed.
     pub before: Option<View>,
 }
 
-impl Walk {
-    /// Learns from an entry; gives back what a state shows, if the vehicle can be held to its order.
-    fn step(&mut self, entry: &Entry, context: &CheckContext<'_>) -> Option<Step> {
-        self.traffic.note(entry);
-        if let Some(plan) = to_vehicle("order", entry, context).and_then(Plan::read)
+impl Way {
+    /// Learns from the next record.
+    pub(crate) fn learn(&mut self, record: &Observation<'_>, shown: &ShownOrder, orders: &OrdersSent) {
+        if let Some(plan) = record.to_vehicle(Topic::Order).and_then(Plan::read)
             && self.plans.back() != Some(&plan)
         {
             if self.plans.len() == MESSAGES {
@@ -181,50 +173,54 @@ impl Walk {
             }
             self.plans.push_back(plan);
         }
-        let state = self.shown.state(entry, context);
-        let is_state = crate::traffic::state(self.traffic, entry, context).is_some();
+        let state = shown.state(record);
+        let is_state = record.state().is_some();
         // Messages that the harness holds up tell nothing about time.
-        if self.traffic.disturbed || !is_state {
-            if is_state || self.traffic.disturbed {
+        if record.link.disturbed || !is_state {
+            if is_state || record.link.disturbed {
                 self.before = None;
             }
-            return None;
+            return;
         }
-        let view = state.and_then(|state| self.view(entry, state));
-        let Some(mut now) = view else {
+        let Some(mut now) = state.and_then(|state| self.view(record, state, shown, orders)) else {
             self.before = None;
-            return None;
+            return;
         };
         let before = self.before.take().filter(|before| before.order == now.order);
         now.fresh = before
             .as_ref()
             .is_none_or(|before| before.node.sequence != now.node.sequence);
         self.before = Some(now.clone());
-        Some(Step { now, before })
+        self.step = Some((record.seq(), Arc::new(Step { now, before })));
+    }
+}
+
+impl Way {
+    /// What this record shows, if it is a state of a vehicle that can be held to its order.
+    #[must_use]
+    pub fn step(&self, record: &Observation<'_>) -> Option<Arc<Step>> {
+        let (_, step) = self.step.as_ref().filter(|(seq, _)| *seq == record.seq())?;
+        Some(Arc::clone(step))
     }
 
-    fn view(&self, entry: &Entry, state: &Value) -> Option<View> {
+    fn view(&self, record: &Observation<'_>, state: &Value, shown: &ShownOrder, orders: &OrdersSent) -> Option<View> {
         let order = text(state, "orderId");
         let update = number(state, "orderUpdateId")?;
-        let mut sent = self.shown.orders.candidates(order, update).peekable();
+        let mut sent = orders.candidates(order, update).peekable();
         sent.peek()?;
         if !sent.all(|sent| sent.sound) {
             return None;
         }
-        let (id, sequence) = self.shown.last.as_ref()?;
+        let (id, sequence) = shown.last()?;
         let node = self.stop(order, update, *sequence)?;
         // Before the first node is reached, the last node is one of the order before.
-        let first = self
-            .shown
-            .orders
-            .candidates(order, update)
-            .any(|sent| sent.first() == *sequence);
-        if node.id != *id || (self.shown.carried.is_some() && !first) {
+        let first = orders.candidates(order, update).any(|sent| sent.first() == *sequence);
+        if node.id != *id || (shown.carried().is_some() && !first) {
             return None;
         }
         let nodes = read_elements(state, "nodeStates", "nodeId")?;
         let edges = read_elements(state, "edgeStates", "edgeId")?;
-        let on = |list: &[crate::orders::Element], sequence: u64| {
+        let on = |list: &[Element], sequence: u64| {
             let found = list.iter().find(|element| element.sequence == sequence);
             found.map(|element| element.released)
         };
@@ -234,10 +230,10 @@ impl Walk {
             .filter(|_| !behind);
         let ahead = listed.and_then(|_| self.lane(order, update, node));
         let lane = ahead.clone().filter(|_| listed == Some((true, true)));
-        let is_ahead = |element: &crate::orders::Element| element.released && element.sequence > *sequence;
+        let is_ahead = |element: &Element| element.released && element.sequence > *sequence;
         Some(View {
-            seq: entry.seq(),
-            moment: entry.at().moment,
+            seq: record.seq(),
+            moment: record.at().moment,
             stamped: text(state, "timestamp").parse().ok(),
             order: order.chars().take(512).collect(),
             node: node.clone(),
@@ -251,7 +247,7 @@ impl Walk {
         })
     }
 
-    fn lane(&self, order: &str, update: u64, from: &Stop) -> Option<Lane> {
+    fn lane(&self, order: &str, update: u64, from: &OrderedNode) -> Option<Lane> {
         let ahead = from.sequence + 1;
         let demands = self.agreed(order, update, |plan| {
             let edge = plan.edges.iter().find(|edge| edge.sequence == ahead);
@@ -265,7 +261,7 @@ impl Walk {
         })
     }
 
-    fn stop(&self, order: &str, update: u64, sequence: u64) -> Option<&Stop> {
+    fn stop(&self, order: &str, update: u64, sequence: u64) -> Option<&OrderedNode> {
         self.agreed(order, update, |plan| {
             let stop = plan.stops.iter().find(|stop| stop.sequence == sequence);
             stop.filter(|_| plan.holds(sequence, update))

@@ -94,6 +94,30 @@ impl TimeLimits {
         ]
     }
 
+    /// The limits among the bindings of a run; those that it does not name are the usual ones.
+    #[must_use]
+    pub fn of_bindings(bindings: &Map<String, Value>) -> Self {
+        let named = bindings.get("time").and_then(Value::as_object);
+        let of = |name: &str| named.and_then(|all| all.get(name)?.as_u64()).map(Duration::from_millis);
+        let usual = Self::default();
+        Self {
+            react: of("react").unwrap_or(usual.react),
+            slow: of("slow").unwrap_or(usual.slow),
+            event: of("event").unwrap_or(usual.event),
+            event_warning: of("eventWarning").unwrap_or(usual.event_warning),
+            drive: of("drive").unwrap_or(usual.drive),
+            download: of("download").unwrap_or(usual.download),
+            connect: of("connect").unwrap_or(usual.connect),
+            reconnect: of("reconnect").unwrap_or(usual.reconnect),
+            will: of("will"),
+            quiet: of("quiet").unwrap_or(usual.quiet),
+            broker: of("broker").unwrap_or(usual.broker),
+            state_period: of("statePeriod").unwrap_or(usual.state_period),
+            settle: of("settle").unwrap_or(usual.settle),
+            notice: of("notice").unwrap_or(usual.notice),
+        }
+    }
+
     /// The names a suite may use after `time.`.
     #[must_use]
     pub fn names() -> Vec<&'static str> {
