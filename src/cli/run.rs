@@ -24,7 +24,8 @@ use super::reference::{self, Asked};
 use super::screen::{Screen, Show};
 use crate::ui::Desk;
 use tck_base::clock::WallClock;
-use tck_base::diagnostic::Diagnostic;
+use tck_base::diagnostic::{Diagnostic, Source, Span};
+use tck_base::secrets::Secrets;
 use tck_journal::Vantage;
 use tck_journal::file::JournalWriter;
 use tck_judge::Library;
@@ -428,7 +429,8 @@ impl Job {
             (RunError::Unknown(unknown), _) => Diagnostic::whole("fault", unknown.to_string()).into(),
             (error, Some(setting)) => {
                 let text = crate::ui::escaped(&error.to_string());
-                Problem::Bench(Box::new(self.effective.complain(setting, "bench", text, "this one")))
+                let complaint = self.effective.complain(setting, "bench", text, "this one");
+                Problem::Bench(Box::new(without_secrets(complaint)))
             }
             (error, None) => environment(error),
         }
@@ -489,6 +491,18 @@ impl Job {
         });
         Ok(followed)
     }
+}
+
+/// A complaint with the line of the profile as it may be read by anybody: an address may hold a token.
+fn without_secrets(mut complaint: Diagnostic) -> Diagnostic {
+    if let Some(span) = &complaint.span {
+        let shown = Secrets::default().out_of(span.text());
+        let text = &span.source.text;
+        let hidden = format!("{}{shown}{}", &text[..span.start], &text[span.end..]);
+        let source = Source::new(span.source.name.as_str(), hidden);
+        complaint.span = Some(Span::new(&source, span.start, span.start + shown.len()));
+    }
+    complaint
 }
 
 fn environment(error: impl std::fmt::Display) -> Problem {

@@ -210,17 +210,20 @@ fn cut_off(bench: &Bench) {
 #[test]
 fn a_run_that_is_gone_on_with_is_about_the_same_profile_firmware_program_and_files() {
     let bench = Bench::new();
-    fs::write(bench.path().join("vehicle.sh"), "sleep 60\n").unwrap();
+    let tool = env!("CARGO_BIN_EXE_vda5050-tck");
+    let vehicle = format!("exec '{tool}' simulate agv --broker mqtt://$1 --manufacturer $2 --serial $3\n");
+    fs::write(bench.path().join("vehicle.sh"), &vehicle).unwrap();
     let with = |more: &str, firmware: &str| Profile {
-        device: format!("command = [\"sh\", \"vehicle.sh\"]\n{more}"),
+        device: format!(
+            "command = [\"sh\", \"vehicle.sh\", \"{{broker-host}}:{{broker-port}}\", \"{{manufacturer}}\", \
+             \"{{serial-number}}\"]\n{more}"
+        ),
         more: format!("[certificate]\nfirmware-version = \"{firmware}\"\n"),
         ..Profile::default()
     };
     let profile = with("", "4.2");
-    let (run, port) = bench.start(&profile, &[QUICK, REFUSAL, "--no-motion"]);
-    let agv = bench.agv(port, &[]);
+    let (run, _) = bench.start(&profile, &[QUICK, REFUSAL, "--no-motion"]);
     run.end();
-    drop(agv);
     cut_off(&bench);
     let resume = |profile: &Profile, more: &[&str]| {
         fs::write(bench.path().join("device.toml"), profile.text()).unwrap();
@@ -245,7 +248,7 @@ fn a_run_that_is_gone_on_with_is_about_the_same_profile_firmware_program_and_fil
     resume(&commented, &[])
         .code(2)
         .says("the profile device.toml is not the file that it was");
-    fs::write(bench.path().join("vehicle.sh"), "sleep 61\n").unwrap();
+    fs::write(bench.path().join("vehicle.sh"), format!("# newer\n{vehicle}")).unwrap();
     resume(&with("", "4.2"), &[])
         .code(2)
         .says("the program vehicle.sh is not the file that it was");

@@ -24,6 +24,9 @@ struct Case {
 /// A way in which something can come out, and whether the sentence allows it to be let through.
 type Way<T> = (&'static str, bool, fn() -> T);
 
+/// Something that can be around the tests, and whether the sentence allows the run to be let through.
+type Beside = (&'static str, bool, fn(&mut Case));
+
 /// How a run can end.
 const ENDS: [Way<End>; 8] = [
     ("to its end", true, || End::Completed),
@@ -73,33 +76,33 @@ const TESTS: [Way<TestResult>; 12] = [
 ];
 
 /// What can be around the tests.
-const AROUND: [(&str, bool, fn(&mut Case)); 11] = [
+const AROUND: [Beside; 11] = [
     ("nothing", true, |_| {}),
     ("monitors passed", true, |case| {
-        case.result.monitors.push(monitor(Verdict::Pass, "HDR-01"))
+        case.result.monitors.push(monitor(Verdict::Pass, "HDR-01"));
     }),
     ("a monitor failed by something known", true, |case| {
         case.result.monitors.push(monitor(Verdict::Fail, KNOWN));
     }),
     ("a monitor failed", false, |case| {
-        case.result.monitors.push(monitor(Verdict::Fail, "HDR-01"))
+        case.result.monitors.push(monitor(Verdict::Fail, "HDR-01"));
     }),
     ("the report could not be written", false, |case| case.written = false),
     ("the run ended early", false, |case| case.result.partial = true),
     ("somebody else may have been judged", false, |case| {
-        case.result.mixed = Some("another".to_owned())
+        case.result.mixed = Some("another".to_owned());
     }),
     ("the program ran until it was ended", true, |case| {
-        case.result.program = Some(program(0, 0))
+        case.result.program = Some(program(0, 0));
     }),
     ("the program ended by itself", false, |case| {
-        case.result.program = Some(program(1, 0))
+        case.result.program = Some(program(1, 0));
     }),
     ("the program ended, perhaps by somebody else", false, |case| {
-        case.result.program = Some(program(1, 1))
+        case.result.program = Some(program(1, 1));
     }),
     ("what is known has expired", true, |case| {
-        "2000-01-01".clone_into(&mut case.known[0].until)
+        "2000-01-01".clone_into(&mut case.known[0].until);
     }),
 ];
 
