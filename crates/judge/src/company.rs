@@ -71,6 +71,8 @@ pub(super) struct Company {
     origins: BTreeMap<u64, Origin>,
     excuse: Excuse,
     influence: Influence,
+    /// What of it was done to the device itself.
+    harm: Influence,
 }
 
 impl Company {
@@ -130,6 +132,11 @@ impl Company {
             _ => {}
         }
         Part::Judged
+    }
+
+    /// Why the device itself may have been harmed now: thrown out, or commanded by somebody else.
+    pub fn harm(&self, now: Moment) -> Option<&Arc<str>> {
+        self.harm.at(now)
     }
 
     /// Why what is found now may stem from somebody else.
@@ -202,10 +209,8 @@ impl Company {
     /// Whether something of a connection is to be judged. One that has not said who it is yet is the device as long as
     /// nobody else is.
     fn part_of(&mut self, connection: u64, entry: &Arc<Entry>) -> Part {
-        let known = match self.is_vehicle {
-            true => self.device_beside(connection).any(|client| self.is_known(client)),
-            false => false,
-        } || self.is_foreign(connection);
+        let somebody = self.is_vehicle && self.device_beside(connection).any(|client| self.is_known(client));
+        let known = somebody || self.is_foreign(connection);
         match self.open.get_mut(&connection) {
             Some(client) if client.who == Who::Device => Part::Judged,
             Some(client) => {
@@ -291,10 +296,12 @@ impl Company {
         }
         if taken && who == Who::Bystander {
             let why = format!("a client at {peer} took the client id of the device, {id:?}, which was thrown out");
+            self.harm.lasts(now + AFTER_TAKEOVER, why.clone());
             self.influence.lasts(now + AFTER_TAKEOVER, why);
         }
         if let (Some(former), Who::Device, false, false, true) = (&before, who, is_own, is_excused, taken) {
             let why = self.rivals.connects(id, (former, &peer), entry.seq(), now);
+            self.harm.lasts(now + AFTER_TAKEOVER, why.clone());
             self.influence.lasts(now + AFTER_TAKEOVER, why);
         }
         if let Some((_, published)) = self.device.get(id).filter(|_| who == Who::Device) {
@@ -443,6 +450,7 @@ impl Company {
         self.influence.await_delivery(topic, payload);
         if let Some(who) = self.disown(connection, topic) {
             let why = format!("{who} published on {topic}, where the device is commanded");
+            self.harm.lasts(entry.at().moment + AFTER_COMMAND, why.clone());
             self.influence.lasts(entry.at().moment + AFTER_COMMAND, why);
         }
         Part::Bystander

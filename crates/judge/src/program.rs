@@ -37,8 +37,8 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    /// Sees the next entry. `doubt` says why what happens now may stem from somebody else; nothing is held against the
-    /// device once the run is interrupted.
+    /// Sees the next entry. `doubt` says why somebody else may have harmed the device; nothing is held against it once
+    /// the run is interrupted.
     pub(super) fn observe(&mut self, entry: &Entry, doubt: Option<&str>, is_interrupted: bool) {
         let now = entry.at().moment;
         match entry.event() {

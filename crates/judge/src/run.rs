@@ -226,7 +226,8 @@ impl RunJudge {
             self.interrupted = Some(why);
         }
         let is_interrupted = self.interrupted.is_some();
-        self.program.observe(entry, present.as_deref(), is_interrupted);
+        let harm = self.company.harm(entry.at().moment);
+        self.program.observe(entry, harm.map(AsRef::as_ref), is_interrupted);
         self.ground.interference = self.interrupted.clone().or(present);
         self.ground.is_interrupted = is_interrupted;
         match part {

@@ -15,21 +15,22 @@ const NAMES: [&str; 5] = ["order", "instantActions", "state", "visualization", "
 
 impl Tap {
     fn new() -> Self {
+        Self::of(Role::Agv)
+    }
+
+    fn of(role: Role) -> Self {
         let packs = Packs::load(&Assets::of_source_tree().unwrap()).unwrap();
         let topics = NAMES
             .iter()
             .map(|name| ((*name).to_owned(), format!("v/{name}")))
             .collect();
+        let header = RunHeader {
+            topics,
+            ..RunHeader::default()
+        };
         Self {
             journal: Journal::new(),
-            company: Company::of(
-                Role::Agv,
-                &RunHeader {
-                    topics,
-                    ..RunHeader::default()
-                },
-                packs.latest(),
-            ),
+            company: Company::of(role, &header, packs.latest()),
             seconds: 0,
         }
     }
@@ -321,19 +322,7 @@ fn what_cannot_be_traced_is_judged_and_said() {
 
 #[test]
 fn of_a_master_control_only_another_program_is_a_stranger() {
-    let packs = Packs::load(&Assets::of_source_tree().unwrap()).unwrap();
-    let topics: BTreeMap<String, String> = NAMES
-        .iter()
-        .map(|name| ((*name).to_owned(), format!("v/{name}")))
-        .collect();
-    let header = RunHeader {
-        topics,
-        ..RunHeader::default()
-    };
-    let mut tap = Tap {
-        company: Company::of(Role::MasterControl, &header, packs.latest()),
-        ..Tap::new()
-    };
+    let mut tap = Tap::of(Role::MasterControl);
     for connection in [1, 2] {
         assert!(tap.connect(connection, "fleet", None) && tap.publish(connection, "order", "1"));
     }
