@@ -39,6 +39,7 @@ mod slice;
 mod validate;
 mod watch;
 
+use std::io::Write as _;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -108,6 +109,11 @@ fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> 
         Command::Completions(arguments) => shell::completions(arguments),
         Command::Man(arguments) => shell::man(arguments),
     }
+}
+
+/// Says something on standard error. That nobody reads there is no failure.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Whether a command line that cannot be read asks for JSON.

@@ -127,7 +127,7 @@ impl Owed {
             forget_latest(reports);
         }
         if let Err(unwritten) = self.write_no_result(&nothing) {
-            eprintln!("{}", unwritten.render(console::colors_enabled_stderr()));
+            super::tell(&unwritten.render(console::colors_enabled_stderr()));
         }
         pipeline::tell_of_nothing(&nothing, self.reports.is_some());
     }

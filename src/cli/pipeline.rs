@@ -23,7 +23,7 @@ pub(super) fn tell(result: &RunResult, sources: &Sources, report: &str) {
 /// Tells the pipeline that nothing came of a command; the summary page is for commands that test.
 pub(super) fn tell_of_nothing(nothing: &NoResult, tests: bool) {
     if std::env::var(ACTIONS).is_ok_and(|value| value == "true") {
-        eprint!("{}", nothing.annotations());
+        super::tell(nothing.annotations().trim_end());
     }
     if tests {
         append(&nothing.markdown());

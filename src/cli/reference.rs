@@ -86,13 +86,13 @@ pub(super) fn is_tested(
         let hint = "name your device with `--profile device.toml`, or the built-in one with `--reference`";
         return Err(Diagnostic::whole("no-device", title).hint(hint).into());
     }
-    eprintln!(
-        "testing the built-in reference {}, and no device of yours (--profile names one)",
-        match device.role {
-            Role::Agv => "AGV",
-            Role::MasterControl => "master control",
-        }
-    );
+    let device = match device.role {
+        Role::Agv => "AGV",
+        Role::MasterControl => "master control",
+    };
+    super::tell(&format!(
+        "testing the built-in reference {device}, and no device of yours (--profile names one)"
+    ));
     Ok(true)
 }
 

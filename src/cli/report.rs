@@ -225,9 +225,9 @@ fn compare_runs(arguments: &Report, folders: &[PathBuf]) -> Result<Exit, Problem
         compare::Outcome::Holds => Exit::Conforms,
         compare::Outcome::Worse => Exit::DoesNotConform,
         compare::Outcome::Undecided => {
-            eprintln!(
+            super::tell(
                 "nothing became worse, but a run is partial or undecided, or a failure cannot be seen any more: nobody can \
-                 say that nothing did"
+                 say that nothing did",
             );
             Exit::Undecided
         }

@@ -71,7 +71,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     let built_in = reference::is_tested(&Asked::of_run(arguments), &effective, &surroundings)?;
     let library = crate::assets::library(arguments.suites.own())?;
     if let Some(own) = library.own() {
-        eprintln!("{own}");
+        super::tell(&own);
     }
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
@@ -222,11 +222,11 @@ impl Job {
         );
         let bundle = bundle.map_err(environment)?;
         if bundle.is_one_of_several() {
-            eprintln!(
+            super::tell(&format!(
                 "another run is going on below {}, so `{LATEST}` leads to neither of them; give each a folder of its own with \
                  --out",
                 self.output.out.display()
-            );
+            ));
         }
         Ok(bundle)
     }
