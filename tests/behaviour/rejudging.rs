@@ -176,8 +176,7 @@ fn what_is_no_run_is_2() {
 fn two_runs_are_compared_and_a_worse_one_is_1() {
     let (bad, bad_folder) = failed_run();
     let good = Bench::new();
-    good.run(&["run", "--virtual", "order-rejection/unreadable", QUICK])
-        .code(0);
+    good.run(&["run", "--virtual", "order-rejection/unreadable"]).code(0);
     let good_folder = good.bundle().display().to_string();
     bad.run(&["report", "--compare", &good_folder, &bad_folder])
         .code(1)
