@@ -42,7 +42,7 @@ const AFTER_HELP: &str = "\
 Examples:
   vda5050-tck run --reference                  test the built-in reference AGV: see how it works
   vda5050-tck run --profile device.toml        test your device, as the profile describes it
-  vda5050-tck run 'order-rejection/*' -v       only some tests, with every effective setting
+  vda5050-tck run --virtual 'maps/*' -v        only some tests, with every effective setting
   vda5050-tck explain ORD-REJ-03               what a requirement asks, and what decides it
   vda5050-tck certify --profile device.toml    everything that applies, with nothing left to choose
 
