@@ -15,6 +15,7 @@ use std::rc::Rc;
 use serde_json::{Map, Value};
 use tck_base::verdict::Verdict;
 use tck_pack::RequirementId;
+use tck_view::Field;
 use tck_world::{End, Fact, Listen, Observation, Setting, World};
 
 /// What a check may know besides the records.
@@ -109,6 +110,8 @@ pub struct Check {
     pub listens: &'static [Listen],
     /// The facts it reads.
     pub reads: &'static [Fact],
+    /// Members of messages it cannot do without: a version that lacks one has nothing for it to look at.
+    pub needs: &'static [Field],
     /// Starts it.
     pub start: fn(&CheckContext<'_>) -> Box<dyn Running>,
 }

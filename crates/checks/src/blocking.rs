@@ -28,6 +28,7 @@ pub(super) const BLOCKING: Check = Check {
     arguments: &["still"],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
+    needs: &[],
     start: |_| Box::new(BlockingTypes::default()),
 };
 

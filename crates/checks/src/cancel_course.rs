@@ -33,6 +33,7 @@ pub(super) const COURSE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Course::default()),
 };
 
@@ -59,7 +60,7 @@ impl Course {
             self.begun.clear();
             self.sent.retain(|_, (cancels, _)| !*cancels);
         }
-        let Some(message) = record.to_vehicle(Topic::InstantActions) else {
+        let Some(message) = record.to_vehicle_json(Topic::InstantActions) else {
             return;
         };
         for action in actions(message).take(MANY) {
@@ -94,7 +95,7 @@ impl Running for Course {
         if !self.sent.values().any(|(cancels, _)| *cancels) {
             return false;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let Some(last) = number(state, "lastNodeSequenceId") else {

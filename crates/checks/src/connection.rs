@@ -25,6 +25,7 @@ pub(super) const ONLINE_AFTER_CONNECT: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(OnlineAfterConnect::default()),
 };
 
@@ -36,6 +37,7 @@ pub(super) const VALUES: Check = Check {
     arguments: &[],
     listens: &[Listen::Published(Topic::Connection)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Values),
 };
 

@@ -41,6 +41,7 @@ pub(super) const STAYS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Malformed],
+    needs: &[],
     start: |_| Box::new(Stays::default()),
 };
 
@@ -83,10 +84,10 @@ impl Stays {
             return;
         };
         let ids = record
-            .to_vehicle(Topic::Order)
+            .to_vehicle_json(Topic::Order)
             .map(|order| vec![text(order, "orderId").to_owned()])
             .unwrap_or_default();
-        let actions = record.to_vehicle(Topic::InstantActions).into_iter();
+        let actions = record.to_vehicle_json(Topic::InstantActions).into_iter();
         let actions = actions.flat_map(|message| elements(message, "actions").take(50));
         let ids = ids
             .into_iter()
@@ -170,7 +171,7 @@ impl Running for Stays {
             }
             _ => {}
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let named = |id: &str| {

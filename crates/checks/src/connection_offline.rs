@@ -31,6 +31,7 @@ pub(super) const SAYS_OFFLINE: Check = Check {
         Listen::Published(Topic::Connection),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(SaysOffline::default()),
 };
 

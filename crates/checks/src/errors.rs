@@ -33,6 +33,7 @@ pub(super) const PERSIST: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Persist::default()),
 };
 
@@ -73,7 +74,7 @@ impl Running for Persist {
             self.watched.clear();
             self.shown = None;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         if !state.get("errors").is_some_and(Value::is_array) {
@@ -137,7 +138,7 @@ impl Persist {
             self.after_order = false;
             self.instant_pending = true;
         }
-        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
+        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
             let ids = actions(message).map(|action| text(action, "actionId").to_owned());
             self.instant.extend(ids);
             let excess = self.instant.len().saturating_sub(ACTIONS);

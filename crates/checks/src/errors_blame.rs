@@ -27,6 +27,7 @@ pub(super) const BLAME: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Blame::default()),
 };
 
@@ -43,7 +44,7 @@ struct Blame {
 impl Running for Blame {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.sent |= record.is_to_vehicle(Topic::Order) || record.is_to_vehicle(Topic::InstantActions);
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let statuses: BTreeMap<&str, &str> = elements(state, "actionStates")

@@ -24,6 +24,7 @@ pub(super) const ON_EVENT: Check = Check {
     arguments: &[],
     listens: &[Listen::AnySent, Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(OnEvent::default()),
 };
 
@@ -83,7 +84,7 @@ impl Running for OnEvent {
             self.before.clone_from(&self.latest);
             self.judged = false;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let errors: Vec<&Value> = elements(state, "errors").take(MANY).collect();

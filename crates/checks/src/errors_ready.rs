@@ -17,6 +17,7 @@ pub(super) const READY: Check = Check {
     arguments: &["order"],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Ready::default()),
 };
 
@@ -49,13 +50,13 @@ impl Running for Ready {
         context: &CheckContext<'_>,
         _findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        if let Some(order) = record.to_vehicle(Topic::Order) {
+        if let Some(order) = record.to_vehicle_json(Topic::Order) {
             self.order = Some(text(order, "orderId").chars().take(512).collect());
             self.waits = None;
             self.started_at = None;
             self.set_out = false;
         }
-        let Some(state) = record.state().filter(|_| self.order.is_some()) else {
+        let Some(state) = record.state_json().filter(|_| self.order.is_some()) else {
             return false;
         };
         let here = last_node(state);

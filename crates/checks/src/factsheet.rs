@@ -21,6 +21,7 @@ pub(super) const LIMITS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Factsheet)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Limits),
 };
 
@@ -36,6 +37,7 @@ pub(super) const CONSISTENCY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Factsheet)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Consistency),
 };
 

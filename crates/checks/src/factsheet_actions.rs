@@ -22,6 +22,7 @@ pub(super) const PREDEFINED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Factsheet)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Predefined),
 };
 

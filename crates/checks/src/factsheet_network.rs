@@ -23,6 +23,7 @@ pub(super) const NETWORK: Check = Check {
         Listen::Published(Topic::Factsheet),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Network::default()),
 };
 

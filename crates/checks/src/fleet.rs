@@ -16,6 +16,7 @@ pub(super) const COMMANDED: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Commanded::default()),
 };
 

@@ -15,6 +15,7 @@ pub(super) const EACH_HEARD: Check = Check {
     arguments: &[],
     listens: &[Listen::Sent(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(EachHeard::default()),
 };
 

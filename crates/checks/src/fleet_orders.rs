@@ -17,6 +17,7 @@ pub(super) const OWN_ORDERS: Check = Check {
     arguments: &[],
     listens: &[Listen::Begin, Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(OwnOrders::default()),
 };
 

@@ -35,6 +35,7 @@ pub(super) const TIMESTAMP: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Timestamp::default()),
 };
 
@@ -48,6 +49,7 @@ pub(super) const IDENTITY: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Identity::default()),
 };
 
@@ -60,6 +62,7 @@ pub(super) const VERSION: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Version),
 };
 

@@ -31,6 +31,7 @@ pub(super) const ID_RISES: Check = Check {
         Listen::AnyPublished,
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(IdRises::default()),
 };
 

@@ -36,6 +36,7 @@ pub(super) const ANSWERED: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Answered::looking_for("IACT-03")),
 };
 
@@ -57,6 +58,7 @@ pub(super) const TOGETHER: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Answered::looking_for("IACT-07")),
 };
 
@@ -79,6 +81,7 @@ pub(super) const BEGINS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Answered::looking_for("IACT-05")),
 };
 
@@ -100,6 +103,7 @@ pub(super) const SCOPE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Answered::looking_for("ACT-10")),
 };
 
@@ -170,7 +174,7 @@ impl Answered {
                 .filter(|action| elements(action, "actionScopes").any(|scope| scope.as_str() == Some("INSTANT")));
             self.offered = instant.map(|action| text(action, "actionType").to_owned()).collect();
         }
-        let Some(message) = record.to_vehicle(Topic::InstantActions) else {
+        let Some(message) = record.to_vehicle_json(Topic::InstantActions) else {
             return;
         };
         let schema = context.pack.schema("instantActions");
@@ -324,7 +328,7 @@ impl Running for Answered {
         if restarted || record.link.disturbed || record.outside_influence() {
             self.asked.clear();
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         if !state.get("actionStates").is_some_and(Value::is_array) || self.asked.is_empty() {

@@ -34,6 +34,7 @@ pub(super) const NOT_QUEUED: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(NotQueued::default()),
 };
 
@@ -55,7 +56,7 @@ struct NotQueued {
 
 impl NotQueued {
     fn learn(&mut self, record: &Observation<'_>) {
-        let Some(message) = record.to_vehicle(Topic::InstantActions) else {
+        let Some(message) = record.to_vehicle_json(Topic::InstantActions) else {
             return;
         };
         for action in actions(message).take(ACTIONS) {
@@ -94,7 +95,7 @@ impl Running for NotQueued {
         if self.asked.is_empty() {
             return false;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let now = record.at().moment;

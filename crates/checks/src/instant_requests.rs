@@ -35,6 +35,7 @@ pub(super) const REQUESTS_MET: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Requests::default()),
 };
 
@@ -49,7 +50,7 @@ struct Requests {
 impl Requests {
     fn learn(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
         let Some(message) = record
-            .to_vehicle(Topic::InstantActions)
+            .to_vehicle_json(Topic::InstantActions)
             .filter(|_| !record.link.disturbed)
         else {
             return;
@@ -152,7 +153,7 @@ impl Running for Requests {
         if record.is(Seen::Delivered, Topic::Factsheet) || record.is(Seen::Stored, Topic::Factsheet) {
             self.sheets.clear();
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let judged = !self.states.is_empty() || !self.sheets.is_empty();

@@ -55,6 +55,7 @@ pub(super) const LINKED_STATE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Linked::default()),
 };
 
@@ -144,8 +145,11 @@ fn parameter<'v>(action: &'v Value, key: &str) -> Option<&'v Value> {
 
 impl Linked {
     fn learn(&mut self, record: &Observation<'_>) {
-        let instant = record.to_vehicle(Topic::InstantActions).into_iter().flat_map(actions);
-        let order = record.to_vehicle(Topic::Order);
+        let instant = record
+            .to_vehicle_json(Topic::InstantActions)
+            .into_iter()
+            .flat_map(actions);
+        let order = record.to_vehicle_json(Topic::Order);
         if order.is_some() {
             self.ordered = record.seq();
         }
@@ -310,7 +314,7 @@ impl Running for Linked {
         if context.world.restarts().now(record) {
             self.order = None;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let order: String = text(state, "orderId").chars().take(512).collect();

@@ -62,6 +62,7 @@ pub(super) const SCHEMA: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[Fact::Malformed],
+    needs: &[],
     start: |context| Box::new(Schema::new(context)),
 };
 
@@ -74,6 +75,7 @@ pub(super) const ENCODING: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered, Listen::AnyPublished],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Encoding),
 };
 

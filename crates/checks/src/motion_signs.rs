@@ -46,6 +46,7 @@ pub(super) const VELOCITY_AXES: Check = Check {
         Listen::Delivered(Topic::Visualization),
     ],
     reads: &[Fact::Displaced],
+    needs: &[],
     start: |_| Box::new(Signs::new(axes, "MAP-03").of_straight_ways()),
 };
 
@@ -67,6 +68,7 @@ pub(super) const TURN_SIGN: Check = Check {
         Listen::Delivered(Topic::Visualization),
     ],
     reads: &[Fact::Displaced],
+    needs: &[],
     start: |_| Box::new(Signs::new(turn, "MAP-01")),
 };
 

@@ -25,6 +25,7 @@ pub(super) const QUALITY: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered, Listen::AnyPublished],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Quality),
 };
 
@@ -39,6 +40,7 @@ pub(super) const CONNECT: Check = Check {
     arguments: &[],
     listens: &[Listen::Connect, Listen::AnyPublished],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Connect::default()),
 };
 

@@ -32,6 +32,7 @@ pub(super) const NAMES: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Names::default()),
 };
 
@@ -44,6 +45,7 @@ pub(super) const STRUCTURE: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered, Listen::AnyPublished, Listen::Elsewhere],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Structure::default()),
 };
 
@@ -56,6 +58,7 @@ pub(super) const OWN_SIDE: Check = Check {
     arguments: &[],
     listens: &[Listen::Connect, Listen::AnyPublished],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(OwnSide),
 };
 

@@ -33,6 +33,7 @@ pub(super) const HEARD: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Heard::default()),
 };
 
@@ -95,7 +96,7 @@ impl Heard {
     /// Notes what the harness sends while the vehicle is there and has had the time to subscribe.
     fn sent(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
         for name in TOPICS {
-            let Some(message) = record.to_vehicle(Topic::of_name(name)) else {
+            let Some(message) = record.to_vehicle_json(Topic::of_name(name)) else {
                 continue;
             };
             let mut keep = |id: &str| {
@@ -190,7 +191,7 @@ impl Running for Heard {
         self.sent(record, context);
         self.overdue(record.at().moment, findings);
         if !record.link.tap
-            && let Some(state) = record.state()
+            && let Some(state) = record.state_json()
         {
             self.reaction(state);
         }

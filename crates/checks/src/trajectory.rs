@@ -20,6 +20,7 @@ pub(super) const TRAJECTORY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Shape::default()),
 };
 
@@ -33,6 +34,7 @@ pub(super) const TRAJECTORY_ENDS: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Ends::default()),
 };
 
@@ -46,6 +48,7 @@ pub(super) const PLANNED_PATH: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Planned::default()),
 };
 
@@ -81,7 +84,7 @@ struct Shape {
 
 impl Running for Shape {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let mut judged = false;
@@ -157,10 +160,10 @@ struct Ends {
 
 impl Running for Ends {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if let Some(order) = record.to_vehicle(Topic::Order) {
+        if let Some(order) = record.to_vehicle_json(Topic::Order) {
             self.places.note(order);
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let order = order_of(state);
@@ -208,7 +211,7 @@ struct Planned {
 
 impl Running for Planned {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if let Some(order) = record.to_vehicle(Topic::Order) {
+        if let Some(order) = record.to_vehicle_json(Topic::Order) {
             let edges = elements(order, "edges").filter(|edge| edge.get("corridor").is_some_and(|one| !one.is_null()));
             for sequence in edges.filter_map(|edge| number(edge, "sequenceId")) {
                 if self.free.len() < EDGES {
@@ -216,7 +219,7 @@ impl Running for Planned {
                 }
             }
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let order = order_of(state);

@@ -30,6 +30,7 @@ pub(super) const RATE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Rate::default()),
 };
 
@@ -53,6 +54,7 @@ pub(super) const PUBLISHED: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| {
         Box::new(Rate {
             presence_only: true,

@@ -43,6 +43,7 @@ pub(super) const POSITION: Check = Check {
         Listen::Delivered(Topic::Visualization),
     ],
     reads: &[Fact::Displaced],
+    needs: &[],
     start: |_| Box::new(Position::default()),
 };
 
@@ -141,7 +142,7 @@ impl Running for Position {
             self.on_the_way.clear();
         }
         let now = record.at().moment;
-        if let Some(state) = record.state() {
+        if let Some(state) = record.state_json() {
             let pose = Pose::of(state).filter(|_| state.get("driving") == Some(&Value::Bool(false)));
             let seen = Pose::of(state);
             self.known = seen.is_some();

@@ -83,7 +83,7 @@ pub struct Pack {
     topic_template: String,
     features: BTreeMap<String, bool>,
     fields: Vec<FieldRule>,
-    names: Names,
+    names: Arc<Names>,
 }
 
 /// Why a pack could not be read.
@@ -152,7 +152,7 @@ impl Pack {
             topic_template: protocol.topic_template,
             features: protocol.features,
             fields: protocol.fields,
-            names: protocol.members,
+            names: Arc::new(protocol.members),
         })
     }
 
@@ -247,7 +247,7 @@ impl Pack {
 
     /// What the version calls the members of messages (`[members]` of `protocol.toml`): what views are read by.
     #[must_use]
-    pub fn names(&self) -> &Names {
+    pub fn names(&self) -> &Arc<Names> {
         &self.names
     }
 

@@ -5,7 +5,7 @@ use tck_base::clock::Moment;
 use crate::members::{actions, elements, text};
 use crate::observation::Observation;
 use crate::orders::sets_position;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How many actions of an order are looked at.
 const ACTIONS: usize = 1024;
@@ -32,9 +32,9 @@ impl Displaced {
 
 fn places(record: &Observation<'_>) -> bool {
     let told = record
-        .to_vehicle(Topic::InstantActions)
+        .to_vehicle_json(Topic::InstantActions)
         .is_some_and(|message| actions(message).any(|action| sets_position(text(action, "actionType"))));
-    let placed = record.to_vehicle(Topic::Order).is_some_and(|order| {
+    let placed = record.to_vehicle_json(Topic::Order).is_some_and(|order| {
         let mut all = elements(order, "nodes")
             .flat_map(|node| elements(node, "actions"))
             .take(ACTIONS);

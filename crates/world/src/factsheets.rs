@@ -13,7 +13,7 @@ use tck_base::pattern::whole;
 use crate::members::{ELEMENTS, elements, text};
 use crate::observation::Observation;
 use crate::setting::Setting;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// What a factsheet says about an action.
 #[derive(Clone, Debug, Default)]
@@ -160,7 +160,7 @@ impl Factsheets {
 impl Factsheets {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>, setting: &Setting<'_>) {
-        let Some(value) = record.said(Topic::Factsheet) else {
+        let Some(value) = record.said_json(Topic::Factsheet) else {
             return;
         };
         // It may get lost; the next one tells.

@@ -3,7 +3,7 @@
 //! Every observation is of exactly one [`Kind`]. A check names the kinds it listens to, and the judge calls it for no
 //! other record.
 
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How a message on a topic was seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

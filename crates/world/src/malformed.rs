@@ -10,7 +10,7 @@ use crate::members::{kept, number, text};
 use crate::observation::Observation;
 use crate::orders::OrdersSent;
 use crate::setting::Setting;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How many orders of either kind are kept.
 const MESSAGES: usize = 64;
@@ -102,7 +102,7 @@ impl MalformedOrders {
         if record.is_to_vehicle(Topic::Order) {
             self.note_order(record, setting, orders);
         }
-        if let Some(state) = record.state() {
+        if let Some(state) = record.state_json() {
             let is_named =
                 state.get("orderId").is_some_and(Value::is_string) && number(state, "orderUpdateId").is_some();
             let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");

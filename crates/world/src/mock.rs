@@ -10,7 +10,7 @@ use crate::members::{ELEMENTS, elements, number, released, short, text};
 use crate::observation::Observation;
 use crate::setting::Setting;
 use crate::shown::is_taken_out;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How many states are kept.
 const STATES: usize = 64;
@@ -169,7 +169,7 @@ impl MockVehicle {
         if matches!(outside, Outside::Moved | Outside::Lost) {
             self.states.clear();
         }
-        if let Some(state) = record.said(Topic::State) {
+        if let Some(state) = record.said_json(Topic::State) {
             if self.states.len() == STATES {
                 self.states.pop_front();
             }

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -9,10 +10,13 @@ use tck_base::clock::{Moment, Stamp};
 use tck_journal::event::{Direction, Event, LinkFault, Packet};
 use tck_journal::{Entry, Parsed, Payload};
 use tck_pack::{Pack, Role};
+use tck_view::{
+    ConnectionView, FactsheetView, InstantActionsView, MessageView, Names, OrderView, StateView, Topic,
+    VisualizationView,
+};
 
 use crate::listen::{Kind, Seen};
 use crate::print;
-use crate::topic::Topic;
 use crate::topics::{Named, Topics};
 
 /// What is known of the link to the device under test.
@@ -37,6 +41,7 @@ pub struct End {
 #[derive(Clone, Debug)]
 pub struct Observer {
     topics: Topics,
+    names: Arc<Names>,
     role: Role,
     link: Link,
 }
@@ -47,6 +52,7 @@ impl Observer {
     pub fn new(topics: &BTreeMap<String, String>, pack: &Pack, role: Role) -> Self {
         Self {
             topics: Topics::new(topics, pack),
+            names: Arc::clone(pack.names()),
             role,
             link: Link::default(),
         }
@@ -65,6 +71,7 @@ impl Observer {
             entry,
             seen: way,
             named,
+            names: &self.names,
             link: self.link,
             role: self.role,
             kind,
@@ -134,6 +141,7 @@ pub struct Observation<'a> {
     /// How a message was seen, if this is about one.
     pub seen: Option<Seen>,
     named: Option<&'a Named>,
+    names: &'a Names,
     /// What the link is like, this record included.
     pub link: Link,
     role: Role,
@@ -184,7 +192,20 @@ impl<'a> Observation<'a> {
         self.entry.event()
     }
 
-    /// The message as a JSON value, if it is one.
+    /// The message as it is read by the names of its version; `None` when it is no JSON, or on no topic of the vehicle.
+    #[must_use]
+    pub fn message(&self) -> Option<&'a MessageView> {
+        self.entry.view(self.topic()?, self.names)
+    }
+
+    /// What the version calls the members of messages: to show one as evidence.
+    #[must_use]
+    pub fn names(&self) -> &'a Names {
+        self.names
+    }
+
+    /// The message as a JSON value, if it is one: for what judges the document itself. What calculates with a message reads its
+    /// view.
     #[must_use]
     pub fn json(&self) -> Option<&'a Value> {
         self.entry.json()
@@ -275,15 +296,58 @@ impl<'a> Observation<'a> {
 
     /// A live message of the device under test on that topic, if it is an object.
     #[must_use]
-    pub fn delivered_on(&self, topic: Topic) -> Option<&'a Value> {
+    pub fn delivered_on(&self, topic: Topic) -> Option<&'a MessageView> {
+        let message = self.is_delivered(topic).then(|| self.message()).flatten();
+        message.filter(|message| message.is_object())
+    }
+
+    /// A live state of the device under test, if it is an object.
+    #[must_use]
+    pub fn state(&self) -> Option<&'a Arc<StateView>> {
+        self.delivered_on(Topic::State)?.state()
+    }
+
+    /// A live visualization message of the device under test, if it is an object.
+    #[must_use]
+    pub fn visualization(&self) -> Option<&'a Arc<VisualizationView>> {
+        self.delivered_on(Topic::Visualization)?.visualization()
+    }
+
+    /// A live connection message of the device under test, if it is an object.
+    #[must_use]
+    pub fn connection(&self) -> Option<&'a Arc<ConnectionView>> {
+        self.delivered_on(Topic::Connection)?.connection()
+    }
+
+    /// A live factsheet of the device under test, if it is an object.
+    #[must_use]
+    pub fn factsheet(&self) -> Option<&'a Arc<FactsheetView>> {
+        self.delivered_on(Topic::Factsheet)?.factsheet()
+    }
+
+    /// A live order of a master control under test, if it is an object.
+    #[must_use]
+    pub fn order(&self) -> Option<&'a Arc<OrderView>> {
+        self.delivered_on(Topic::Order)?.order()
+    }
+
+    /// Live instant actions of a master control under test, if it is an object.
+    #[must_use]
+    pub fn instant_actions(&self) -> Option<&'a Arc<InstantActionsView>> {
+        self.delivered_on(Topic::InstantActions)?.instant_actions()
+    }
+
+    /// The JSON of a live message of the device under test on that topic, if it is an object.
+    #[must_use]
+    pub fn delivered_json(&self, topic: Topic) -> Option<&'a Value> {
         let value = self.is_delivered(topic).then(|| self.json()).flatten();
         value.filter(|value| value.is_object())
     }
 
     /// A live state of the device under test, if it is an object.
     #[must_use]
-    pub fn state(&self) -> Option<&'a Value> {
-        self.delivered_on(Topic::State)
+    pub fn state_json(&self) -> Option<&'a Value> {
+        self.delivered_json(Topic::State)
     }
 
     /// Whether this is a message towards the vehicle on that topic, from the harness or from a master control, readable or not.
@@ -292,15 +356,59 @@ impl<'a> Observation<'a> {
         matches!(self.seen, Some(Seen::Sent | Seen::Delivered)) && self.topic() == Some(topic)
     }
 
-    /// A message towards the vehicle on that topic, from the harness or from a master control that was recorded.
+    /// A message towards the vehicle on that topic, from the harness or from a master control that was recorded. It may be no
+    /// object.
     #[must_use]
-    pub fn to_vehicle(&self, topic: Topic) -> Option<&'a Value> {
+    pub fn to_vehicle(&self, topic: Topic) -> Option<&'a MessageView> {
+        self.is_to_vehicle(topic).then(|| self.message()).flatten()
+    }
+
+    /// An order towards the vehicle, see [`Observation::to_vehicle`].
+    #[must_use]
+    pub fn order_to_vehicle(&self) -> Option<&'a Arc<OrderView>> {
+        self.to_vehicle(Topic::Order)?.order()
+    }
+
+    /// Instant actions towards the vehicle, see [`Observation::to_vehicle`].
+    #[must_use]
+    pub fn instant_actions_to_vehicle(&self) -> Option<&'a Arc<InstantActionsView>> {
+        self.to_vehicle(Topic::InstantActions)?.instant_actions()
+    }
+
+    /// The JSON of a message towards the vehicle on that topic, from the harness or from a master control that was recorded.
+    #[must_use]
+    pub fn to_vehicle_json(&self, topic: Topic) -> Option<&'a Value> {
         self.is_to_vehicle(topic).then(|| self.json()).flatten()
     }
 
     /// What a mock vehicle of the harness says on that topic, if it is an object.
     #[must_use]
-    pub fn said(&self, topic: Topic) -> Option<&'a Value> {
+    pub fn said(&self, topic: Topic) -> Option<&'a MessageView> {
+        let message = self.is(Seen::Sent, topic).then(|| self.message()).flatten();
+        message.filter(|message| message.is_object())
+    }
+
+    /// A state of a mock vehicle of the harness, if it is an object.
+    #[must_use]
+    pub fn said_state(&self) -> Option<&'a Arc<StateView>> {
+        self.said(Topic::State)?.state()
+    }
+
+    /// A connection message of a mock vehicle of the harness, if it is an object.
+    #[must_use]
+    pub fn said_connection(&self) -> Option<&'a Arc<ConnectionView>> {
+        self.said(Topic::Connection)?.connection()
+    }
+
+    /// A factsheet of a mock vehicle of the harness, if it is an object.
+    #[must_use]
+    pub fn said_factsheet(&self) -> Option<&'a Arc<FactsheetView>> {
+        self.said(Topic::Factsheet)?.factsheet()
+    }
+
+    /// The JSON of what a mock vehicle of the harness says on that topic, if it is an object.
+    #[must_use]
+    pub fn said_json(&self, topic: Topic) -> Option<&'a Value> {
         let value = self.is(Seen::Sent, topic).then(|| self.json()).flatten();
         value.filter(|value| value.is_object())
     }
@@ -450,7 +558,7 @@ mod tests {
         let order = message("v/order", false);
         let mut vehicle = observer(Role::Agv);
         let seen = vehicle.see(&order);
-        assert!(seen.delivered().is_none() && seen.to_vehicle(Topic::Order).is_some());
+        assert!(seen.delivered().is_none() && seen.order_to_vehicle().is_some());
         assert!(observer(Role::MasterControl).see(&order).delivered().is_some());
     }
 

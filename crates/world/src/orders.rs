@@ -9,7 +9,7 @@ use tck_base::pattern::whole;
 
 use crate::members::{elements, number, text};
 use crate::observation::Observation;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How many order messages are kept, and how many elements each may have.
 const MESSAGES: usize = 64;
@@ -198,7 +198,7 @@ impl OrdersSent {
 impl OrdersSent {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>) {
-        let Some(sent) = record.to_vehicle(Topic::Order).and_then(SentOrder::read) else {
+        let Some(sent) = record.to_vehicle_json(Topic::Order).and_then(SentOrder::read) else {
             return;
         };
         self.at = Some(record.seq());

@@ -34,7 +34,7 @@ impl Restarts {
         if let Event::Fault { fault } = record.event() {
             self.cut |= *fault != LinkFault::Restore;
         }
-        let restarted = if let Some(state) = record.state() {
+        let restarted = if let Some(state) = record.state_json() {
             let header = number(state, "headerId");
             let goes_on = matches!((self.header, header), (Some(before), Some(now)) if now > before);
             let restarted = self.pending && !goes_on;

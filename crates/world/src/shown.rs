@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::members::{actions, elements, number, text};
 use crate::observation::Observation;
 use crate::orders::sets_position;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How many FATAL errors are kept in mind.
 const ERRORS: usize = 16;
@@ -33,7 +33,7 @@ impl ShownOrder {
     /// The state that this record is, if it can be held against its order.
     #[must_use]
     pub fn state<'e>(&self, record: &Observation<'e>) -> Option<&'e Value> {
-        record.state().filter(|_| self.held == Some(record.seq()))
+        record.state_json().filter(|_| self.held == Some(record.seq()))
     }
 
     /// orderId of the last state.
@@ -64,7 +64,7 @@ impl ShownOrder {
 impl ShownOrder {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>) {
-        let moved = record.to_vehicle(Topic::InstantActions).is_some_and(|message| {
+        let moved = record.to_vehicle_json(Topic::InstantActions).is_some_and(|message| {
             actions(message).any(|action| {
                 let name = text(action, "actionType");
                 name == "cancelOrder" || sets_position(name)
@@ -73,7 +73,7 @@ impl ShownOrder {
         if moved || record.outside_influence() {
             self.abandoned.clone_from(&self.order);
         }
-        let Some(state) = record.state() else { return };
+        let Some(state) = record.state_json() else { return };
         let (Some(order), Some(last)) = (state.get("orderId").and_then(Value::as_str), last_node(state)) else {
             return;
         };

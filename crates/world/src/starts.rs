@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::members::{in_sequence, instant_actions, number, place_of, short, text};
 use crate::mock::MockVehicle;
 use crate::observation::Observation;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How many ids are remembered.
 const IDS: usize = 1024;
@@ -53,10 +53,10 @@ impl Starts {
         if vehicle.is_lost(record) {
             self.cancelled = false;
         }
-        if let Some(message) = record.delivered_on(Topic::InstantActions) {
+        if let Some(message) = record.delivered_json(Topic::InstantActions) {
             self.cancelled |= instant_actions(message).any(|action| text(action, "actionType") == "cancelOrder");
         }
-        if let Some(order) = record.delivered_on(Topic::Order)
+        if let Some(order) = record.delivered_json(Topic::Order)
             && let Some(id) = short(order, "orderId")
         {
             self.begins(id, order, record.seq());

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use tck_pack::{Pack, Role};
 
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// One topic of a vehicle.
 #[derive(Clone, Debug)]

@@ -13,7 +13,7 @@ use crate::observation::Observation;
 use crate::orders::{Element, OrdersSent, read_elements};
 use crate::pose::{Pose, finite};
 use crate::shown::ShownOrder;
-use crate::topic::Topic;
+use tck_view::Topic;
 
 /// How many order messages are kept, and how many elements of each.
 const MESSAGES: usize = 64;
@@ -165,7 +165,7 @@ pub struct Step {
 impl Way {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>, shown: &ShownOrder, orders: &OrdersSent) {
-        if let Some(plan) = record.to_vehicle(Topic::Order).and_then(Plan::read)
+        if let Some(plan) = record.to_vehicle_json(Topic::Order).and_then(Plan::read)
             && self.plans.back() != Some(&plan)
         {
             if self.plans.len() == MESSAGES {
@@ -174,7 +174,7 @@ impl Way {
             self.plans.push_back(plan);
         }
         let state = shown.state(record);
-        let is_state = record.state().is_some();
+        let is_state = record.state_json().is_some();
         // Messages that the harness holds up tell nothing about time.
         if record.link.disturbed || !is_state {
             if is_state || record.link.disturbed {

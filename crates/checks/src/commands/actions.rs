@@ -20,6 +20,7 @@ pub(crate) const SCOPES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(scopes),
 };
 
@@ -37,6 +38,7 @@ pub(crate) const IN_FACTSHEET: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(InFactsheet),
 };
 
@@ -51,6 +53,7 @@ pub(crate) const LOAD_DEVICE: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(LoadDevice),
 };
 

@@ -19,6 +19,7 @@ pub(crate) const NOT_ASKED: Check = Check {
     arguments: &["types", "except"],
     listens: &[Listen::Delivered(Topic::InstantActions)],
     reads: &[],
+    needs: &[],
     start: |context| {
         let list = |name: &str| -> Option<Vec<String>> {
             let list = context.with.get(name)?.as_array()?;

@@ -25,6 +25,7 @@ pub(crate) const AWAY: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Away::default()),
 };
 
@@ -52,7 +53,7 @@ impl Running for Away {
             Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => self.delay(now),
             _ => {}
         }
-        if let Some(message) = record.said(Topic::Connection) {
+        if let Some(message) = record.said_json(Topic::Connection) {
             let state = text(message, "connectionState");
             let gone = says_broken(message) || Some(state) == context.pack.word("connection.offline");
             self.since = gone.then(|| (now, state.chars().take(64).collect()));

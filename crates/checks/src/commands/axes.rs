@@ -21,6 +21,7 @@ pub(crate) const AXES: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(Axes::default()),
 };
 

@@ -25,6 +25,7 @@ pub(crate) const BASE_KEPT: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(BaseKept::default()),
 };
 

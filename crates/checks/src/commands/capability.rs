@@ -18,6 +18,7 @@ pub(crate) const OPTIONAL: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Optional),
 };
 
@@ -30,6 +31,7 @@ pub(crate) const REQUIRED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Required),
 };
 

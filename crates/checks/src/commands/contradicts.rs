@@ -23,6 +23,7 @@ pub(crate) const CONTRADICTS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(Contradicts::default()),
 };
 
@@ -42,7 +43,7 @@ impl Running for Contradicts {
         if context.world.mock().is_lost(record) {
             self.since = None;
         }
-        if record.said(Topic::State).is_some() {
+        if record.said_json(Topic::State).is_some() {
             let busy = context.world.mock().last().filter(|seen| seen.base > 0);
             self.since = busy.map(|seen| self.since.unwrap_or(seen.at));
         }

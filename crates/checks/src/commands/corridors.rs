@@ -21,6 +21,7 @@ pub(crate) const CORRIDORS: Check = Check {
     arguments: &[],
     listens: &[Listen::Sent(Topic::State), Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Corridors::default()),
 };
 
@@ -63,7 +64,7 @@ impl Running for Corridors {
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        if let Some(state) = record.said(Topic::State) {
+        if let Some(state) = record.said_json(Topic::State) {
             self.plans |= elements(state, "edgeStates").any(|edge| edge.get("trajectory").is_some());
         }
         let order = Command::read(record).and_then(Command::order);

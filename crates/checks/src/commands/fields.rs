@@ -20,6 +20,7 @@ pub(crate) const ARRAYS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(arrays),
 };
 
@@ -32,6 +33,7 @@ pub(crate) const POSITION_RANGE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(position_range),
 };
 
@@ -44,6 +46,7 @@ pub(crate) const ZONE_SET: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(ZoneSet),
 };
 
@@ -58,6 +61,7 @@ pub(crate) const IDENTIFIERS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(identifiers),
 };
 
@@ -73,6 +77,7 @@ pub(crate) const TOPICS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(topics),
 };
 
@@ -85,6 +90,7 @@ pub(crate) const POSITION: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Position),
 };
 

@@ -32,6 +32,7 @@ pub(crate) const UPDATES: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(Part { focus: Focus::Updates }),
 };
 
@@ -50,6 +51,7 @@ pub(crate) const ORDER_IDS: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(Part { focus: Focus::Ids }),
 };
 
@@ -68,6 +70,7 @@ pub(crate) const RESENT: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(Part { focus: Focus::Resent }),
 };
 
@@ -384,7 +387,7 @@ impl Follow {
     /// Learns from a record; gives back what it shows.
     fn follow(&mut self, record: &Observation<'_>, context: &CheckContext<'_>, keeps: bool) -> Told {
         let vehicle = context.world.mock();
-        let is_state = record.said(Topic::State).is_some();
+        let is_state = record.said_json(Topic::State).is_some();
         if vehicle.is_lost(record) {
             self.lost(vehicle.now(record), record, keeps);
         }

@@ -18,6 +18,7 @@ pub(crate) const NODES_AND_EDGES: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(nodes_and_edges),
 };
 
@@ -30,6 +31,7 @@ pub(crate) const RELEASED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(base_and_horizon),
 };
 
@@ -42,6 +44,7 @@ pub(crate) const EDGE_ENDS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(edge_ends),
 };
 
@@ -54,6 +57,7 @@ pub(crate) const SEQUENCE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Sequence::default()),
 };
 

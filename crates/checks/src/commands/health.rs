@@ -30,6 +30,7 @@ pub(crate) const HEALTH: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Health::default()),
 };
 
@@ -72,14 +73,14 @@ impl Running for Health {
         {
             self.waits.get_or_insert(now);
         }
-        if let Some(state) = record.said(Topic::State) {
+        if let Some(state) = record.said_json(Topic::State) {
             let reason = reason(state);
             if reason != self.reason {
                 (self.waits, self.online) = (None, false);
                 self.reason = reason;
             }
         }
-        if let Some(connection) = record.said(Topic::Connection)
+        if let Some(connection) = record.said_json(Topic::Connection)
             && Some(text(connection, "connectionState")) == context.pack.word("connection.online")
             && self.waits.is_some_and(|since| now.since(since) >= context.time.notice)
         {

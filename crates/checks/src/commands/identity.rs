@@ -21,6 +21,7 @@ pub(crate) const NODE_IDS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(NodeIds::default()),
 };
 
@@ -39,6 +40,7 @@ pub(crate) const ACTION_IDS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(ActionIds::default()),
 };
 

@@ -22,6 +22,7 @@ pub(crate) const ON_INFORMATION: Check = Check {
     arguments: &[],
     listens: &[Listen::Sent(Topic::State), Listen::Delivered(Topic::InstantActions)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(OnInformation::default()),
 };
 
@@ -45,7 +46,7 @@ struct OnInformation {
 impl Running for OnInformation {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let now = record.at().moment;
-        if let Some(state) = record.said(Topic::State) {
+        if let Some(state) = record.said_json(Topic::State) {
             let informs = elements(state, "information").next().is_some();
             if informs && !self.informs {
                 self.since = Some(now);

@@ -23,6 +23,7 @@ pub(crate) const SIZES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Sizes),
 };
 
@@ -36,6 +37,7 @@ pub(crate) const ORDER_INTERVAL: Check = Check {
     arguments: &[],
     listens: &[Listen::Fault, Listen::Hook, Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Interval::default()),
 };
 

@@ -20,6 +20,7 @@ pub(crate) const ALIVE: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Alive::default()),
 };
 
@@ -32,6 +33,7 @@ pub(crate) const LISTENS: Check = Check {
     arguments: &[],
     listens: &[Listen::Subscribe, Listen::Closed, Listen::Sent(Topic::Connection)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Listens::default()),
 };
 
@@ -177,7 +179,7 @@ impl Running for Listens {
             _ => {}
         }
         let Some(said) = record
-            .said(Topic::Connection)
+            .said_json(Topic::Connection)
             .filter(|_| context.role == Role::MasterControl)
         else {
             return false;

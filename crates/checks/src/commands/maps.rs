@@ -28,6 +28,7 @@ pub(crate) const ENABLED: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(Enabled::default()),
 };
 
@@ -47,6 +48,7 @@ pub(crate) const ON_BOARD: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(OnBoard::default()),
 };
 
@@ -61,6 +63,7 @@ pub(crate) const DOWNLOADS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(download),
 };
 
@@ -80,6 +83,7 @@ pub(crate) const DUPLICATES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |context| {
         Box::new(Duplicates {
             settled: context.with.get("settled") == Some(&Value::Bool(true)),
@@ -165,7 +169,7 @@ impl Running for Enabled {
         if context.world.mock().is_lost(record) {
             self.reported.clear();
         }
-        if let Some(state) = record.said(Topic::State) {
+        if let Some(state) = record.said_json(Topic::State) {
             let listed = state
                 .get("maps")
                 .and_then(Value::as_array)
@@ -249,7 +253,7 @@ impl Running for OnBoard {
             self.listed.clear();
         }
         let now = record.at().moment;
-        if let Some(state) = record.said(Topic::State) {
+        if let Some(state) = record.said_json(Topic::State) {
             let name = |map: &Value, member| short(map, member).unwrap_or_default();
             let maps = elements(state, "maps").take(KEPT);
             let maps = maps.map(|map| (name(map, "mapId"), name(map, "mapVersion"))).collect();
@@ -342,7 +346,7 @@ impl Running for Duplicates {
             self.refused.clear();
             self.deleted.clear();
         }
-        if let Some(state) = record.said(Topic::State) {
+        if let Some(state) = record.said_json(Topic::State) {
             self.note_state(state, record.at().moment);
         }
         let Some(command) = Command::read(record) else {

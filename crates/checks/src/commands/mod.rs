@@ -71,8 +71,8 @@ enum Command<'e> {
 impl<'e> Command<'e> {
     /// Reads a record; only what is a JSON object.
     fn read(record: &Observation<'e>) -> Option<Self> {
-        let order = record.delivered_on(Topic::Order).map(Self::Order);
-        order.or_else(|| record.delivered_on(Topic::InstantActions).map(Self::Instant))
+        let order = record.delivered_json(Topic::Order).map(Self::Order);
+        order.or_else(|| record.delivered_json(Topic::InstantActions).map(Self::Instant))
     }
 
     fn order(self) -> Option<&'e Value> {

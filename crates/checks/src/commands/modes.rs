@@ -23,6 +23,7 @@ pub(crate) const MODES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
+    needs: &[],
     start: |_| Box::new(Modes::default()),
 };
 
@@ -59,7 +60,7 @@ impl Running for Modes {
         }
         // That nothing comes is seen with every state.
         let Some(command) = Command::read(record) else {
-            return record.said(Topic::State).is_some();
+            return record.said_json(Topic::State).is_some();
         };
         let mut found = Found::new(record, findings);
         let asks = |kind: &str| matches!(kind, "stateRequest" | "factsheetRequest");

@@ -22,6 +22,7 @@ pub(crate) const VALUES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Values),
 };
 
@@ -85,6 +86,7 @@ pub(crate) const KEYS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Keys),
 };
 
@@ -100,6 +102,7 @@ pub(crate) const MANDATORY: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Mandatory),
 };
 

@@ -18,6 +18,7 @@ pub(crate) const START: Check = Check {
     arguments: &["settled"],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock],
+    needs: &[],
     start: |context| {
         let settled = context.with.get("settled") == Some(&Value::Bool(true));
         Box::new(Start {
@@ -36,6 +37,7 @@ pub(crate) const CANCELLED_ON_NODE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock, Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Start::new(Rule::OnNode)),
 };
 
@@ -48,6 +50,7 @@ pub(crate) const CANCELLED_BETWEEN: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock, Fact::Factsheets],
+    needs: &[],
     start: |_| Box::new(Start::new(Rule::Between)),
 };
 
@@ -60,6 +63,7 @@ pub(crate) const FIRST_PLACE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock],
+    needs: &[],
     start: |_| {
         Box::new(Start {
             settled: true,

@@ -17,6 +17,7 @@ pub(crate) const TRAJECTORY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(shape),
 };
 
@@ -29,6 +30,7 @@ pub(crate) const ENDS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
+    needs: &[],
     start: |_| Each::start(ends),
 };
 

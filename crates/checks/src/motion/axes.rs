@@ -14,6 +14,7 @@ pub(crate) const AXES: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(Axes::default()),
 };
 

@@ -17,6 +17,7 @@ pub(crate) const CORRIDOR: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(Boundaries::of(Point::Centre)),
 };
 
@@ -29,6 +30,7 @@ pub(crate) const CORRIDOR_POINT: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(Boundaries::of(Point::AsOrdered)),
 };
 
@@ -42,6 +44,7 @@ pub(crate) const NEXT_CORRIDOR: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(NextCorridor),
 };
 

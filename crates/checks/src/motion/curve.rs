@@ -14,6 +14,7 @@ pub(crate) const TRAJECTORY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(Trajectory),
 };
 
@@ -28,6 +29,7 @@ pub(crate) const CURVE_ORIENTATION: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(CurveOrientation),
 };
 

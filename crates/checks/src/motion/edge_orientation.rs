@@ -16,6 +16,7 @@ pub(crate) const EDGE_ORIENTATION: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(EdgeOrientation),
 };
 

@@ -15,6 +15,7 @@ pub(crate) const EDGE_ROTATION_SPEED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(EdgeRotationSpeed::default()),
 };
 

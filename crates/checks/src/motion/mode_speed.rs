@@ -19,6 +19,7 @@ pub(crate) const MODE_SPEED: Check = Check {
     arguments: &["alike"],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(ModeSpeed::default()),
 };
 

@@ -17,6 +17,7 @@ pub(crate) const NODE_THETA: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(NodeTheta::default()),
 };
 

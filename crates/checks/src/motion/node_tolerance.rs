@@ -16,6 +16,7 @@ pub(crate) const NODE_TOLERANCE: Check = Check {
     arguments: &["tolerance"],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |context| {
         let stated = context.with.get("tolerance").and_then(serde_json::Value::as_f64);
         Box::new(NodeTolerance {

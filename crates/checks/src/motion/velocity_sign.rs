@@ -14,6 +14,7 @@ pub(crate) const VELOCITY_SIGN: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
+    needs: &[],
     start: |_| Box::new(VelocitySign::default()),
 };
 

@@ -30,6 +30,7 @@ pub(crate) const ACTION_IDS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(ActionIds::default()),
 };
 
@@ -45,12 +46,12 @@ struct ActionIds {
 impl ActionIds {
     fn learn(&mut self, record: &Observation<'_>) {
         let read = |action: &Value| text(action, "actionId").chars().take(1024).collect::<String>();
-        if let Some(order) = record.to_vehicle(Topic::Order) {
+        if let Some(order) = record.to_vehicle_json(Topic::Order) {
             let all = elements(order, "nodes").chain(elements(order, "edges"));
             let ids = all.flat_map(|element| elements(element, "actions")).map(read);
             self.sent.extend(ids.take(IDS));
         }
-        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
+        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
             self.sent.extend(actions(message).map(read).take(IDS));
         }
         self.unknown |= self.sent.len() > IDS;
@@ -66,7 +67,7 @@ impl ActionIds {
 impl Running for ActionIds {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.learn(record);
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let ids = elements(state, "actionStates").take(IDS);

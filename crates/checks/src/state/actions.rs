@@ -24,6 +24,7 @@ pub(crate) const TRANSITIONS: Check = Check {
     arguments: &[],
     listens: &[Listen::Hook, Listen::Answer, Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |context| {
         Box::new(Transitions {
             graph: Graph::of(context.pack),
@@ -49,6 +50,7 @@ pub(crate) const KEPT: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |context| {
         Box::new(Kept {
             graph: Graph::of(context.pack),
@@ -115,7 +117,7 @@ impl Running for Transitions {
         if record.outside_influence() {
             self.last.clear();
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let seq = record.seq();
@@ -168,7 +170,7 @@ impl Running for Kept {
         if context.world.restarts().now(record) || record.outside_influence() {
             self.listed.clear();
         }
-        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
+        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
             let all = actions(message).map(|action| text(action, "actionId").to_owned());
             self.instant.extend(all.take(ACTIONS));
             let excess = self.instant.len().saturating_sub(ACTIONS);
@@ -182,7 +184,7 @@ impl Running for Kept {
         if let Some(limit) = Self::factsheet_limit(record) {
             self.limit = limit;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         if !state.get("actionStates").is_some_and(Value::is_array) {

@@ -17,6 +17,7 @@ pub(crate) const LEVELS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Levels::default()),
 };
 
@@ -42,7 +43,7 @@ fn hundredths(charge: f64) -> Option<i64> {
 impl Running for Levels {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, _findings: &mut Vec<CheckFinding>) -> bool {
         let charge = record
-            .state()
+            .state_json()
             .and_then(|state| state.get("batteryState")?.get("batteryCharge")?.as_f64())
             .and_then(hundredths);
         let Some(charge) = charge.filter(|_| self.seen.len() <= 2) else {

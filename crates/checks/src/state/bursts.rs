@@ -29,6 +29,7 @@ pub(crate) const BURSTS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Bursts::default()),
 };
 
@@ -61,7 +62,7 @@ impl Running for Bursts {
         if asked || record.outside_influence() || record.lag().is_some() || record.link.disturbed {
             self.equal.clear();
         }
-        let Some(state) = record.state().filter(|_| !record.link.disturbed) else {
+        let Some(state) = record.state_json().filter(|_| !record.link.disturbed) else {
             return false;
         };
         let now = essence(state);

@@ -50,6 +50,7 @@ pub(crate) const DRIVING: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Displaced],
+    needs: &[],
     start: |_| Box::new(Driving::default()),
 };
 
@@ -70,6 +71,7 @@ pub(crate) const POSITION_MOVES: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Displaced],
+    needs: &[],
     start: |_| Box::new(PositionMoves::default()),
 };
 
@@ -206,7 +208,7 @@ impl Running for Driving {
         if context.world.displaced().now(record) {
             self.forget();
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         // A vehicle may be slow to take a new place over.
@@ -281,10 +283,10 @@ impl Running for PositionMoves {
             self.before = None;
             self.stuck = 0;
         }
-        if let Some(order) = record.to_vehicle(Topic::Order) {
+        if let Some(order) = record.to_vehicle_json(Topic::Order) {
             self.learn(order);
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let (Some(pose), Some((node, _))) = (Pose::of(state), last_node(state)) else {

@@ -39,6 +39,7 @@ pub(crate) const ORDER_KNOWN: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts, Fact::Malformed],
+    needs: &[],
     start: |_| Box::new(OrderKnown::looking_for(Part::Known)),
 };
 
@@ -59,6 +60,7 @@ pub(crate) const UPDATE_ID_RISES: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts, Fact::Malformed],
+    needs: &[],
     start: |_| Box::new(OrderKnown::looking_for(Part::Rises)),
 };
 
@@ -80,6 +82,7 @@ pub(crate) const NOT_REPLACED: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts, Fact::Malformed],
+    needs: &[],
     start: |_| Box::new(OrderKnown::looking_for(Part::Replaced)),
 };
 
@@ -136,7 +139,7 @@ impl OrderKnown {
 
     fn learn(&mut self, record: &Observation<'_>) {
         // One without a name or number is malformed, and looked after there.
-        if let Some(pair) = record.to_vehicle(Topic::Order).and_then(named) {
+        if let Some(pair) = record.to_vehicle_json(Topic::Order).and_then(named) {
             self.since.push(pair.clone());
             self.sent.push_back(pair);
             self.unknown |= self.sent.len() > ORDERS;
@@ -144,7 +147,7 @@ impl OrderKnown {
             self.sent.drain(..excess);
         }
         let cancels = record
-            .to_vehicle(Topic::InstantActions)
+            .to_vehicle_json(Topic::InstantActions)
             .is_some_and(|message| actions(message).any(|action| text(action, "actionType") == "cancelOrder"));
         if cancels {
             self.cancelled = self.before.as_ref().map(|before| before.pair.0.clone());
@@ -282,7 +285,7 @@ impl Running for OrderKnown {
             self.before = None;
             self.refused.clear();
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");

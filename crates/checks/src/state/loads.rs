@@ -32,6 +32,7 @@ pub(crate) const LOADS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(Loads::default()),
 };
 
@@ -88,7 +89,7 @@ impl Running for Loads {
             self.loaded = false;
             self.open.clear();
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         self.place(state, record.seq(), findings);

@@ -35,6 +35,7 @@ pub(crate) const MAP_CHANGES: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(MapChanges::default()),
 };
 
@@ -83,8 +84,8 @@ fn of_order(order: &Value) -> impl Iterator<Item = &Value> {
 
 impl MapChanges {
     fn learn(&mut self, record: &Observation<'_>) {
-        let instant = record.to_vehicle(Topic::InstantActions);
-        let order = record.to_vehicle(Topic::Order);
+        let instant = record.to_vehicle_json(Topic::InstantActions);
+        let order = record.to_vehicle_json(Topic::Order);
         let instant = instant.into_iter().flat_map(actions);
         let all = instant.chain(order.into_iter().flat_map(of_order));
         for action in all.take(LIMIT) {
@@ -195,7 +196,7 @@ impl Running for MapChanges {
         if context.world.restarts().now(record) || record.outside_influence() {
             self.listed = None;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let Some(maps) = state.get("maps").and_then(Value::as_array) else {

@@ -29,6 +29,7 @@ pub(crate) const MAPS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Maps::default()),
 };
 
@@ -46,7 +47,7 @@ impl Running for Maps {
         if record.outside_influence() {
             self.listed = None;
         }
-        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
+        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
             for action in actions(message).filter(|action| text(action, "actionType") == "deleteMap") {
                 if self.deleted.len() < LIMIT {
                     self.deleted
@@ -54,7 +55,7 @@ impl Running for Maps {
                 }
             }
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let Some(maps) = state.get("maps").and_then(Value::as_array) else {

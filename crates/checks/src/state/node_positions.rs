@@ -24,6 +24,7 @@ pub(crate) const NODE_POSITIONS: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
+    needs: &[],
     start: |_| Box::new(NodePositions::default()),
 };
 
@@ -37,6 +38,7 @@ pub(crate) const JOINT_POSITION: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
+    needs: &[],
     start: |_| {
         Box::new(NodePositions {
             joint: true,
@@ -82,7 +84,7 @@ fn same(one: &Place, other: &Place) -> bool {
 
 impl NodePositions {
     fn learn(&mut self, record: &Observation<'_>) {
-        let Some(order) = record.to_vehicle(Topic::Order) else {
+        let Some(order) = record.to_vehicle_json(Topic::Order) else {
             return;
         };
         let Some(update) = number(order, "orderUpdateId") else {

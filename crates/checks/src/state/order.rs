@@ -33,6 +33,7 @@ pub(crate) const ORDER_KEPT: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
+    needs: &[],
     start: |_| Box::new(OrderKept::default()),
 };
 
@@ -57,18 +58,18 @@ impl Running for OrderKept {
             self.shown = None;
         }
         let cancels = record
-            .to_vehicle(Topic::InstantActions)
+            .to_vehicle_json(Topic::InstantActions)
             .is_some_and(|message| actions(message).any(|action| text(action, "actionType") == "cancelOrder"));
         if cancels {
             self.cancelled = self.shown.as_ref().map(|shown| shown.0.clone());
         }
-        if let Some(order) = record.to_vehicle(Topic::Order) {
+        if let Some(order) = record.to_vehicle_json(Topic::Order) {
             self.sent.push_back(named(order));
             if self.sent.len() > ORDERS {
                 self.sent.pop_front();
             }
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");

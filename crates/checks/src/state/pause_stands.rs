@@ -30,6 +30,7 @@ pub(crate) const PAUSE_STANDS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Displaced],
+    needs: &[],
     start: |_| Box::new(PauseStands::default()),
 };
 
@@ -52,7 +53,7 @@ impl Running for PauseStands {
         if context.world.displaced().now(record) {
             self.since = None;
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");

@@ -26,6 +26,7 @@ pub(crate) const PAUSED: Check = Check {
     arguments: &[],
     listens: &[Listen::Hook, Listen::Answer, Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(PausedActions::default()),
 };
 
@@ -51,7 +52,7 @@ impl Running for PausedActions {
         if record.outside_influence() {
             self.before.clear();
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let before = std::mem::take(&mut self.before);

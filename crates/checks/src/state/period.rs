@@ -45,6 +45,7 @@ pub(crate) const PERIOD: Check = Check {
         Listen::Delivered(Topic::Factsheet),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Period::default()),
 };
 
@@ -64,6 +65,7 @@ pub(crate) const OWN_LIMITS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(OwnLimits::default()),
 };
 

@@ -29,6 +29,7 @@ pub(crate) const LAST_NODE_PLACE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(LastNodePlace::default()),
 };
 
@@ -125,11 +126,11 @@ impl Running for LastNodePlace {
         if record.outside_influence() || record.may_be_a_restart() {
             self.last = None;
         }
-        if let Some(order) = record.to_vehicle(Topic::Order) {
+        if let Some(order) = record.to_vehicle_json(Topic::Order) {
             self.learn(order);
             self.stopped = false;
         }
-        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
+        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
             for action in actions(message) {
                 match text(action, "actionType") {
                     "cancelOrder" | "startPause" => self.stopped = true,
@@ -139,7 +140,7 @@ impl Running for LastNodePlace {
                 }
             }
         }
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let now: String = text(state, "lastNodeId").chars().take(512).collect();

@@ -25,6 +25,7 @@ pub(crate) const STATUSES: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Statuses::default()),
 };
 
@@ -41,6 +42,7 @@ pub(crate) const RESULTS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Results::default()),
 };
 
@@ -57,7 +59,7 @@ impl Running for Statuses {
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let held = is_held(state);
@@ -122,7 +124,7 @@ impl Results {
 impl Running for Results {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.learn(record);
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let mut judged = false;

@@ -19,6 +19,7 @@ pub(crate) const REMAINING_ROUTE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
+    needs: &[],
     start: |_| Box::new(RemainingRoute::default()),
 };
 
@@ -31,6 +32,7 @@ pub(crate) const LAST_NODE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
+    needs: &[],
     start: |_| Box::new(LastNode::default()),
 };
 
@@ -313,7 +315,7 @@ impl Running for LastNode {
         let seq = record.seq();
         let shown = context.world.shown();
         let Some(state) = shown.state(record) else {
-            if record.state().is_some() {
+            if record.state_json().is_some() {
                 self.before = None;
             }
             return false;

@@ -22,6 +22,7 @@ pub(crate) const TRIGGERS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
+    needs: &[],
     start: |_| Box::new(Triggers::default()),
 };
 

@@ -28,6 +28,7 @@ pub(crate) const IDLE_EMPTY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Malformed],
+    needs: &[],
     start: |_| Box::new(IdleEmpty),
 };
 
@@ -39,6 +40,7 @@ pub(crate) const POSITION_RANGE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State), Listen::Delivered(Topic::Visualization)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(PositionRange),
 };
 
@@ -50,6 +52,7 @@ pub(crate) const IDENTIFIERS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
+    needs: &[],
     start: |_| Box::new(Identifiers::default()),
 };
 
@@ -63,7 +66,7 @@ impl Running for IdleEmpty {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         let Some(state) = record
-            .state()
+            .state_json()
             .filter(|_state| !context.world.malformed().is_shown(record))
         else {
             return false;
@@ -137,7 +140,7 @@ struct Identifiers {
 
 impl Running for Identifiers {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(state) = record.state() else {
+        let Some(state) = record.state_json() else {
             return false;
         };
         let position = state
