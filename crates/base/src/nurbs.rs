@@ -63,37 +63,72 @@ pub struct Curve {
     points: Vec<ControlPoint>,
 }
 
-fn number(value: &Value, name: &str) -> Option<f64> {
-    value.get(name)?.as_f64().filter(|number| number.abs() < FARTHEST)
+/// A trajectory as it is written, before anybody asks whether it is one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Written {
+    /// The degree; `None` where it is missing, not a number where it is none.
+    pub degree: Option<f64>,
+    /// The control points; `None` where they are no list.
+    pub points: Option<Vec<WrittenPoint>>,
+    /// The knots; `None` where they are no list of numbers.
+    pub knots: Option<Vec<f64>>,
 }
 
-fn read_degree(trajectory: &Value, flaws: &mut Vec<Flaw>) -> usize {
-    let Some(degree) = trajectory.get("degree").filter(|degree| !degree.is_null()) else {
+/// A control point as it is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WrittenPoint {
+    /// `None` where it is missing or no number.
+    pub x: Option<f64>,
+    /// `None` where it is missing or no number.
+    pub y: Option<f64>,
+    /// `None` where it is missing, not a number where it is none.
+    pub weight: Option<f64>,
+}
+
+impl From<&Value> for Written {
+    fn from(trajectory: &Value) -> Self {
+        let float = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+        let list = |name: &str| trajectory.get(name).and_then(Value::as_array);
+        let point = |point: &Value| WrittenPoint {
+            x: point.get("x").and_then(Value::as_f64),
+            y: point.get("y").and_then(Value::as_f64),
+            weight: point.get("weight").map(float),
+        };
+        Self {
+            degree: trajectory.get("degree").filter(|degree| !degree.is_null()).map(float),
+            points: list("controlPoints").map(|points| points.iter().map(point).collect()),
+            knots: list("knotVector").and_then(|knots| knots.iter().map(Value::as_f64).collect()),
+        }
+    }
+}
+
+fn near(number: Option<f64>) -> Option<f64> {
+    number.filter(|number| number.abs() < FARTHEST)
+}
+
+fn read_degree(degree: Option<f64>, flaws: &mut Vec<Flaw>) -> usize {
+    let Some(degree) = degree else {
         flaws.push(Flaw::DegreeMissing);
         return 1;
     };
-    let whole = degree.as_f64().filter(|degree| degree.fract() == 0.0 && *degree >= 1.0);
-    let Some(whole) = whole.filter(|degree| *degree < 1e6) else {
+    if degree.fract() != 0.0 || !(1.0..1e6).contains(&degree) {
         flaws.push(Flaw::Member("degree is not a whole number of at least 1".to_owned()));
         return 0;
-    };
+    }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
-    let degree = whole as usize;
+    let degree = degree as usize;
     degree
 }
 
-fn read_points(trajectory: &Value, flaws: &mut Vec<Flaw>) -> Vec<ControlPoint> {
-    let Some(list) = trajectory.get("controlPoints").and_then(Value::as_array) else {
+fn read_points(points: Option<Vec<WrittenPoint>>, flaws: &mut Vec<Flaw>) -> Vec<ControlPoint> {
+    let Some(list) = points else {
         flaws.push(Flaw::Member("controlPoints is not a list".to_owned()));
         return Vec::new();
     };
-    let mut points = Vec::new();
-    for (at, point) in list.iter().enumerate() {
-        let weight = match point.get("weight") {
-            None => Some(1.0),
-            Some(_) => number(point, "weight").filter(|weight| *weight >= 0.0),
-        };
-        match (number(point, "x"), number(point, "y"), weight) {
+    let mut points = Vec::with_capacity(list.len());
+    for (at, point) in list.into_iter().enumerate() {
+        let weight = near(point.weight.or(Some(1.0))).filter(|weight| *weight >= 0.0);
+        match (near(point.x), near(point.y), weight) {
             (Some(x), Some(y), Some(weight)) => points.push(ControlPoint { x, y, weight }),
             (Some(_), Some(_), None) => {
                 flaws.push(Flaw::Member(format!(
@@ -106,23 +141,17 @@ fn read_points(trajectory: &Value, flaws: &mut Vec<Flaw>) -> Vec<ControlPoint> {
     points
 }
 
-fn read_knots(trajectory: &Value, flaws: &mut Vec<Flaw>) -> Option<Vec<f64>> {
-    let list = trajectory.get("knotVector").and_then(Value::as_array);
-    let knots: Option<Vec<f64>> = list.and_then(|list| list.iter().map(Value::as_f64).collect());
-    if knots.is_none() {
-        flaws.push(Flaw::Member("knotVector is not a list of numbers".to_owned()));
-    }
-    knots
-}
-
 impl Curve {
     /// Reads a trajectory: what is wrong with it, and the curve if it can be calculated with all the same.
     #[must_use]
-    pub fn read(trajectory: &Value) -> (Option<Self>, Vec<Flaw>) {
+    pub fn read(trajectory: impl Into<Written>) -> (Option<Self>, Vec<Flaw>) {
+        let Written { degree, points, knots } = trajectory.into();
         let mut flaws = Vec::new();
-        let degree = read_degree(trajectory, &mut flaws);
-        let points = read_points(trajectory, &mut flaws);
-        let knots = read_knots(trajectory, &mut flaws);
+        let degree = read_degree(degree, &mut flaws);
+        let points = read_points(points, &mut flaws);
+        if knots.is_none() {
+            flaws.push(Flaw::Member("knotVector is not a list of numbers".to_owned()));
+        }
         let readable = flaws.iter().all(|flaw| *flaw == Flaw::DegreeMissing);
         let Some(knots) = knots.filter(|_| readable) else {
             return (None, flaws);

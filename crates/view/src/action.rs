@@ -1,6 +1,6 @@
 //! Actions, as they are ordered.
 
-use crate::{Json, List, Text};
+use crate::{Json, List, Member, Text};
 
 view! {
     /// An action of an order or of instant actions.
@@ -30,16 +30,23 @@ view! {
     }
 }
 
+/// The value of a parameter that is not there.
+static NO_VALUE: Member<Json> = Member::Absent;
+
 impl ActionView {
-    /// The value of the first parameter with this key; `None` where there is none, or it is null or absent.
+    /// The value of the first parameter with this key: absent where there is none, or where it has no value.
     ///
-    /// This is the one reader of action parameters; use [`Json::text`], [`Json::number`], [`Json::flag`] on what it gives.
+    /// This is the one reader of action parameters; use `text`, `float`, `flag` on what it gives.
+    #[must_use]
+    pub fn argument(&self, key: &str) -> &Member<Json> {
+        let mut all = self.action_parameters.iter();
+        let found = all.find(|parameter| parameter.key.or_empty() == key);
+        found.map_or(&NO_VALUE, |parameter| &parameter.value)
+    }
+
+    /// The value of the first parameter with this key; `None` where [`ActionView::argument`] is absent or null.
     #[must_use]
     pub fn parameter(&self, key: &str) -> Option<&Json> {
-        self.action_parameters
-            .iter()
-            .find(|parameter| parameter.key.is(key))?
-            .value
-            .there()
+        self.argument(key).there()
     }
 }

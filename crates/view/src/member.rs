@@ -1,6 +1,6 @@
 //! A member of a message: there, absent, null, or of another type.
 
-use std::slice;
+use std::{fmt, slice};
 
 use crate::{Json, Kind, List, Number, Text};
 
@@ -101,6 +101,45 @@ impl<T> Member<T> {
             Self::Other(other) => Some(other.kind()),
             Self::Absent | Self::There(_) => None,
         }
+    }
+}
+
+/// What stands there, as JSON; nothing where the member is absent.
+impl<T: Shown> fmt::Display for Member<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Absent => Ok(()),
+            Self::Null => f.write_str("null"),
+            Self::Other(other) => fmt::Display::fmt(other, f),
+            Self::There(value) => value.show(f),
+        }
+    }
+}
+
+/// A value that can be shown as the JSON it was.
+pub trait Shown {
+    /// Writes it as JSON.
+    ///
+    /// # Errors
+    /// As of the formatter.
+    fn show(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
+}
+
+impl Shown for Text {
+    fn show(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&Json::Text(self.clone()), f)
+    }
+}
+
+impl Shown for Number {
+    fn show(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl Shown for Json {
+    fn show(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Orders.
 
-use crate::{ActionView, List, NodePosition, Number, Text, Trajectory};
+use crate::{ActionView, List, Member, NodePosition, Number, Text, Trajectory};
 
 view! {
     /// An order.
@@ -95,6 +95,68 @@ view! {
         release_required: bool = later "releaseRequired",
         /// What to do when the release is lost.
         release_loss_behavior: Text = later "releaseLossBehavior",
+    }
+}
+
+/// A node or an edge of an order: what both have.
+#[derive(Clone, Copy, Debug)]
+pub enum Element<'o> {
+    /// A node.
+    Node(&'o Node),
+    /// An edge.
+    Edge(&'o Edge),
+}
+
+impl<'o> Element<'o> {
+    /// Whether it is an edge.
+    #[must_use]
+    pub const fn is_edge(self) -> bool {
+        matches!(self, Self::Edge(_))
+    }
+
+    /// Which node or edge it is.
+    #[must_use]
+    pub const fn id(self) -> &'o Member<Text> {
+        match self {
+            Self::Node(node) => &node.node_id,
+            Self::Edge(edge) => &edge.edge_id,
+        }
+    }
+
+    /// Its place in the order.
+    #[must_use]
+    pub const fn sequence_id(self) -> &'o Member<Number> {
+        match self {
+            Self::Node(node) => &node.sequence_id,
+            Self::Edge(edge) => &edge.sequence_id,
+        }
+    }
+
+    /// Whether it belongs to the base.
+    #[must_use]
+    pub const fn released(self) -> &'o Member<bool> {
+        match self {
+            Self::Node(node) => &node.released,
+            Self::Edge(edge) => &edge.released,
+        }
+    }
+
+    /// What is to be done there.
+    #[must_use]
+    pub const fn actions(self) -> &'o Member<List<ActionView>> {
+        match self {
+            Self::Node(node) => &node.actions,
+            Self::Edge(edge) => &edge.actions,
+        }
+    }
+
+    /// Whether it is a JSON object at all.
+    #[must_use]
+    pub const fn is_object(self) -> bool {
+        match self {
+            Self::Node(node) => node.is_object(),
+            Self::Edge(edge) => edge.is_object(),
+        }
     }
 }
 

@@ -10,7 +10,8 @@ use crate::CHARACTERS;
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Text {
     characters: Arc<str>,
-    cut: bool,
+    /// How many characters are not kept.
+    cut: u32,
 }
 
 impl Text {
@@ -23,9 +24,10 @@ impl Text {
         } else {
             text.char_indices().nth(CHARACTERS).map(|(at, _)| at)
         };
+        let (kept, cut) = text.split_at(end.unwrap_or(text.len()));
         Self {
-            characters: end.map_or(text, |end| &text[..end]).into(),
-            cut: end.is_some(),
+            characters: kept.into(),
+            cut: u32::try_from(cut.chars().count()).unwrap_or(u32::MAX),
         }
     }
 
@@ -38,7 +40,13 @@ impl Text {
     /// Whether the text of the message goes on behind what is kept.
     #[must_use]
     pub const fn is_cut(&self) -> bool {
-        self.cut
+        self.cut > 0
+    }
+
+    /// How many characters the text of the message has, kept or not.
+    #[must_use]
+    pub fn length(&self) -> u64 {
+        self.characters.chars().count() as u64 + u64::from(self.cut)
     }
 }
 

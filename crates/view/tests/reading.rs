@@ -6,8 +6,8 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 use tck_view::{
-    CHARACTERS, ELEMENTS, Json, Kind, MessageView, Names, NodeState, Number, Presence, Print, Scope, StateView, TOTAL,
-    Topic,
+    CHARACTERS, ELEMENTS, Element, Json, Kind, MessageView, Names, NodeState, Number, Presence, Print, Scope,
+    StateView, TOTAL, Text, Topic,
 };
 
 fn read(topic: Topic, message: &Value) -> MessageView {
@@ -198,6 +198,7 @@ fn actions_are_found_wherever_they_stand() {
     let (_, pick) = order.actions().next().unwrap();
     assert_eq!(pick.parameter("lhd"), None);
     assert_eq!(pick.parameter("height"), None);
+    assert!(pick.argument("lhd").is_null() && pick.argument("height").is_absent());
     let station = pick.parameter("stationType").unwrap();
     assert_eq!(station.member("side").and_then(Json::list).map(<[Json]>::len), Some(1));
     assert_eq!(station.to_string(), r#"{"side":["left"]}"#);
@@ -272,4 +273,62 @@ fn views_go_from_thread_to_thread_and_parts_are_shared() {
     shared(&view);
     let text = view.state().unwrap().order_id.there().unwrap();
     assert!(std::ptr::eq(text.as_str(), text.clone().as_str()));
+}
+
+#[test]
+fn nodes_and_edges_have_something_in_common() {
+    let order = json!({
+        "nodes": [{ "nodeId": "n", "sequenceId": 0, "released": true, "actions": [{ "actionId": "a" }] }],
+        "edges": [{ "edgeId": "e", "sequenceId": 1, "released": false }, 7],
+    });
+    let view = read(Topic::Order, &order);
+    let order = view.order().unwrap();
+    let edges = order.edges.iter().map(Element::Edge);
+    let all: Vec<Element<'_>> = order.nodes.iter().map(Element::Node).chain(edges).collect();
+    let ids: Vec<_> = all.iter().map(|element| element.id().or_empty()).collect();
+    assert_eq!(ids, ["n", "e", ""]);
+    let places: Vec<_> = all.iter().map(|element| element.sequence_id().whole()).collect();
+    assert_eq!(places, [Some(0), Some(1), None]);
+    let base: Vec<_> = all.iter().map(|element| element.released().flag()).collect();
+    assert_eq!(base, [Some(true), Some(false), None]);
+    let kinds: Vec<_> = all
+        .iter()
+        .map(|element| (element.is_edge(), element.is_object()))
+        .collect();
+    assert_eq!(kinds, [(false, true), (true, true), (true, false)]);
+    assert_eq!(all[0].actions().total(), 1);
+    assert!(all[1].actions().is_absent());
+}
+
+#[test]
+fn a_text_tells_how_long_it_was() {
+    assert_eq!(Text::new("").length(), 0);
+    assert_eq!(Text::new("\u{e4}\u{1f600}").length(), 2);
+    let long = Text::new(&"\u{e4}".repeat(600));
+    assert_eq!((long.length(), long.chars().count()), (600, 512));
+    assert!(long.is_cut());
+}
+
+#[test]
+fn a_member_is_shown_as_it_stands() {
+    let message = json!({ "headerId": "7", "orderId": 3, "lastNodeId": "a\"b", "operatingMode": null });
+    let state = state(&message);
+    assert_eq!(state.header.header_id.to_string(), r#""7""#);
+    assert_eq!(state.order_id.to_string(), "3");
+    assert_eq!(state.last_node_id.to_string(), r#""a\"b""#);
+    assert_eq!(state.operating_mode.to_string(), "null");
+    assert_eq!(state.zone_set_id.to_string(), "");
+}
+
+#[test]
+fn every_limit_of_a_factsheet_is_among_all_of_them() {
+    let limits = json!({ "maxStringLens": { "msgLen": 1, "idLen": 2, "enumLen": 3, "loadIdLen": 4, "topicElemLen": 5,
+                                            "topicSerialLen": 6, "idNumericalOnly": true },
+                         "maxArrayLens": { "order.nodes": 1, "state.loads": 2 } });
+    let view = read(Topic::Factsheet, &json!({ "protocolLimits": limits }));
+    let sheet = view.factsheet().unwrap();
+    let strings = sheet.string_limits().unwrap().all();
+    assert!(strings.iter().all(|limit| limit.is_there()));
+    let arrays = sheet.array_limits().unwrap().all();
+    assert_eq!(arrays.iter().filter(|limit| limit.is_there()).count(), 2);
 }

@@ -1,6 +1,6 @@
 //! Limits of messages.
 
-use crate::Number;
+use crate::{Member, Number};
 
 view! {
     /// How long and how often messages may be.
@@ -89,5 +89,48 @@ view! {
         default_state_interval: Number = "defaultStateInterval",
         /// Between two visualization messages.
         visualization_interval: Number = "visualizationInterval",
+    }
+}
+
+impl StringLimits {
+    /// Every limit of a length.
+    #[must_use]
+    pub const fn all(&self) -> [&Member<Number>; 6] {
+        [
+            &self.msg_len,
+            &self.topic_serial_len,
+            &self.topic_elem_len,
+            &self.id_len,
+            &self.enum_len,
+            &self.load_id_len,
+        ]
+    }
+}
+
+impl ArrayLimits {
+    /// Every limit.
+    #[must_use]
+    pub const fn all(&self) -> [&Member<Number>; 19] {
+        [
+            &self.order_nodes,
+            &self.order_edges,
+            &self.node_actions,
+            &self.edge_actions,
+            &self.action_parameters,
+            &self.instant_actions,
+            &self.knot_vector,
+            &self.control_points,
+            &self.zones,
+            &self.node_states,
+            &self.edge_states,
+            &self.loads,
+            &self.action_states,
+            &self.instant_action_states,
+            &self.zone_action_states,
+            &self.errors,
+            &self.information,
+            &self.error_references,
+            &self.info_references,
+        ]
     }
 }
