@@ -6,14 +6,15 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde_json::Value;
 use tck_base::clock::Moment;
-use tck_base::pattern::whole;
+use tck_view::{
+    ArrayLimits, FactsheetView, List, Member, Number, OfferedAction, OfferedParameter, OptionalParameter, StringLimits,
+    Text,
+};
 
-use crate::members::{ELEMENTS, elements, text};
+use crate::members::ELEMENTS;
 use crate::observation::Observation;
 use crate::setting::Setting;
-use tck_view::Topic;
 
 /// What a factsheet says about an action.
 #[derive(Clone, Debug, Default)]
@@ -43,86 +44,100 @@ pub struct Factsheet {
     pub actions: Option<BTreeMap<String, Offered>>,
     /// loadPositions.
     pub load_positions: Vec<String>,
-    /// maxStringLens, without those that are 0.
-    pub strings: BTreeMap<String, u64>,
-    /// idNumericalOnly.
-    pub numerical: bool,
-    /// maxArrayLens, without those that are 0.
-    pub arrays: BTreeMap<String, u64>,
+    /// All of it as it was read.
+    pub view: Arc<FactsheetView>,
     /// minOrderInterval in seconds.
     pub interval: f64,
 }
 
-fn texts(value: Option<&Value>) -> Option<Vec<String>> {
-    let list = value?.as_array()?.iter().take(ELEMENTS);
-    Some(list.filter_map(|text| Some(text.as_str()?.to_owned())).collect())
+fn texts(list: &Member<List<Member<Text>>>) -> Vec<String> {
+    list.iter()
+        .take(ELEMENTS)
+        .filter_map(|text| Some(text.text()?.to_owned()))
+        .collect()
 }
 
-fn limits(value: Option<&Value>) -> BTreeMap<String, u64> {
-    let members = value.and_then(Value::as_object).into_iter().flatten().take(ELEMENTS);
-    let all = members.filter_map(|(name, limit)| {
-        let limit = whole(limit).filter(|limit| *limit > 0)?;
-        Some((name.clone(), limit))
-    });
-    all.collect()
+/// A limit of a length; 0 is none.
+fn limit(member: &Member<Number>) -> Option<u64> {
+    member.whole().filter(|limit| *limit > 0)
 }
 
 impl Offered {
-    fn read(action: &Value) -> Self {
-        let listed = action.get("actionParameters").and_then(Value::as_array);
-        let parameters = listed.map(|list| {
-            let all = list.iter().take(ELEMENTS).map(|parameter| {
-                let optional = parameter.get("isOptional").and_then(Value::as_bool).unwrap_or_default();
-                (text(parameter, "key").to_owned(), optional)
-            });
+    fn read(action: &OfferedAction) -> Self {
+        let listed = || action.action_parameters.iter().take(ELEMENTS);
+        let key = |parameter: &OfferedParameter| parameter.key.or_empty().to_owned();
+        let parameters = action.action_parameters.is_there().then(|| {
+            let all = listed().map(|parameter| (key(parameter), parameter.is_optional.is(true)));
             all.collect()
         });
-        let typed = listed.into_iter().flatten().take(ELEMENTS).filter_map(|parameter| {
-            let kind = parameter.get("valueDataType")?.as_str()?;
-            Some((text(parameter, "key").to_owned(), kind.chars().take(32).collect()))
+        let typed = listed().filter_map(|parameter| {
+            let kind = parameter.value_data_type.text()?;
+            Some((key(parameter), kind.chars().take(32).collect()))
         });
         Self {
             types: typed.collect(),
-            scopes: texts(action.get("actionScopes")).unwrap_or_default(),
-            blocking: texts(action.get("blockingTypes")).filter(|types| !types.is_empty()),
+            scopes: texts(&action.action_scopes),
+            blocking: Some(texts(&action.blocking_types)).filter(|types| !types.is_empty()),
             parameters,
         }
     }
 }
 
 impl Factsheet {
-    fn read(value: &Value) -> Self {
-        let at = |pointer: &str| value.pointer(pointer);
-        let navigation = texts(at("/typeSpecification/navigationTypes")).unwrap_or_default();
-        let localization = texts(at("/typeSpecification/localizationTypes")).unwrap_or_default();
+    fn read(view: &Arc<FactsheetView>) -> Self {
+        let kind = view.type_specification.there();
+        let navigation = kind.map(|kind| texts(&kind.navigation_types)).unwrap_or_default();
+        let localization = kind.map(|kind| texts(&kind.localization_types)).unwrap_or_default();
         let marks = |kind: &String| matches!(kind.as_str(), "RFID" | "DMC" | "SPOT");
-        let features = at("/protocolFeatures");
-        let listed = features.and_then(|features| features.get("optionalParameters")?.as_array());
-        let names = |support: &str| {
-            let all = listed.into_iter().flatten().take(ELEMENTS);
-            let some = all.filter(move |one| support.is_empty() || text(one, "support") == support);
-            some.map(|one| text(one, "parameter").to_owned()).collect::<Vec<_>>()
+        let features = view.protocol_features.there();
+        let names = |wanted: fn(&OptionalParameter) -> bool| {
+            let some = view.optional_parameters().take(ELEMENTS).filter(move |one| wanted(one));
+            some.map(|one| one.parameter.or_empty().to_owned()).collect::<Vec<_>>()
         };
-        let offered = features.filter(|features| features.get("agvActions").is_some_and(Value::is_array));
-        let actions = offered.map(|features| {
-            let all = elements(features, "agvActions").take(ELEMENTS);
-            all.map(|action| (text(action, "actionType").to_owned(), Offered::read(action)))
-                .collect::<BTreeMap<_, _>>()
-        });
+        let lists = features.is_some_and(|features| features.optional_parameters.is_there());
+        let actions = view.offered_actions().take(ELEMENTS);
+        let actions: BTreeMap<_, _> = actions
+            .map(|action| (action.action_type.or_empty().to_owned(), Offered::read(action)))
+            .collect();
+        let loads = view.load_specification.there();
+        let interval = view.timing().and_then(|timing| timing.min_order_interval.float());
         Self {
             line_guided: navigation.is_empty() || navigation.iter().any(|kind| kind.contains("LINE_GUIDED")),
             on_nodes_only: !localization.is_empty() && localization.iter().all(marks),
-            supported: listed.map(|_| names("")),
-            required: names("REQUIRED"),
-            actions: actions.filter(|actions| !actions.is_empty()),
-            load_positions: texts(at("/loadSpecification/loadPositions")).unwrap_or_default(),
-            strings: limits(at("/protocolLimits/maxStringLens")),
-            numerical: at("/protocolLimits/maxStringLens/idNumericalOnly") == Some(&Value::Bool(true)),
-            arrays: limits(at("/protocolLimits/maxArrayLens")),
-            interval: at("/protocolLimits/timing/minOrderInterval")
-                .and_then(Value::as_f64)
-                .unwrap_or_default(),
+            supported: lists.then(|| names(|_| true)),
+            required: names(|one| one.support.is("REQUIRED")),
+            actions: Some(actions).filter(|actions| !actions.is_empty()),
+            load_positions: loads.map(|loads| texts(&loads.load_positions)).unwrap_or_default(),
+            interval: interval.unwrap_or_default(),
+            view: Arc::clone(view),
         }
+    }
+
+    /// How long a text, or a whole message, may be, where that is limited.
+    #[must_use]
+    pub fn string_limit(&self, of: fn(&StringLimits) -> &Member<Number>) -> Option<u64> {
+        limit(of(self.view.string_limits()?))
+    }
+
+    /// How long a list may be, where that is limited.
+    #[must_use]
+    pub fn array_limit(&self, of: fn(&ArrayLimits) -> &Member<Number>) -> Option<u64> {
+        limit(of(self.view.array_limits()?))
+    }
+
+    /// Whether ids are to be made of digits only.
+    #[must_use]
+    pub fn wants_digits(&self) -> bool {
+        let strings = self.view.string_limits();
+        strings.is_some_and(|strings| strings.id_numerical_only.is(true))
+    }
+
+    /// Whether it limits the length of anything, or wants digits.
+    #[must_use]
+    pub fn is_limited(&self) -> bool {
+        let strings = self.view.string_limits().into_iter().flat_map(StringLimits::all);
+        let arrays = self.view.array_limits().into_iter().flat_map(ArrayLimits::all);
+        self.wants_digits() || strings.chain(arrays).any(|member| limit(member).is_some())
     }
 }
 
@@ -160,7 +175,7 @@ impl Factsheets {
 impl Factsheets {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>, setting: &Setting<'_>) {
-        let Some(value) = record.said_json(Topic::Factsheet) else {
+        let Some(view) = record.said_factsheet() else {
             return;
         };
         // It may get lost; the next one tells.
@@ -175,7 +190,7 @@ impl Factsheets {
             self.before.remove(0);
         }
         let until = now + setting.time.notice;
-        let new = Arc::new(Factsheet::read(value));
+        let new = Arc::new(Factsheet::read(view));
         self.before.extend(self.now.replace(new).map(|old| (old, until)));
         self.said = print;
         self.since = Some(now);

@@ -17,6 +17,7 @@ mod malformed;
 pub mod members;
 mod mock;
 mod observation;
+pub mod ordered;
 mod orders;
 mod pose;
 pub mod print;

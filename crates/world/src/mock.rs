@@ -2,15 +2,14 @@
 
 use std::collections::VecDeque;
 
-use serde_json::Value;
 use tck_base::clock::Moment;
 use tck_journal::event::Event;
+use tck_view::{ErrorView, Field, OrderView, StateView};
 
-use crate::members::{ELEMENTS, elements, number, released, short, text};
+use crate::members::ELEMENTS;
 use crate::observation::Observation;
+use crate::ordered::short;
 use crate::setting::Setting;
-use crate::shown::is_taken_out;
-use tck_view::Topic;
 
 /// How many states are kept.
 const STATES: usize = 64;
@@ -45,36 +44,40 @@ pub struct ShownState {
 }
 
 impl ShownState {
-    fn read(state: &Value, at: Moment) -> Self {
+    fn read(state: &StateView, at: Moment) -> Self {
+        let nodes = state.node_states.iter().take(ELEMENTS).map(|node| &node.released);
+        let edges = state.edge_states.iter().take(ELEMENTS).map(|edge| &edge.released);
         let left = |wanted: bool| {
-            let of = |list| elements(state, list).take(ELEMENTS);
-            let all = of("nodeStates").chain(of("edgeStates"));
-            all.filter(|element| released(element) == Some(wanted)).count()
+            nodes
+                .clone()
+                .chain(edges.clone())
+                .filter(|released| released.is(wanted))
+                .count()
         };
-        let position = state
-            .get("agvPosition")
-            .filter(|position| position.get("positionInitialized") == Some(&Value::Bool(true)));
+        let position = state.position.there().filter(|position| position.initialized.is(true));
         let pose = position.and_then(|position| {
-            let member = |name: &str| position.get(name).and_then(Value::as_f64);
-            Some((member("x")?, member("y")?, short(position, "mapId").unwrap_or_default()))
+            let map = short(&position.map_id).unwrap_or_default();
+            Some((position.x.float()?, position.y.float()?, map))
         });
-        let actions: Vec<_> = elements(state, "actionStates")
+        let actions: Vec<_> = state
+            .action_states
+            .iter()
             .take(ELEMENTS)
             .map(|action| {
-                let member = |name| short(action, name).unwrap_or_default();
-                (member("actionId"), member("actionStatus"))
+                let id = short(&action.action_id).unwrap_or_default();
+                (id, short(&action.action_status).unwrap_or_default())
             })
             .collect();
         Self {
             at,
-            order: short(state, "orderId").unwrap_or_default(),
-            update: number(state, "orderUpdateId").unwrap_or_default(),
-            last_node: short(state, "lastNodeId").unwrap_or_default(),
+            order: short(&state.order_id).unwrap_or_default(),
+            update: state.order_update_id.whole().unwrap_or_default(),
+            last_node: short(&state.last_node_id).unwrap_or_default(),
             pose,
-            driving: state.get("driving") == Some(&Value::Bool(true)),
+            driving: state.driving.is(true),
             base: left(true),
             horizon: left(false),
-            mode: text(state, "operatingMode").chars().take(64).collect(),
+            mode: state.operating_mode.or_empty().chars().take(64).collect(),
             taken_out: is_taken_out(state),
             actions,
             refused: refused(state),
@@ -88,18 +91,26 @@ impl ShownState {
     }
 }
 
+/// Whether a state shows what takes a vehicle out of its order, but for a failed action.
+fn is_taken_out(state: &StateView) -> bool {
+    let manual = matches!(state.operating_mode.or_empty(), "MANUAL" | "SERVICE" | "TEACHIN");
+    let stopped = matches!(state.emergency_stop(), Some("AUTOACK" | "MANUAL" | "REMOTE"));
+    let fatal = |error: &ErrorView| !matches!(error.error_level.or_empty(), "WARNING" | "URGENT");
+    manual || stopped || state.errors.iter().any(fatal)
+}
+
 /// The orderUpdateIds of the order of this state that errors name.
-fn refused(state: &Value) -> Vec<u64> {
-    let order = text(state, "orderId");
-    let errors = elements(state, "errors").take(ELEMENTS);
+fn refused(state: &StateView) -> Vec<u64> {
+    let order = state.order_id.or_empty();
+    let errors = state.errors.iter().take(ELEMENTS);
     let named = errors.filter_map(|error| {
-        let value = |key: &str| {
-            let mut all = elements(error, "errorReferences").take(ELEMENTS);
-            let found = all.find(|reference| text(reference, "referenceKey") == key)?;
-            Some(text(found, "referenceValue"))
+        let value = |field: Field| {
+            let mut all = error.error_references.iter().take(ELEMENTS);
+            let found = all.find(|reference| reference.key.is(field.usual_name()))?;
+            Some(found.value.or_empty())
         };
-        let own = value("orderId").is_none_or(|id| id == order);
-        value("orderUpdateId").filter(|_| own)?.parse().ok()
+        let own = value(OrderView::order_id).is_none_or(|id| id == order);
+        value(OrderView::order_update_id).filter(|_| own)?.parse().ok()
     });
     named.collect()
 }
@@ -169,7 +180,7 @@ impl MockVehicle {
         if matches!(outside, Outside::Moved | Outside::Lost) {
             self.states.clear();
         }
-        if let Some(state) = record.said_json(Topic::State) {
+        if let Some(state) = record.said_state() {
             if self.states.len() == STATES {
                 self.states.pop_front();
             }

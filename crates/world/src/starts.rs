@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::Value;
+use tck_view::OrderView;
 
-use crate::members::{in_sequence, instant_actions, number, place_of, short, text};
+use crate::members::ELEMENTS;
 use crate::mock::MockVehicle;
 use crate::observation::Observation;
-use tck_view::Topic;
+use crate::ordered::{nodes_in_sequence, place_of, short};
 
 /// How many ids are remembered.
 const IDS: usize = 1024;
@@ -53,11 +53,12 @@ impl Starts {
         if vehicle.is_lost(record) {
             self.cancelled = false;
         }
-        if let Some(message) = record.delivered_json(Topic::InstantActions) {
-            self.cancelled |= instant_actions(message).any(|action| text(action, "actionType") == "cancelOrder");
+        if let Some(message) = record.instant_actions() {
+            let mut actions = message.commanded().take(ELEMENTS);
+            self.cancelled |= actions.any(|action| action.action_type.is("cancelOrder"));
         }
-        if let Some(order) = record.delivered_json(Topic::Order)
-            && let Some(id) = short(order, "orderId")
+        if let Some(order) = record.order()
+            && let Some(id) = short(&order.order_id)
         {
             self.begins(id, order, record.seq());
         }
@@ -65,7 +66,7 @@ impl Starts {
 }
 
 impl Starts {
-    fn begins(&mut self, id: String, order: &Value, seq: u64) {
+    fn begins(&mut self, id: String, order: &OrderView, seq: u64) {
         for (node, place) in self.latest.drain(..) {
             if self.places.len() < IDS || self.places.contains_key(&node) {
                 self.places.insert(node, place);
@@ -76,14 +77,14 @@ impl Starts {
         }
         let is_new = self.orders.insert(id);
         self.order = Some((seq, is_new, self.cancelled));
-        let nodes = in_sequence(order, "nodes");
-        let begins = number(order, "orderUpdateId").is_none_or(|update| update == 0);
+        let nodes = nodes_in_sequence(order);
+        let begins = order.order_update_id.whole().is_none_or(|update| update == 0);
         if is_new && begins && !nodes.is_empty() {
             self.cancelled = false;
         }
         let places = nodes.into_iter().filter_map(|node| {
             let (x, y, _) = place_of(node)?;
-            Some((short(node, "nodeId")?, (x, y)))
+            Some((short(&node.node_id)?, (x, y)))
         });
         self.latest = places.collect();
     }
