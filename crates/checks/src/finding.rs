@@ -1,9 +1,11 @@
 //! Findings, and how values of a device are shown in them.
 
-use serde_json::Value;
+use std::fmt::Display;
+
 use tck_base::verdict::Verdict;
 use tck_check::CheckFinding;
 use tck_pack::RequirementId;
+use tck_view::{Member, Shown};
 use tck_world::members::text;
 
 /// The header fields of every message.
@@ -11,7 +13,7 @@ pub(crate) const HEADER: [&str; 5] = ["headerId", "timestamp", "version", "manuf
 
 /// Whether a connection message says that the connection is broken. Spelled with or without underscore
 /// depending on the version.
-pub(crate) fn says_broken(message: &Value) -> bool {
+pub(crate) fn says_broken(message: &serde_json::Value) -> bool {
     text(message, "connectionState")
         .bytes()
         .filter(|byte| *byte != b'_')
@@ -45,8 +47,17 @@ pub(crate) fn unclear(requirement: &str, seq: u64, message: impl Into<String>) -
 }
 
 /// A value of a device, escaped and cut to a readable length.
-pub(crate) fn show(value: &Value) -> String {
+pub(crate) fn show(value: &impl Display) -> String {
     shorten(&value.to_string())
+}
+
+/// A member of a device as [`show`] shows it, or that it is missing.
+pub(crate) fn missing_or<T: Shown>(member: &Member<T>) -> String {
+    if member.is_absent() {
+        "missing".to_owned()
+    } else {
+        show(member)
+    }
 }
 
 /// A text of a device in quotes, escaped and cut to a readable length.

@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use super::{Command, ELEMENTS, Each, Found, parameter};
+use super::{Command, ELEMENTS, Each, Found};
 use crate::finding::{quote, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ActionView, LoadSpecification, Member, ProtocolFeatures, Scope};
 use tck_world::{Fact, Factsheet, Listen, Observation, Offered, Topic};
 
 /// `commands/scopes`.
@@ -20,7 +20,7 @@ pub(crate) const SCOPES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[ActionView::action_type],
     start: |_| Each::start(scopes),
 };
 
@@ -38,7 +38,7 @@ pub(crate) const IN_FACTSHEET: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ActionView::action_type, ProtocolFeatures::actions],
     start: |_| Box::new(InFactsheet),
 };
 
@@ -53,7 +53,7 @@ pub(crate) const LOAD_DEVICE: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ActionView::action_parameters, LoadSpecification::load_positions],
     start: |_| Box::new(LoadDevice),
 };
 
@@ -65,16 +65,17 @@ fn predefined<'c>(kind: &str, context: &'c CheckContext<'_>) -> Option<&'c Value
 fn scopes(command: Command<'_>, context: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let mut judged = false;
     for (scope, action) in command.actions() {
-        let kind = text(action, "actionType");
+        let kind = action.action_type.or_empty();
         let Some(known) = predefined(kind, context) else {
             continue;
         };
         judged = true;
-        if elements(known, "scopes").any(|allowed| allowed.as_str() == Some(scope)) {
+        let mut allowed = known.get("scopes").and_then(Value::as_array).into_iter().flatten();
+        if allowed.any(|allowed| allowed.as_str() == Some(scope.word())) {
             continue;
         }
-        let message = format!("{kind} is sent with scope {scope}");
-        if kind == "finePositioning" && scope == "INSTANT" {
+        let message = format!("{kind} is sent with scope {}", scope.word());
+        if kind == "finePositioning" && scope == Scope::Instant {
             found.remark("ACT-08", message);
         } else {
             found.broken("ACT-08", message);
@@ -103,7 +104,7 @@ impl Running for InFactsheet {
         let mut judged = false;
         for (scope, action) in command.actions() {
             // Without a type there is nothing to look up.
-            if text(action, "actionType").is_empty() {
+            if action.action_type.or_empty().is_empty() {
                 continue;
             }
             let mut wrong = Vec::new();
@@ -132,16 +133,21 @@ impl Running for InFactsheet {
 const ALWAYS: [&str; 3] = ["cancelOrder", "stateRequest", "factsheetRequest"];
 
 /// How an action deviates from a factsheet: whether that is certainly wrong, and in words.
-fn deviation(sheet: &Factsheet, scope: &str, action: &Value, context: &CheckContext<'_>) -> Option<(bool, String)> {
-    let kind = text(action, "actionType");
+fn deviation(
+    sheet: &Factsheet,
+    scope: Scope,
+    action: &ActionView,
+    context: &CheckContext<'_>,
+) -> Option<(bool, String)> {
+    let kind = action.action_type.or_empty();
     let name = quote(kind);
     let Some(offered) = sheet.actions.as_ref()?.get(kind) else {
         return (!ALWAYS.contains(&kind)).then(|| (true, format!("action {name} is not listed in the factsheet")));
     };
-    if !offered.scopes.is_empty() && !offered.scopes.iter().any(|listed| listed == scope) {
-        return Some((true, format!("action {name} is not listed with scope {scope}")));
+    if !offered.scopes.is_empty() && !offered.scopes.iter().any(|listed| listed == scope.word()) {
+        return Some((true, format!("action {name} is not listed with scope {}", scope.word())));
     }
-    let blocking = text(action, "blockingType");
+    let blocking = action.blocking_type.or_empty();
     let listed = offered.blocking.as_ref();
     if listed.is_some_and(|listed| !blocking.is_empty() && !listed.iter().any(|one| one == blocking)) {
         return Some((
@@ -152,18 +158,18 @@ fn deviation(sheet: &Factsheet, scope: &str, action: &Value, context: &CheckCont
     of_parameters(offered, action, context)
 }
 
-fn of_parameters(offered: &Offered, action: &Value, context: &CheckContext<'_>) -> Option<(bool, String)> {
-    let kind = text(action, "actionType");
+fn of_parameters(offered: &Offered, action: &ActionView, context: &CheckContext<'_>) -> Option<(bool, String)> {
+    let kind = action.action_type.or_empty();
     let listed = offered.parameters.as_ref()?;
     let missing = listed
         .iter()
-        .find(|(key, optional)| !**optional && parameter(action, key).is_none());
+        .find(|(key, optional)| !**optional && action.argument(key).is_absent());
     if let Some((key, _)) = missing {
         return Some((true, format!("action {} lacks parameter {}", quote(kind), quote(key))));
     }
-    let sent = elements(action, "actionParameters").take(ELEMENTS);
+    let sent = action.action_parameters.iter().take(ELEMENTS);
     let further = sent
-        .map(|parameter| text(parameter, "key"))
+        .map(|parameter| parameter.key.or_empty())
         .find(|key| !listed.contains_key(*key))?;
     let known = predefined(kind, context).and_then(|known| known.get("parameters")?.get(further));
     let message = format!(
@@ -193,17 +199,13 @@ impl Running for LoadDevice {
         let mut found = Found::new(record, findings);
         let mut judged = false;
         let picks = command.actions().into_iter().map(|(_, action)| action);
-        for pick in picks.filter(|action| text(action, "actionType") == "pick") {
+        for pick in picks.filter(|action| action.action_type.or_empty() == "pick") {
             judged = true;
-            match parameter(pick, "lhd") {
-                None => found.broken("ACT-32", "a pick for a vehicle with several load positions has no lhd"),
-                Some(lhd) => {
-                    let names = |sheet: &Factsheet| {
-                        sheet
-                            .load_positions
-                            .iter()
-                            .any(|one| Some(one.as_str()) == lhd.as_str())
-                    };
+            match pick.argument("lhd") {
+                Member::Absent => found.broken("ACT-32", "a pick for a vehicle with several load positions has no lhd"),
+                lhd => {
+                    let names =
+                        |sheet: &Factsheet| sheet.load_positions.iter().any(|one| Some(one.as_str()) == lhd.text());
                     if !sheets.iter().any(|sheet| names(sheet)) {
                         let text = format!("lhd {} of a pick is none of the load positions", show(lhd));
                         found.broken("ACT-32", text);

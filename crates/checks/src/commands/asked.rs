@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{Command, Found};
 use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::text;
+use tck_view::ActionView;
 use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
@@ -19,7 +19,7 @@ pub(crate) const NOT_ASKED: Check = Check {
     arguments: &["types", "except"],
     listens: &[Listen::Delivered(Topic::InstantActions)],
     reads: &[],
-    needs: &[],
+    needs: &[ActionView::action_type],
     start: |context| {
         let list = |name: &str| -> Option<Vec<String>> {
             let list = context.with.get(name)?.as_array()?;
@@ -58,7 +58,7 @@ impl Running for NotAsked {
         };
         let mut found = Found::new(record, findings);
         for (_, action) in command.actions() {
-            let kind = text(action, "actionType");
+            let kind = action.action_type.or_empty();
             if self.forbids(kind) {
                 found.push(CheckFinding {
                     requirement: None,

@@ -1,11 +1,10 @@
 //! Nothing is sent to a vehicle that is known to be gone.
 
 use super::{Command, Found};
-use crate::finding::says_broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
-use tck_world::members::text;
+use tck_view::ConnectionView;
 use tck_world::{Listen, Observation, Topic};
 
 /// `commands/while-away`.
@@ -25,7 +24,7 @@ pub(crate) const AWAY: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[ConnectionView::connection_state],
     start: |_| Box::new(Away::default()),
 };
 
@@ -53,9 +52,9 @@ impl Running for Away {
             Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => self.delay(now),
             _ => {}
         }
-        if let Some(message) = record.said_json(Topic::Connection) {
-            let state = text(message, "connectionState");
-            let gone = says_broken(message) || Some(state) == context.pack.word("connection.offline");
+        if let Some(message) = record.said_connection() {
+            let state = message.connection_state.or_empty();
+            let gone = message.is_broken() || Some(state) == context.pack.word("connection.offline");
             self.since = gone.then(|| (now, state.chars().take(64).collect()));
             return gone;
         }
@@ -70,7 +69,7 @@ impl Running for Away {
         let mut kinds = command
             .actions()
             .into_iter()
-            .map(|(_, action)| text(action, "actionType"));
+            .map(|(_, action)| action.action_type.or_empty());
         let what = match command {
             Command::Order(_) => "an order",
             Command::Instant(_) if kinds.all(asks) => return true,

@@ -1,9 +1,9 @@
 //! Coordinates of orders against those of a vehicle that stands where it was put.
 
-use super::{Command, Found, in_sequence, place_of};
+use super::{Command, Found, nodes_in_sequence, place_of};
 use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::text;
+use tck_view::{Node, StateView};
 use tck_world::{Fact, Listen, Observation, Outside, Topic};
 
 /// `commands/axes`.
@@ -21,7 +21,7 @@ pub(crate) const AXES: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[Node::node_id, Node::node_position, StateView::position],
     start: |_| Box::new(Axes::default()),
 };
 
@@ -53,8 +53,8 @@ impl Running for Axes {
         if self.driven || context.world.mock().unsettled(record, context) {
             return false;
         }
-        let nodes = in_sequence(order, "nodes");
-        let here = nodes.iter().find(|node| text(node, "nodeId") == seen.last_node);
+        let nodes = nodes_in_sequence(order);
+        let here = nodes.iter().find(|node| node.node_id.or_empty() == seen.last_node);
         let Some((node_x, node_y, map)) = here.and_then(|node| place_of(node)) else {
             return false;
         };

@@ -3,14 +3,12 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use serde_json::Value;
-
 use super::graph::is_counted;
-use super::{Command, ELEMENTS, Found, released, short};
+use super::{Command, Found, elements, short};
 use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, number, text};
+use tck_view::{Node, OrderView, StateView};
 use tck_world::{Fact, Listen, Observation, Outside, ShownState};
 
 /// See the module.
@@ -25,7 +23,7 @@ pub(crate) const BASE_KEPT: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[OrderView::order_id, Node::sequence_id, StateView::node_states],
     start: |_| Box::new(BaseKept::default()),
 };
 
@@ -133,13 +131,13 @@ impl Running for BaseKept {
         };
         let Command::Order(order) = command else {
             for (_, action) in command.actions() {
-                if text(action, "actionType") == "cancelOrder" {
-                    self.cancel = short(action, "actionId").map(|id| (id, record.at().moment));
+                if action.action_type.or_empty() == "cancelOrder" {
+                    self.cancel = short(&action.action_id).map(|id| (id, record.at().moment));
                 }
             }
             return false;
         };
-        let Some(id) = short(order, "orderId") else {
+        let Some(id) = short(&order.order_id) else {
             return false;
         };
         let mut found = Found::new(record, findings);
@@ -165,12 +163,12 @@ impl Running for BaseKept {
             self.order = id;
         } else if self.cancel.is_none() && self.is_busy(context) {
             judged = self.replaced(order, &mut found);
-        } else if let Some(update) = number(order, "orderUpdateId") {
+        } else if let Some(update) = order.order_update_id.whole() {
             judged = self.continued(update, record.at().moment, context, &mut found);
         }
-        self.newest = self.newest.max(number(order, "orderUpdateId"));
+        self.newest = self.newest.max(order.order_update_id.whole());
         for (_, action) in command.actions() {
-            if let Some(id) = short(action, "actionId").filter(|_| self.actions.len() < KEPT) {
+            if let Some(id) = short(&action.action_id).filter(|_| self.actions.len() < KEPT) {
                 self.actions.insert(id);
             }
         }
@@ -186,7 +184,7 @@ impl Running for BaseKept {
 
 impl BaseKept {
     /// An update with other elements in the place of released ones.
-    fn replaced(&self, order: &Value, found: &mut Found<'_>) -> bool {
+    fn replaced(&self, order: &OrderView, found: &mut Found<'_>) -> bool {
         let other = released_elements(order).find_map(|(sequence, id)| {
             let known = self.base.get(&sequence).filter(|known| **known != id)?;
             Some((sequence, known, id))
@@ -195,9 +193,7 @@ impl BaseKept {
             return false;
         };
         // Numbers that begin anew are another mistake.
-        let first = elements(order, "nodes")
-            .filter_map(|node| number(node, "sequenceId"))
-            .min();
+        let first = order.nodes.iter().filter_map(|node| node.sequence_id.whole()).min();
         let restarted = first.is_some_and(|first| {
             self.base
                 .keys()
@@ -227,12 +223,7 @@ fn status<'s>(seen: &'s ShownState, id: &str) -> Option<&'s str> {
     all.find(|(action, _)| action == id).map(|(_, status)| status.as_str())
 }
 
-fn released_elements(order: &Value) -> impl Iterator<Item = (u64, String)> {
-    [("nodes", "nodeId"), ("edges", "edgeId")]
-        .into_iter()
-        .flat_map(move |(list, id)| {
-            let all = elements(order, list).take(ELEMENTS);
-            let base = all.filter(|element| released(element) == Some(true));
-            base.filter_map(move |element| Some((number(element, "sequenceId")?, short(element, id)?)))
-        })
+fn released_elements(order: &OrderView) -> impl Iterator<Item = (u64, String)> {
+    let base = elements(order).filter(|element| element.released().is(true));
+    base.filter_map(|element| Some((element.sequence_id().whole()?, short(element.id())?)))
 }

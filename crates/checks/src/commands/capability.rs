@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{Command, ELEMENTS, Found};
 use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::elements;
+use tck_view::{ActionView, Edge, Field, Names, Node, NodePosition, OrderView, Presence, ProtocolFeatures};
 use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/optional-fields`.
@@ -18,7 +18,7 @@ pub(crate) const OPTIONAL: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ProtocolFeatures::optional_parameters],
     start: |_| Box::new(Optional),
 };
 
@@ -31,58 +31,63 @@ pub(crate) const REQUIRED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ProtocolFeatures::optional_parameters],
     start: |_| Box::new(Required),
 };
 
-/// Optional fields by the list they belong to.
-const OF_NODE: [&str; 1] = ["nodeDescription"];
-const OF_POSITION: [&str; 4] = ["theta", "allowedDeviationXY", "allowedDeviationTheta", "mapDescription"];
-const OF_EDGE: [&str; 12] = [
-    "edgeDescription",
-    "maxSpeed",
-    "maxHeight",
-    "minHeight",
-    "orientation",
-    "orientationType",
-    "direction",
-    "rotationAllowed",
-    "maxRotationSpeed",
-    "trajectory",
-    "length",
-    "corridor",
+/// Optional fields by what they belong to.
+const OF_POSITION: [Field; 4] = [
+    NodePosition::theta,
+    NodePosition::allowed_deviation_xy,
+    NodePosition::allowed_deviation_theta,
+    NodePosition::map_description,
+];
+const OF_EDGE: [Field; 12] = [
+    Edge::edge_description,
+    Edge::max_speed,
+    Edge::max_height,
+    Edge::min_height,
+    Edge::orientation,
+    Edge::orientation_type,
+    Edge::direction,
+    Edge::rotation_allowed,
+    Edge::max_rotation_speed,
+    Edge::trajectory,
+    Edge::length,
+    Edge::corridor,
 ];
 
 /// The optional fields of an order that are there, by their full names.
-fn present(order: &Value) -> Vec<String> {
-    let mut all = Vec::new();
-    let mut add = |value: &Value, prefix: &str, names: &[&str]| {
-        for name in names {
-            if value.get(*name).is_some_and(|field| !field.is_null()) {
-                let full = format!("{prefix}.{name}");
-                if !all.contains(&full) {
-                    all.push(full);
-                }
-            }
+fn present(order: &OrderView, names: &Names) -> Vec<String> {
+    let mut found: Vec<(&str, Field)> = Vec::new();
+    let mut add = |prefix: &'static str, field: Field, presence: Presence| {
+        if presence.is_something() && !found.contains(&(prefix, field)) {
+            found.push((prefix, field));
         }
     };
-    add(order, "order", &["zoneSetId"]);
-    for node in elements(order, "nodes").take(ELEMENTS) {
-        add(node, "order.nodes", &OF_NODE);
-        if let Some(position) = node.get("nodePosition") {
-            add(position, "order.nodes.nodePosition", &OF_POSITION);
+    let described = ActionView::action_description;
+    add("order", OrderView::zone_set_id, order.zone_set_id.presence());
+    for node in order.nodes.iter().take(ELEMENTS) {
+        add("order.nodes", Node::node_description, node.node_description.presence());
+        if let Some(position) = node.node_position.there() {
+            for field in OF_POSITION {
+                add("order.nodes.nodePosition", field, position.presence(field));
+            }
         }
-        for action in elements(node, "actions").take(ELEMENTS) {
-            add(action, "order.nodes.actions", &["actionDescription"]);
-        }
-    }
-    for edge in elements(order, "edges").take(ELEMENTS) {
-        add(edge, "order.edges", &OF_EDGE);
-        for action in elements(edge, "actions").take(ELEMENTS) {
-            add(action, "order.edges.actions", &["actionDescription"]);
+        for action in node.actions.iter().take(ELEMENTS) {
+            add("order.nodes.actions", described, action.action_description.presence());
         }
     }
-    all
+    for edge in order.edges.iter().take(ELEMENTS) {
+        for field in OF_EDGE {
+            add("order.edges", field, edge.presence(field));
+        }
+        for action in edge.actions.iter().take(ELEMENTS) {
+            add("order.edges.actions", described, action.action_description.presence());
+        }
+    }
+    let full = |(prefix, field): (&str, Field)| Some(format!("{prefix}.{}", names.name(field)?));
+    found.into_iter().filter_map(full).collect()
 }
 
 /// Whether a factsheet lists a field: under its full name, under the end of it, or with what it belongs to.
@@ -111,7 +116,7 @@ impl Running for Optional {
             return false;
         }
         let mut found = Found::new(record, findings);
-        for field in present(order) {
+        for field in present(order, record.names()) {
             if sheets.iter().any(|sheet| lists(sheet, &field)) {
                 continue;
             }
@@ -135,8 +140,10 @@ impl Running for Required {
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        let order = Command::read(record).and_then(Command::order);
-        let Some(order) = order else { return false };
+        // The factsheet gives the names of what is looked for.
+        let Some(order) = record.delivered_json(Topic::Order) else {
+            return false;
+        };
         let sheets = context.world.factsheets().valid(record, context);
         let Some((first, others)) = sheets.split_first() else {
             return false;

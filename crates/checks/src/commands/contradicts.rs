@@ -4,7 +4,7 @@ use super::{Command, Found};
 use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::text;
+use tck_view::{ActionView, Scope, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/contradicts`.
@@ -23,7 +23,7 @@ pub(crate) const CONTRADICTS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[ActionView::action_type, StateView::node_states],
     start: |_| Box::new(Contradicts::default()),
 };
 
@@ -43,15 +43,18 @@ impl Running for Contradicts {
         if context.world.mock().is_lost(record) {
             self.since = None;
         }
-        if record.said_json(Topic::State).is_some() {
+        if record.said_state().is_some() {
             let busy = context.world.mock().last().filter(|seen| seen.base > 0);
             self.since = busy.map(|seen| self.since.unwrap_or(seen.at));
         }
         let Some(command) = Command::read(record) else {
             return false;
         };
-        let actions = command.actions().into_iter().filter(|(scope, _)| *scope == "INSTANT");
-        let kinds: Vec<&str> = actions.map(|(_, action)| text(action, "actionType")).collect();
+        let actions = command
+            .actions()
+            .into_iter()
+            .filter(|(scope, _)| *scope == Scope::Instant);
+        let kinds: Vec<&str> = actions.map(|(_, action)| action.action_type.or_empty()).collect();
         if kinds.contains(&"cancelOrder") {
             self.since = None;
         }

@@ -1,12 +1,15 @@
 //! Corridors that are sent with edges.
 
+use std::borrow::Cow;
+
 use serde_json::Value;
 
-use super::{Command, Found, in_sequence, place_of};
-use crate::finding::{quote, show};
-use tck_base::nurbs::{Curve, Path};
+use super::{Command, Found, allowed_deviation, edges_in_sequence, nodes_in_sequence, place_of};
+use crate::finding::{missing_or, quote, show};
+use tck_base::nurbs::Path;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{Corridor, Edge, Member, Node};
+use tck_world::ordered::curve;
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/corridors`.
@@ -34,24 +37,25 @@ struct Corridors {
     plans: bool,
 }
 
-fn corridor(edge: &Value) -> Option<&Value> {
-    edge.get("corridor").filter(|corridor| !corridor.is_null())
-}
-
-fn width(corridor: &Value, name: &str) -> Option<f64> {
-    corridor.get(name).and_then(Value::as_f64)
+/// The corridor of an edge; one without members where something else stands in its place.
+fn corridor(edge: &Edge) -> Option<Cow<'_, Corridor>> {
+    match &edge.corridor {
+        Member::There(corridor) => Some(Cow::Borrowed(corridor)),
+        Member::Other(_) => Some(Cow::Owned(Corridor::default())),
+        Member::Absent | Member::Null => None,
+    }
 }
 
 /// Both widths, if they make sense: left, right.
-fn widths(edge: &Value) -> Option<(f64, f64)> {
+fn widths(edge: &Edge) -> Option<(f64, f64)> {
     let corridor = corridor(edge)?;
-    let (left, right) = (width(corridor, "leftWidth")?, width(corridor, "rightWidth")?);
+    let (left, right) = (corridor.left_width.float()?, corridor.right_width.float()?);
     (left >= 0.0 && right >= 0.0).then_some((left, right))
 }
 
-fn path(edge: &Value, from: &Value, to: &Value) -> Option<Path> {
-    if let Some(trajectory) = edge.get("trajectory").filter(|trajectory| !trajectory.is_null()) {
-        return Curve::read(trajectory).0.map(|curve| curve.path());
+fn path(edge: &Edge, from: &Node, to: &Node) -> Option<Path> {
+    if edge.trajectory.presence().is_something() {
+        return curve(edge.trajectory.there()?).0.map(|curve| curve.path());
     }
     let ((ax, ay, _), (bx, by, _)) = (place_of(from)?, place_of(to)?);
     Some(Path::through([(ax, ay), (bx, by)]))
@@ -64,12 +68,12 @@ impl Running for Corridors {
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        if let Some(state) = record.said_json(Topic::State) {
-            self.plans |= elements(state, "edgeStates").any(|edge| edge.get("trajectory").is_some());
+        if let Some(state) = record.said_state() {
+            self.plans |= state.edge_states.iter().any(|edge| !edge.trajectory.is_absent());
         }
         let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
-        let edges = in_sequence(order, "edges");
+        let edges = edges_in_sequence(order);
         if !edges.iter().any(|edge| corridor(edge).is_some()) {
             return false;
         }
@@ -78,13 +82,16 @@ impl Running for Corridors {
         let bound = self.plans || sheets.is_empty() || sheets.iter().any(|sheet| sheet.line_guided);
         for edge in &edges {
             let Some(corridor) = corridor(edge) else { continue };
-            by_itself(corridor, edge, context, &mut found);
-            if !bound && edge.get("trajectory").is_none_or(Value::is_null) {
-                let text = format!("edge {} has a corridor and no trajectory", quote(text(edge, "edgeId")));
+            by_itself(&corridor, edge, context, &mut found);
+            if !bound && !edge.trajectory.presence().is_something() {
+                let text = format!(
+                    "edge {} has a corridor and no trajectory",
+                    quote(edge.edge_id.or_empty())
+                );
                 found.broken("CORR-02", text);
             }
         }
-        let nodes = in_sequence(order, "nodes");
+        let nodes = nodes_in_sequence(order);
         if nodes.len() == edges.len() + 1 {
             if let (Some(edge), Some(node)) = (edges.first(), nodes.first()) {
                 beginning(edge, node, &mut found);
@@ -97,47 +104,54 @@ impl Running for Corridors {
     }
 }
 
-fn by_itself(corridor: &Value, edge: &Value, context: &CheckContext<'_>, found: &mut Found<'_>) {
-    let id = quote(text(edge, "edgeId"));
+fn by_itself(corridor: &Corridor, edge: &Edge, context: &CheckContext<'_>, found: &mut Found<'_>) {
+    let id = quote(edge.edge_id.or_empty());
     let mut zero = true;
-    for name in ["leftWidth", "rightWidth"] {
-        let value = width(corridor, name);
+    for (name, width) in [
+        ("leftWidth", &corridor.left_width),
+        ("rightWidth", &corridor.right_width),
+    ] {
+        let value = width.float();
         zero &= value == Some(0.0);
         if value.is_none_or(|value| value < 0.0) {
-            let shown = corridor.get(name).map_or_else(|| "missing".to_owned(), show);
+            let shown = missing_or(width);
             found.broken("CORR-09", format!("{name} of the corridor of edge {id} is {shown}"));
         }
     }
     if zero {
         found.broken("CORR-05", format!("the corridor of edge {id} has no width"));
     }
-    let names = ["corridorRefPoint", "corridorReferencePoint"];
-    if let Some(point) = names.iter().find_map(|name| corridor.get(*name)) {
+    let point = &corridor.reference_point;
+    if !point.is_absent() {
         let known = context
             .pack
             .vocabulary()
             .get("corridorReference")
             .and_then(Value::as_object);
-        if known.is_some_and(|known| !known.values().any(|known| known == point)) {
+        if known.is_some_and(|known| {
+            !known
+                .values()
+                .any(|known| known.as_str().is_some_and(|known| point.is(known)))
+        }) {
             found.broken("CORR-09", format!("corridorRefPoint of edge {id} is {}", show(point)));
         }
     }
 }
 
 /// The first node, behind no other corridor: where the vehicle may be on it, it is inside the corridor that begins there.
-fn beginning(edge: &Value, node: &Value, found: &mut Found<'_>) {
-    let allowed = node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64);
+fn beginning(edge: &Edge, node: &Node, found: &mut Found<'_>) {
+    let allowed = allowed_deviation(node);
     let (Some((left, right)), Some(allowed)) = (widths(edge), allowed) else {
         return;
     };
     if left + right > 0.0 && allowed > left.max(right) + ROUNDING {
-        let id = quote(text(node, "nodeId"));
+        let id = quote(node.node_id.or_empty());
         let text = format!("node {id} allows {allowed} m, the corridor that begins there is narrower to both sides");
         found.remark("CORR-04", text);
     }
 }
 
-fn meeting(pair: &[&Value], around: &[&Value], found: &mut Found<'_>) {
+fn meeting(pair: &[&Edge], around: &[&Node], found: &mut Found<'_>) {
     let ([first, second], [from, node, to]) = (pair, around) else {
         return;
     };
@@ -154,7 +168,7 @@ fn meeting(pair: &[&Value], around: &[&Value], found: &mut Found<'_>) {
         return;
     };
     let room = if beside.left { left } else { right };
-    let id = quote(text(node, "nodeId"));
+    let id = quote(node.node_id.or_empty());
     if beside.distance > room + ROUNDING {
         let text = format!(
             "at node {id} the way ends {:.2} m beside the next corridor",
@@ -171,7 +185,7 @@ fn meeting(pair: &[&Value], around: &[&Value], found: &mut Found<'_>) {
         found.remark("CORR-04", text);
         return;
     }
-    let allowed = node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64);
+    let allowed = allowed_deviation(node);
     let reach = before_left.max(before_right);
     let wide = |allowed: f64| allowed.min(reach) > left.max(right) + ROUNDING || allowed > left + right + ROUNDING;
     if let Some(allowed) = allowed.filter(|allowed| wide(*allowed)) {

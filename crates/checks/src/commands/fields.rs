@@ -3,13 +3,14 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use regex::Regex;
-use serde_json::Value;
-
-use super::{Command, ELEMENTS, Each, Found, in_sequence};
+use super::{Command, Each, Found, elements, nodes_in_sequence};
 use crate::finding::{quote, show};
+use regex::Regex;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{
+    ActionView, Deviation, Edge, Element, Field, InstantActionsView, Member, MessageView, Node, NodePosition,
+    OrderView, Text,
+};
 use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/arrays`.
@@ -20,7 +21,7 @@ pub(crate) const ARRAYS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[OrderView::edges, Node::actions, Edge::actions],
     start: |_| Each::start(arrays),
 };
 
@@ -33,7 +34,7 @@ pub(crate) const POSITION_RANGE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[Node::node_position],
     start: |_| Each::start(position_range),
 };
 
@@ -46,7 +47,7 @@ pub(crate) const ZONE_SET: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[OrderView::zone_set_id],
     start: |_| Box::new(ZoneSet),
 };
 
@@ -61,7 +62,7 @@ pub(crate) const IDENTIFIERS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[OrderView::order_id, ActionView::action_id],
     start: |_| Each::start(identifiers),
 };
 
@@ -77,8 +78,8 @@ pub(crate) const TOPICS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
-    needs: &[],
-    start: |_| Each::start(topics),
+    needs: &[OrderView::nodes, InstantActionsView::actions],
+    start: |_| Box::new(Topics),
 };
 
 /// `commands/node-position`.
@@ -90,7 +91,7 @@ pub(crate) const POSITION: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[Node::node_position],
     start: |_| Box::new(Position),
 };
 
@@ -103,21 +104,16 @@ static IDENTIFIER: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(r"^[A-Z
 
 fn arrays(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let Some(order) = command.order() else { return false };
-    if order.get("nodes").is_none() {
+    if order.nodes.is_absent() {
         return false;
     }
-    if order.get("edges").is_none() {
+    if order.edges.is_absent() {
         found.broken("ORD-MSG-06", "edges is left out");
     }
-    for (list, id) in [("nodes", "nodeId"), ("edges", "edgeId")] {
-        for element in elements(order, list)
-            .take(ELEMENTS)
-            .filter(|element| element.is_object())
-        {
-            if element.get("actions").is_none() {
-                let id = quote(text(element, id));
-                found.broken("ORD-MSG-06", format!("actions of {id} is left out"));
-            }
+    for element in elements(order).filter(|element| element.is_object()) {
+        if element.actions().is_absent() {
+            let id = quote(element.id().or_empty());
+            found.broken("ORD-MSG-06", format!("actions of {id} is left out"));
         }
     }
     true
@@ -126,31 +122,36 @@ fn arrays(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> 
 fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let Some(order) = command.order() else { return false };
     let mut judged = false;
-    for node in in_sequence(order, "nodes") {
-        let Some(position) = node.get("nodePosition").filter(|position| position.is_object()) else {
+    for node in nodes_in_sequence(order) {
+        let Some(position) = node.node_position.there() else {
             continue;
         };
         judged = true;
-        let id = quote(text(node, "nodeId"));
-        let number = |name: &str| position.get(name).and_then(Value::as_f64);
-        if let Some(theta) = number("theta").filter(|theta| theta.abs() > PI + ROUNDING) {
+        let id = quote(node.node_id.or_empty());
+        if let Some(theta) = position.theta.float().filter(|theta| theta.abs() > PI + ROUNDING) {
             let text = format!("theta {theta} of node {id} is not between minus pi and pi");
             found.broken("ORD-MSG-09", text.clone());
             found.broken("MAP-02", text);
         }
-        if let Some(allowed) = number("allowedDeviationXY").filter(|allowed| *allowed < 0.0) {
+        if let Some(allowed) = position
+            .allowed_deviation_xy
+            .there()
+            .and_then(Deviation::radius)
+            .filter(|allowed| *allowed < 0.0)
+        {
             found.broken(
                 "ORD-MSG-09",
                 format!("allowedDeviationXY {allowed} of node {id} is below 0"),
             );
         }
-        let turned = number("allowedDeviationTheta").filter(|allowed| !(0.0..=PI + ROUNDING).contains(allowed));
+        let turned = position.allowed_deviation_theta.float();
+        let turned = turned.filter(|allowed| !(0.0..=PI + ROUNDING).contains(allowed));
         if let Some(allowed) = turned {
             let text = format!("allowedDeviationTheta {allowed} of node {id} is not between 0 and pi");
             found.broken("ORD-MSG-09", text);
         }
-        for name in ["x", "y"] {
-            if let Some(value) = number(name).filter(|value| value.abs() > FAR) {
+        for (name, coordinate) in [("x", &position.x), ("y", &position.y)] {
+            if let Some(value) = coordinate.float().filter(|value| value.abs() > FAR) {
                 found.remark(
                     "MAP-02",
                     format!("{name} {value} of node {id} is not likely to be in metres"),
@@ -176,10 +177,10 @@ impl Running for ZoneSet {
         let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
         let mut found = Found::new(record, findings);
-        match order.get("zoneSetId") {
-            Some(Value::Null) => found.broken("ORD-MSG-03", "zoneSetId is null"),
-            Some(Value::String(text)) if text.is_empty() => found.broken("ORD-MSG-03", "zoneSetId is empty"),
-            Some(Value::String(text)) if NOTHING.contains(&text.to_ascii_lowercase().trim()) => {
+        match &order.zone_set_id {
+            Member::Null => found.broken("ORD-MSG-03", "zoneSetId is null"),
+            Member::There(text) if text.is_empty() => found.broken("ORD-MSG-03", "zoneSetId is empty"),
+            Member::There(text) if NOTHING.contains(&text.to_ascii_lowercase().trim()) => {
                 let sheets = context.world.factsheets().valid(record, context);
                 let unlisted = |sheet: &Factsheet| {
                     let listed = sheet.supported.as_ref();
@@ -199,30 +200,35 @@ impl Running for ZoneSet {
 }
 
 /// Every identifier in a message: what it is, and the text.
-pub(super) fn ids<'v>(command: Command<'v>) -> Vec<(&'static str, &'v str)> {
+pub(super) fn ids(command: Command<'_>) -> Vec<(&'static str, &Text)> {
     let mut all = Vec::new();
-    let mut add = |value: &'v Value, name: &'static str| {
-        all.extend(value.get(name).and_then(Value::as_str).map(|text| (name, text)));
-    };
     if let Command::Order(order) = command {
-        add(order, "orderId");
-        add(order, "zoneSetId");
-        for node in elements(order, "nodes").take(ELEMENTS) {
-            add(node, "nodeId");
-            if let Some(position) = node.get("nodePosition") {
-                add(position, "mapId");
-            }
-        }
-        for edge in elements(order, "edges").take(ELEMENTS) {
-            for name in ["edgeId", "startNodeId", "endNodeId"] {
-                add(edge, name);
+        let mut add = |field: Field, member| all.extend(named(field, member));
+        add(OrderView::order_id, &order.order_id);
+        add(OrderView::zone_set_id, &order.zone_set_id);
+        for element in elements(order) {
+            match element {
+                Element::Node(node) => {
+                    add(Node::node_id, &node.node_id);
+                    if let Some(position) = node.node_position.there() {
+                        add(NodePosition::map_id, &position.map_id);
+                    }
+                }
+                Element::Edge(edge) => {
+                    add(Edge::edge_id, &edge.edge_id);
+                    add(Edge::start_node_id, &edge.start_node_id);
+                    add(Edge::end_node_id, &edge.end_node_id);
+                }
             }
         }
     }
-    for (_, action) in command.actions() {
-        add(action, "actionId");
-    }
+    let actions = command.actions().into_iter();
+    all.extend(actions.filter_map(|(_, action)| named(ActionView::action_id, &action.action_id)));
     all
+}
+
+fn named(field: Field, member: &Member<Text>) -> Option<(&'static str, &Text)> {
+    Some((field.usual_name(), member.there()?))
 }
 
 fn identifiers(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
@@ -237,23 +243,49 @@ fn identifiers(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>
     !ids.is_empty()
 }
 
-fn topics(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
-    let value = command.value();
-    let has = |name: &str| value.get(name).is_some();
-    let is_order = has("nodes") || has("orderId");
-    let is_instant = ["actions", "instantActions"]
-        .iter()
-        .any(|name| value.get(*name).is_some_and(Value::is_array));
-    match command {
-        Command::Order(_) if is_instant && !is_order => {
-            found.broken("TOPIC-13", "instant actions come on the order topic");
+struct Topics;
+
+fn is_order(order: &OrderView) -> bool {
+    !order.nodes.is_absent() || !order.order_id.is_absent()
+}
+
+fn is_instant(message: &InstantActionsView) -> bool {
+    message.actions.is_there() || message.misnamed_actions.is_there()
+}
+
+impl Running for Topics {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(command) = Command::read(record) else {
+            return false;
+        };
+        let own = match command {
+            Command::Order(order) => is_order(order),
+            Command::Instant(message) => is_instant(message),
+        };
+        if own {
+            return true;
         }
-        Command::Instant(_) if is_order && !is_instant => {
-            found.broken("TOPIC-13", "an order comes on the instantActions topic");
+        // What is none of its topic is read as what it may have been meant for.
+        let read = |topic| record.entry.view(topic, record.names());
+        let wrong = match command {
+            Command::Order(_) => {
+                let meant = read(Topic::InstantActions).and_then(MessageView::instant_actions);
+                meant
+                    .is_some_and(|message| is_instant(message))
+                    .then_some("instant actions come on the order topic")
+            }
+            Command::Instant(_) => {
+                let meant = read(Topic::Order).and_then(MessageView::order);
+                meant
+                    .is_some_and(|order| is_order(order))
+                    .then_some("an order comes on the instantActions topic")
+            }
+        };
+        if let Some(wrong) = wrong {
+            Found::new(record, findings).broken("TOPIC-13", wrong);
         }
-        _ => {}
+        wrong.is_some()
     }
-    is_order || is_instant
 }
 
 /// Whether an optional parameter of a factsheet is the position of a node, or something in it.
@@ -285,13 +317,15 @@ impl Running for Position {
         }
         let mut found = Found::new(record, findings);
         let mut judged = false;
-        for node in in_sequence(order, "nodes") {
+        for node in nodes_in_sequence(order) {
             judged = true;
-            if node.get("nodePosition").is_some_and(Value::is_object) {
-                continue;
-            }
-            let id = quote(text(node, "nodeId"));
-            let shown = node.get("nodePosition").map_or_else(|| "missing".to_owned(), show);
+            let shown = match &node.node_position {
+                Member::There(_) => continue,
+                Member::Absent => "missing".to_owned(),
+                Member::Null => "null".to_owned(),
+                Member::Other(other) => show(other),
+            };
+            let id = quote(node.node_id.or_empty());
             let message = format!("nodePosition of node {id} is {shown}");
             let required = |name: &str| name.rsplit('.').next() == Some("nodePosition");
             if sheets

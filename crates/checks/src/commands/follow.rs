@@ -2,16 +2,15 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use serde_json::Value;
-
 use super::graph::is_counted;
 use super::stitching::{base, counted_back, elsewhere, stitched};
-use super::{Command, Found, in_sequence, released, short};
+use super::{Command, Found, nodes_in_sequence, short};
 use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_world::members::{ELEMENTS, number, text};
+use tck_view::{Node, OrderView};
+use tck_world::members::ELEMENTS;
 use tck_world::{Fact, Listen, Observation, Outside, ShownState, Topic};
 
 /// `commands/updates`.
@@ -32,7 +31,7 @@ pub(crate) const UPDATES: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[OrderView::order_id, OrderView::order_update_id],
     start: |_| Box::new(Part { focus: Focus::Updates }),
 };
 
@@ -51,7 +50,7 @@ pub(crate) const ORDER_IDS: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[OrderView::order_id, OrderView::order_update_id],
     start: |_| Box::new(Part { focus: Focus::Ids }),
 };
 
@@ -70,7 +69,7 @@ pub(crate) const RESENT: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[OrderView::order_id, OrderView::order_update_id],
     start: |_| Box::new(Part { focus: Focus::Resent }),
 };
 
@@ -162,7 +161,7 @@ impl Running for Part {
 struct BaseEnd {
     id: String,
     sequence: u64,
-    node: Value,
+    node: Node,
 }
 
 /// One message of an order.
@@ -197,18 +196,18 @@ struct Follow {
     numbers: BTreeMap<String, Vec<(u64, Option<u64>)>>,
 }
 
-fn end(order: &Value) -> Option<BaseEnd> {
-    let nodes = in_sequence(order, "nodes");
-    let last = nodes.into_iter().rfind(|node| released(node) == Some(true))?;
+fn end(order: &OrderView) -> Option<BaseEnd> {
+    let nodes = nodes_in_sequence(order);
+    let last = nodes.into_iter().rfind(|node| node.released.is(true))?;
     Some(BaseEnd {
-        id: short(last, "nodeId")?,
-        sequence: number(last, "sequenceId")?,
+        id: short(&last.node_id)?,
+        sequence: last.sequence_id.whole()?,
         node: last.clone(),
     })
 }
 
 impl Order {
-    fn begin(id: String, message: &Value, update: u64, record: &Observation<'_>) -> Self {
+    fn begin(id: String, message: &OrderView, update: u64, record: &Observation<'_>) -> Self {
         let mut order = Self {
             id,
             sent: VecDeque::new(),
@@ -221,7 +220,7 @@ impl Order {
         order
     }
 
-    fn take(&mut self, message: &Value, update: u64, record: &Observation<'_>) {
+    fn take(&mut self, message: &OrderView, update: u64, record: &Observation<'_>) {
         if self.sent.len() == MESSAGES {
             self.sent.pop_front();
         }
@@ -279,7 +278,7 @@ impl Follow {
     /// An order that goes on behind a disturbance with a number that was given before.
     fn falls_back(
         &self,
-        message: &Value,
+        message: &OrderView,
         id: &str,
         update: u64,
         record: &Observation<'_>,
@@ -289,9 +288,9 @@ impl Follow {
             return false;
         };
         let again = known.contains(&(update, record.content()));
-        let first = in_sequence(message, "nodes")
+        let first = nodes_in_sequence(message)
             .first()
-            .and_then(|node| number(node, "sequenceId"));
+            .and_then(|node| node.sequence_id.whole());
         let newest = known.iter().map(|(update, _)| *update).max().unwrap_or_default();
         if again || first.is_none_or(|first| first == 0) {
             return false;
@@ -303,9 +302,9 @@ impl Follow {
         true
     }
 
-    fn message(&mut self, message: &Value, record: &Observation<'_>, context: &CheckContext<'_>) -> Told {
+    fn message(&mut self, message: &OrderView, record: &Observation<'_>, context: &CheckContext<'_>) -> Told {
         let mut told = Told::default();
-        let (Some(id), Some(update)) = (short(message, "orderId"), number(message, "orderUpdateId")) else {
+        let (Some(id), Some(update)) = (short(&message.order_id), message.order_update_id.whole()) else {
             return told;
         };
         let Some(at) = self.orders.iter().position(|order| order.id == id) else {
@@ -333,9 +332,9 @@ impl Follow {
         let Some(mut order) = self.orders.remove(at) else {
             return told;
         };
-        let first = in_sequence(message, "nodes")
+        let first = nodes_in_sequence(message)
             .first()
-            .and_then(|node| number(node, "sequenceId"));
+            .and_then(|node| node.sequence_id.whole());
         let behind_its_end = order.ended
             && order
                 .sent
@@ -363,16 +362,16 @@ impl Follow {
     }
 
     /// An orderId nobody has seen yet, with which the order before goes on.
-    fn continues(&self, message: &Value, id: &str, found: &mut Found<'_>) -> bool {
+    fn continues(&self, message: &OrderView, id: &str, found: &mut Found<'_>) -> bool {
         let Some(before) = self.orders.back() else { return false };
         let end = before.sent.back().and_then(|sent| sent.end.as_ref());
-        let first = in_sequence(message, "nodes").into_iter().next();
+        let first = nodes_in_sequence(message).into_iter().next();
         let (Some(end), Some(first)) = (end, first) else {
             return false;
         };
         let continues = end.sequence > 0
-            && number(first, "sequenceId") == Some(end.sequence)
-            && text(first, "nodeId") == end.id
+            && first.sequence_id.whole() == Some(end.sequence)
+            && first.node_id.or_empty() == end.id
             && !before.done;
         if continues {
             let (old, new) = (quote(&before.id), quote(id));
@@ -387,7 +386,7 @@ impl Follow {
     /// Learns from a record; gives back what it shows.
     fn follow(&mut self, record: &Observation<'_>, context: &CheckContext<'_>, keeps: bool) -> Told {
         let vehicle = context.world.mock();
-        let is_state = record.said_json(Topic::State).is_some();
+        let is_state = record.said_state().is_some();
         if vehicle.is_lost(record) {
             self.lost(vehicle.now(record), record, keeps);
         }
@@ -439,7 +438,7 @@ impl Follow {
 /// An update of the order that was sent last.
 fn updated(
     order: &Order,
-    message: &Value,
+    message: &OrderView,
     update: u64,
     record: &Observation<'_>,
     context: &CheckContext<'_>,
@@ -459,7 +458,7 @@ fn updated(
             format!("orderUpdateId {update} comes directly after {newest}"),
         );
     }
-    let Some(first) = in_sequence(message, "nodes").into_iter().next() else {
+    let Some(first) = nodes_in_sequence(message).into_iter().next() else {
         return;
     };
     counted_back(message, first, found);
@@ -471,8 +470,8 @@ fn updated(
         .map(|shown| shown.update)
         .min()
         .unwrap_or_default();
-    let sequence = number(first, "sequenceId");
-    let is_end = |end: &&BaseEnd| Some(end.sequence) == sequence && text(first, "nodeId") == end.id;
+    let sequence = first.sequence_id.whole();
+    let is_end = |end: &&BaseEnd| Some(end.sequence) == sequence && first.node_id.or_empty() == end.id;
     // The end of an update that was refused is nowhere on the vehicle.
     let refused = |sent: &Sent| sent.update > confirmed && knows_refused(&order.id, sent.update, record, context);
     let candidates = order

@@ -2,12 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
-use super::{Command, Each, Found, in_sequence, released, short};
+use super::{Command, Each, Found, edges_in_sequence, elements, nodes_in_sequence, short};
 use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, number, text};
+use tck_view::{Edge, Element, Node, OrderView};
 use tck_world::{Listen, Observation, Topic};
 
 /// `commands/nodes-and-edges`.
@@ -18,7 +16,7 @@ pub(crate) const NODES_AND_EDGES: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[OrderView::nodes, OrderView::edges],
     start: |_| Each::start(nodes_and_edges),
 };
 
@@ -31,7 +29,7 @@ pub(crate) const RELEASED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[Node::released, Edge::released],
     start: |_| Each::start(base_and_horizon),
 };
 
@@ -44,7 +42,7 @@ pub(crate) const EDGE_ENDS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[Node::node_id, Edge::start_node_id, Edge::end_node_id],
     start: |_| Each::start(edge_ends),
 };
 
@@ -57,7 +55,7 @@ pub(crate) const SEQUENCE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[Node::sequence_id, Edge::sequence_id],
     start: |_| Box::new(Sequence::default()),
 };
 
@@ -67,10 +65,10 @@ const ORDERS: usize = 256;
 fn nodes_and_edges(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let Some(order) = command.order() else { return false };
     // What was meant for another topic is no order.
-    if order.get("nodes").is_none() && order.get("orderId").is_none() {
+    if order.nodes.is_absent() && order.order_id.is_absent() {
         return false;
     }
-    let (nodes, edges) = (elements(order, "nodes").count(), elements(order, "edges").count());
+    let (nodes, edges) = (order.nodes.total(), order.edges.total());
     if nodes == 0 {
         found.broken("ORD-02", "the order has no node");
     } else if edges + 1 != nodes {
@@ -81,12 +79,9 @@ fn nodes_and_edges(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found
 
 /// Whether the sequenceIds of nodes and edges together alternate and count up by one. An order that is counted otherwise is a
 /// mistake of its own, and no measure for what is sent after it.
-pub(super) fn is_counted(order: &Value) -> bool {
-    let of = |list, is_edge| {
-        let all = elements(order, list).take(super::ELEMENTS);
-        all.map(move |element| Some((number(element, "sequenceId")?, is_edge)))
-    };
-    let all: Option<Vec<(u64, bool)>> = of("nodes", false).chain(of("edges", true)).collect();
+pub(super) fn is_counted(order: &OrderView) -> bool {
+    let place = |element: Element<'_>| Some((element.sequence_id().whole()?, element.is_edge()));
+    let all: Option<Vec<(u64, bool)>> = elements(order).map(place).collect();
     let Some(mut all) = all else { return false };
     all.sort_unstable();
     let alternates = |pair: &[(u64, bool)]| pair[0].0.checked_add(1) == Some(pair[1].0) && pair[0].1 != pair[1].1;
@@ -94,16 +89,16 @@ pub(super) fn is_counted(order: &Value) -> bool {
 }
 
 /// Nodes and edges alternating, if there is one edge fewer.
-fn chain(order: &Value) -> Option<Vec<(bool, &Value)>> {
-    let (nodes, edges) = (in_sequence(order, "nodes"), in_sequence(order, "edges"));
+fn chain(order: &OrderView) -> Option<Vec<Element<'_>>> {
+    let (nodes, edges) = (nodes_in_sequence(order), edges_in_sequence(order));
     if nodes.len() != edges.len() + 1 {
         return None;
     }
     let mut chain = Vec::with_capacity(nodes.len() + edges.len());
     let mut edges = edges.into_iter();
     for node in nodes {
-        chain.push((false, node));
-        chain.extend(edges.next().map(|edge| (true, edge)));
+        chain.push(Element::Node(node));
+        chain.extend(edges.next().map(Element::Edge));
     }
     Some(chain)
 }
@@ -112,16 +107,16 @@ fn base_and_horizon(command: Command<'_>, _: &CheckContext<'_>, found: &mut Foun
     let Some(chain) = command.order().and_then(chain) else {
         return false;
     };
-    let flags: Option<Vec<bool>> = chain.iter().map(|(_, element)| released(element)).collect();
+    let flags: Option<Vec<bool>> = chain.iter().map(|element| element.released().flag()).collect();
     let Some(flags) = flags else { return false };
     if flags.iter().all(|released| !released) {
         found.remark("ORD-09", "the order releases nothing");
         return true;
     }
     let touching = flags.windows(3).zip(&chain[1..]);
-    for (flags, (is_edge, element)) in touching {
-        if *is_edge && flags[1] && !(flags[0] && flags[2]) {
-            let id = quote(text(element, "edgeId"));
+    for (flags, element) in touching {
+        if element.is_edge() && flags[1] && !(flags[0] && flags[2]) {
+            let id = quote(element.id().or_empty());
             found.broken("ORD-08", format!("edge {id} is released, and a node of it is not"));
         }
     }
@@ -129,10 +124,7 @@ fn base_and_horizon(command: Command<'_>, _: &CheckContext<'_>, found: &mut Foun
     if let Some(horizon) = horizon {
         // A released edge that leads into the horizon is the business of ORD-08; the horizon begins behind it.
         if let Some(at) = flags[horizon..].iter().position(|released| *released) {
-            let id = text(
-                chain[horizon + at].1,
-                if chain[horizon + at].0 { "edgeId" } else { "nodeId" },
-            );
+            let id = chain[horizon + at].id().or_empty();
             found.broken("ORD-09", format!("{} is released behind the horizon", quote(id)));
         }
     }
@@ -141,20 +133,22 @@ fn base_and_horizon(command: Command<'_>, _: &CheckContext<'_>, found: &mut Foun
 
 fn edge_ends(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let Some(order) = command.order() else { return false };
-    let (nodes, edges) = (in_sequence(order, "nodes"), in_sequence(order, "edges"));
+    let (nodes, edges) = (nodes_in_sequence(order), edges_in_sequence(order));
     if edges.is_empty() || nodes.len() != edges.len() + 1 {
         return false;
     }
     let mut judged = false;
     for (edge, ends) in edges.iter().zip(nodes.windows(2)) {
-        for (name, node) in [("startNodeId", ends[0]), ("endNodeId", ends[1])] {
-            let named = edge.get(name).and_then(Value::as_str);
-            let Some((named, is)) = named.zip(node.get("nodeId").and_then(Value::as_str)) else {
+        for (name, named, node) in [
+            ("startNodeId", &edge.start_node_id, ends[0]),
+            ("endNodeId", &edge.end_node_id, ends[1]),
+        ] {
+            let Some((named, is)) = named.text().zip(node.node_id.text()) else {
                 continue;
             };
             judged = true;
             if named != is {
-                let id = quote(text(edge, "edgeId"));
+                let id = quote(edge.edge_id.or_empty());
                 found.broken(
                     "ORD-MSG-19",
                     format!(
@@ -179,34 +173,30 @@ impl Running for Sequence {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
-        let is_known = short(order, "orderId").is_none_or(|id| {
+        let is_known = short(&order.order_id).is_none_or(|id| {
             if self.known.len() == ORDERS {
                 self.known.pop_first();
             }
             !self.known.insert(id)
         });
         let mut all = Vec::new();
-        for list in ["nodes", "edges"] {
-            for element in elements(order, list).take(super::ELEMENTS) {
-                let Some(written) = element.get("sequenceId") else {
-                    return false;
-                };
-                let Some(sequence) = number(element, "sequenceId") else {
-                    if written.is_number() {
-                        let text = format!("sequenceId {written} is no whole number");
-                        Found::new(record, findings).broken("ORD-UPD-11", text);
-                    }
-                    return written.is_number();
-                };
-                all.push((sequence, list == "edges"));
-            }
+        for element in elements(order) {
+            let Some(written) = element.sequence_id().number() else {
+                return false;
+            };
+            let Some(sequence) = written.whole() else {
+                let text = format!("sequenceId {written} is no whole number");
+                Found::new(record, findings).broken("ORD-UPD-11", text);
+                return true;
+            };
+            all.push((sequence, element.is_edge()));
         }
         all.sort_unstable();
         let Some((first, begins_with_edge)) = all.first().copied() else {
             return false;
         };
         let mut found = Found::new(record, findings);
-        let begins = !is_known && number(order, "orderUpdateId").is_none_or(|update| update == 0);
+        let begins = !is_known && order.order_update_id.whole().is_none_or(|update| update == 0);
         if begins && first != 0 {
             found.broken(
                 "ORD-UPD-11",

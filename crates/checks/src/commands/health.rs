@@ -6,14 +6,12 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
-use super::{Command, ELEMENTS, released, short};
+use super::{Command, ELEMENTS, short};
 use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_world::members::{elements, text};
+use tck_view::{ConnectionView, OrderView, StateView};
 use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
@@ -30,7 +28,7 @@ pub(crate) const HEALTH: Check = Check {
         Listen::Delivered(Topic::Order),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::errors, ConnectionView::connection_state, OrderView::order_id],
     start: |_| Box::new(Health::default()),
 };
 
@@ -49,14 +47,14 @@ struct Health {
 }
 
 /// Why the vehicle cannot begin an order.
-fn reason(state: &Value) -> Option<String> {
-    let mut errors = elements(state, "errors").take(ELEMENTS);
-    if let Some(error) = errors.find(|error| text(error, "errorLevel") == "FATAL") {
-        return Some(format!("the FATAL error {}", quote(text(error, "errorType"))));
+fn reason(state: &StateView) -> Option<String> {
+    let mut errors = state.errors.iter().take(ELEMENTS);
+    if let Some(error) = errors.find(|error| error.error_level.is("FATAL")) {
+        return Some(format!("the FATAL error {}", quote(error.error_type.or_empty())));
     }
-    let mut base = elements(state, "nodeStates").take(ELEMENTS);
-    let driven = base.any(|node| released(node) == Some(true));
-    driven.then(|| format!("order {}", quote(text(state, "orderId"))))
+    let mut base = state.node_states.iter().take(ELEMENTS);
+    let driven = base.any(|node| node.released.is(true));
+    driven.then(|| format!("order {}", quote(state.order_id.or_empty())))
 }
 
 impl Running for Health {
@@ -73,21 +71,21 @@ impl Running for Health {
         {
             self.waits.get_or_insert(now);
         }
-        if let Some(state) = record.said_json(Topic::State) {
+        if let Some(state) = record.said_state() {
             let reason = reason(state);
             if reason != self.reason {
                 (self.waits, self.online) = (None, false);
                 self.reason = reason;
             }
         }
-        if let Some(connection) = record.said_json(Topic::Connection)
-            && Some(text(connection, "connectionState")) == context.pack.word("connection.online")
+        if let Some(connection) = record.said_connection()
+            && Some(connection.connection_state.or_empty()) == context.pack.word("connection.online")
             && self.waits.is_some_and(|since| now.since(since) >= context.time.notice)
         {
             self.online = true;
         }
         let order = Command::read(record).and_then(Command::order);
-        let Some(id) = order.and_then(|order| short(order, "orderId")) else {
+        let Some(id) = order.and_then(|order| short(&order.order_id)) else {
             return false;
         };
         let fresh = !self.orders.contains(&id);

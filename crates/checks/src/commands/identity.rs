@@ -2,15 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
-
 use super::graph::is_counted;
-use super::{Command, ELEMENTS, Found, in_sequence, place_of, short};
+use super::{Command, ELEMENTS, Found, elements, nodes_in_sequence, place_of, short};
 use crate::finding::{quote, unclear};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_world::members::{elements, number, text};
-use tck_world::{Fact, Listen, Observation, Topic, print};
+use tck_view::{ActionView, Element, Node, Print};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/node-ids`.
 pub(crate) const NODE_IDS: Check = Check {
@@ -21,7 +19,7 @@ pub(crate) const NODE_IDS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[Node::node_id, Node::node_position],
     start: |_| Box::new(NodeIds::default()),
 };
 
@@ -40,7 +38,7 @@ pub(crate) const ACTION_IDS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[ActionView::action_id],
     start: |_| Box::new(ActionIds::default()),
 };
 
@@ -74,8 +72,8 @@ impl Running for NodeIds {
             .collect();
         let mut found = Found::new(record, findings);
         let mut judged = false;
-        for node in in_sequence(order, "nodes") {
-            let (Some(id), Some((x, y, map))) = (short(node, "nodeId"), place_of(node)) else {
+        for node in nodes_in_sequence(order) {
+            let (Some(id), Some((x, y, map))) = (short(&node.node_id), place_of(node)) else {
                 continue;
             };
             let Some((was_x, was_y, was_map)) = self.known.get_mut(&id) else {
@@ -111,11 +109,11 @@ impl Running for NodeIds {
 #[derive(Default)]
 struct ActionIds {
     /// Where each action stands, and what it is.
-    known: BTreeMap<String, (String, Option<u64>)>,
+    known: BTreeMap<String, (String, Option<Print>)>,
 }
 
 /// Every action of a message with a name for the place where it stands.
-fn placed(command: Command<'_>) -> Vec<(String, &Value)> {
+fn placed<'c>(command: Command<'c>) -> Vec<(String, &'c ActionView)> {
     let order = match command {
         Command::Instant(_) => {
             let actions = command.actions().into_iter();
@@ -125,16 +123,13 @@ fn placed(command: Command<'_>) -> Vec<(String, &Value)> {
         }
         Command::Order(order) => order,
     };
-    let name = short(order, "orderId").unwrap_or_default();
-    let of = |list| {
-        let name = &name;
-        elements(order, list).take(ELEMENTS).flat_map(move |element| {
-            let sequence = number(element, "sequenceId").unwrap_or_default();
-            let place = format!("order {}, sequenceId {sequence}", quote(name));
-            elements(element, "actions").map(move |action| (place.clone(), action))
-        })
+    let name = short(&order.order_id).unwrap_or_default();
+    let of_element = |element: Element<'c>| {
+        let sequence = element.sequence_id().whole().unwrap_or_default();
+        let place = format!("order {}, sequenceId {sequence}", quote(&name));
+        element.actions().iter().map(move |action| (place.clone(), action))
     };
-    of("nodes").chain(of("edges")).take(ELEMENTS).collect()
+    elements(order).flat_map(of_element).take(ELEMENTS).collect()
 }
 
 impl Running for ActionIds {
@@ -152,13 +147,13 @@ impl Running for ActionIds {
         let counted = command.order().is_none_or(is_counted);
         let mut here: BTreeMap<&str, ()> = BTreeMap::new();
         for (place, action) in placed(command) {
-            let Some(id) = short(action, "actionId").filter(|id| !id.is_empty()) else {
+            let Some(id) = short(&action.action_id).filter(|id| !id.is_empty()) else {
                 continue;
             };
             judged = true;
-            let twice = here.insert(text(action, "actionId"), ()).is_some();
+            let twice = here.insert(action.action_id.or_empty(), ()).is_some();
             // A stitching node that was changed is the business of another requirement.
-            let print = matches!(command, Command::Instant(_)).then(|| print::of(action));
+            let print = matches!(command, Command::Instant(_)).then_some(action.print);
             if twice {
                 found.broken(
                     "ORD-MSG-17",

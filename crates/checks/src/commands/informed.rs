@@ -10,7 +10,7 @@ use super::{Command, ELEMENTS, Found};
 use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ActionView, StateView};
 use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
@@ -22,7 +22,7 @@ pub(crate) const ON_INFORMATION: Check = Check {
     arguments: &[],
     listens: &[Listen::Sent(Topic::State), Listen::Delivered(Topic::InstantActions)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::information, ActionView::action_type],
     start: |_| Box::new(OnInformation::default()),
 };
 
@@ -46,8 +46,8 @@ struct OnInformation {
 impl Running for OnInformation {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let now = record.at().moment;
-        if let Some(state) = record.said_json(Topic::State) {
-            let informs = elements(state, "information").next().is_some();
+        if let Some(state) = record.said_state() {
+            let informs = !state.information.is_empty();
             if informs && !self.informs {
                 self.since = Some(now);
                 self.begun += 1;
@@ -61,7 +61,7 @@ impl Running for OnInformation {
         let at_once = self.since.is_some_and(|since| now.since(since) <= AT_ONCE);
         let mut found = Found::new(record, findings);
         for (_, action) in command.actions().into_iter().take(ELEMENTS) {
-            let kind: String = text(action, "actionType").chars().take(256).collect();
+            let kind: String = action.action_type.or_empty().chars().take(256).collect();
             if self.came.len() == KINDS && !self.came.contains_key(&kind) {
                 continue;
             }

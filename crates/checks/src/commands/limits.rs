@@ -1,14 +1,12 @@
 //! The limits a vehicle states in its factsheet: how long, how many, how often.
 
-use serde_json::Value;
-
 use super::fields::ids;
-use super::{Command, ELEMENTS, Found, parameter};
+use super::{Command, ELEMENTS, Found};
 use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, LinkFault};
-use tck_world::members::{elements, text};
+use tck_view::{ActionView, ArrayLimits, Field, Json, Member, Number, ProtocolLimits, Timing};
 use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/limits`.
@@ -23,7 +21,7 @@ pub(crate) const SIZES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ProtocolLimits::max_string_lens, ProtocolLimits::max_array_lens],
     start: |_| Box::new(Sizes),
 };
 
@@ -37,7 +35,7 @@ pub(crate) const ORDER_INTERVAL: Check = Check {
     arguments: &[],
     listens: &[Listen::Fault, Listen::Hook, Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[Timing::min_order_interval],
     start: |_| Box::new(Interval::default()),
 };
 
@@ -54,8 +52,7 @@ impl Running for Sizes {
             return false;
         };
         let sheets = context.world.factsheets().valid(record, context);
-        let limited = |sheet: &Factsheet| !sheet.strings.is_empty() || !sheet.arrays.is_empty() || sheet.numerical;
-        if sheets.is_empty() || !sheets.iter().all(|sheet| limited(sheet)) {
+        if sheets.is_empty() || !sheets.iter().all(|sheet| sheet.is_limited()) {
             return false;
         }
         let length = record.payload().map_or(0, tck_journal::Payload::len);
@@ -71,62 +68,92 @@ impl Running for Sizes {
     }
 }
 
-/// Arrays of a message with their names in a factsheet.
-fn arrays(command: Command<'_>) -> Vec<(&'static str, usize)> {
-    let count = |value: &Value, name: &str| elements(value, name).count();
-    let mut all = Vec::new();
+/// A list of a message: its name in a factsheet, its limit there, and how many elements it has.
+type Counted = (Field, fn(&ArrayLimits) -> &Member<Number>, usize);
+
+/// The lists of a message.
+fn lists(command: Command<'_>) -> Vec<Counted> {
+    let mut all: Vec<Counted> = Vec::new();
     match command {
-        Command::Instant(message) => all.push(("instantActions", count(message, "actions"))),
+        Command::Instant(message) => {
+            let count = message.actions.total();
+            all.push((ArrayLimits::instant_actions, |limits| &limits.instant_actions, count));
+        }
         Command::Order(order) => {
-            all.push(("order.nodes", count(order, "nodes")));
-            all.push(("order.edges", count(order, "edges")));
-            for node in elements(order, "nodes").take(ELEMENTS) {
-                all.push(("node.actions", count(node, "actions")));
+            all.push((
+                ArrayLimits::order_nodes,
+                |limits| &limits.order_nodes,
+                order.nodes.total(),
+            ));
+            all.push((
+                ArrayLimits::order_edges,
+                |limits| &limits.order_edges,
+                order.edges.total(),
+            ));
+            for node in order.nodes.iter().take(ELEMENTS) {
+                let count = node.actions.total();
+                all.push((ArrayLimits::node_actions, |limits| &limits.node_actions, count));
             }
-            for edge in elements(order, "edges").take(ELEMENTS) {
-                all.push(("edge.actions", count(edge, "actions")));
-                if let Some(curve) = edge.get("trajectory") {
-                    all.push(("trajectory.knotVector", count(curve, "knotVector")));
-                    all.push(("trajectory.controlPoints", count(curve, "controlPoints")));
+            for edge in order.edges.iter().take(ELEMENTS) {
+                let count = edge.actions.total();
+                all.push((ArrayLimits::edge_actions, |limits| &limits.edge_actions, count));
+                if let Some(curve) = edge.trajectory.there() {
+                    let (knots, points) = (curve.knot_vector.total(), curve.control_points.total());
+                    all.push((ArrayLimits::knot_vector, |limits| &limits.knot_vector, knots));
+                    all.push((ArrayLimits::control_points, |limits| &limits.control_points, points));
                 }
             }
         }
     }
-    let actions = command.actions().into_iter();
-    all.extend(actions.map(|(_, action)| ("actions.actionsParameters", count(action, "actionParameters"))));
+    let parameters = |action: &ActionView| -> Counted {
+        let count = action.action_parameters.total();
+        (
+            ArrayLimits::action_parameters,
+            |limits| &limits.action_parameters,
+            count,
+        )
+    };
+    all.extend(command.actions().into_iter().map(|(_, action)| parameters(action)));
     all
 }
 
 fn excesses(sheet: &Factsheet, command: Command<'_>, length: u64) -> Vec<String> {
-    let string = |name: &str| sheet.strings.get(name).copied().unwrap_or(u64::MAX);
-    let chars = |text: &str| text.chars().count() as u64;
+    let string = |of| sheet.string_limit(of).unwrap_or(u64::MAX);
+    let most = string(|limits| &limits.id_len);
+    let words = string(|limits| &limits.enum_len);
+    let loads = string(|limits| &limits.load_id_len);
     let mut all = Vec::new();
-    if length > string("msgLen") {
-        all.push(format!(
-            "the message has {length} bytes, msgLen is {}",
-            string("msgLen")
-        ));
+    if let Some(limit) = sheet
+        .string_limit(|limits| &limits.msg_len)
+        .filter(|limit| length > *limit)
+    {
+        all.push(format!("the message has {length} bytes, msgLen is {limit}"));
     }
-    for (name, count) in arrays(command) {
-        if let Some(limit) = sheet.arrays.get(name).filter(|limit| count as u64 > **limit) {
-            all.push(format!("{name} has {count} elements, the limit is {limit}"));
+    for (name, limit, count) in lists(command) {
+        if let Some(limit) = sheet.array_limit(limit).filter(|limit| count as u64 > *limit) {
+            all.push(format!(
+                "{} has {count} elements, the limit is {limit}",
+                name.usual_name()
+            ));
         }
     }
     for (name, id) in ids(command) {
-        if chars(id) > string("idLen") {
-            all.push(format!("{name} {} is longer than idLen {}", quote(id), string("idLen")));
+        if id.length() > most {
+            all.push(format!("{name} {} is longer than idLen {most}", quote(id)));
         }
-        if sheet.numerical && !id.bytes().all(|byte| byte.is_ascii_digit()) {
+        if sheet.wants_digits() && !id.bytes().all(|byte| byte.is_ascii_digit()) {
             all.push(format!("{name} {} is not made of digits only", quote(id)));
         }
     }
     for (_, action) in command.actions() {
-        let blocking = text(action, "blockingType");
-        if chars(blocking) > string("enumLen") {
+        if let Some(blocking) = action.blocking_type.there().filter(|word| word.length() > words) {
             all.push(format!("blockingType {} is longer than enumLen", quote(blocking)));
         }
-        let load = parameter(action, "loadId").and_then(Value::as_str).unwrap_or_default();
-        if chars(load) > string("loadIdLen") {
+        let load = match action.argument("loadId") {
+            Member::There(Json::Text(load)) => Some(load),
+            _ => None,
+        };
+        if let Some(load) = load.filter(|load| load.length() > loads) {
             all.push(format!("loadId {} is longer than loadIdLen", quote(load)));
         }
     }

@@ -8,7 +8,7 @@ use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Close, Event, Packet};
 use tck_pack::Role;
-use tck_world::members::text;
+use tck_view::ConnectionView;
 use tck_world::{End, Listen, Observation, Topic, takes};
 
 /// `commands/alive`.
@@ -33,7 +33,7 @@ pub(crate) const LISTENS: Check = Check {
     arguments: &[],
     listens: &[Listen::Subscribe, Listen::Closed, Listen::Sent(Topic::Connection)],
     reads: &[],
-    needs: &[],
+    needs: &[ConnectionView::connection_state],
     start: |_| Box::new(Listens::default()),
 };
 
@@ -178,10 +178,7 @@ impl Running for Listens {
             }
             _ => {}
         }
-        let Some(said) = record
-            .said_json(Topic::Connection)
-            .filter(|_| context.role == Role::MasterControl)
-        else {
+        let Some(said) = record.said_connection().filter(|_| context.role == Role::MasterControl) else {
             return false;
         };
         let Event::Sent { topic, .. } = record.event() else {
@@ -194,7 +191,7 @@ impl Running for Listens {
             .max();
         if best == Some(0)
             && !self.told
-            && Some(text(said, "connectionState")) == context.pack.word("connection.online")
+            && Some(said.connection_state.or_empty()) == context.pack.word("connection.online")
         {
             self.told = true;
             let text = "the connection topic is subscribed with QoS 0, so that a last will may be lost";

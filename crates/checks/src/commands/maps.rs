@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use serde_json::Value;
 
-use super::{Command, ELEMENTS, Each, Found, in_sequence, parameter, place_of, short};
-use crate::finding::{quote, show};
+use super::{Command, ELEMENTS, Each, Found, nodes_in_sequence, place_of, short};
+use crate::finding::{missing_or, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, number, text};
+use tck_view::{ActionView, Json, Scope, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/map-enabled`.
@@ -98,28 +98,28 @@ const KEPT: usize = 256;
 fn download(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let mut judged = false;
     for (_, action) in command.actions() {
-        if text(action, "actionType") != "downloadMap" {
+        if action.action_type.or_empty() != "downloadMap" {
             continue;
         }
         judged = true;
         for key in ["mapId", "mapDownloadLink"] {
-            let value = parameter(action, key);
-            if value.and_then(Value::as_str).is_none_or(str::is_empty) {
-                let shown = value.map_or_else(|| "missing".to_owned(), show);
+            let value = action.argument(key);
+            if value.text().is_none_or(str::is_empty) {
+                let shown = missing_or(value);
                 found.broken("MAP-16", format!("{key} of downloadMap is {shown}"));
             }
         }
-        if let Some(link) = parameter(action, "mapDownloadLink").and_then(Value::as_str)
+        if let Some(link) = action.argument("mapDownloadLink").text()
             && !link.is_empty()
             && !is_remote(link)
         {
             let text = format!(
                 "mapDownloadLink {} names no host the vehicle could ask",
-                show(&link.into())
+                show(&Json::Text(link.into()))
             );
             found.remark("MAP-16", text);
         }
-        if parameter(action, "mapVersion").is_none() {
+        if action.argument("mapVersion").is_absent() {
             found.remark("MAP-16", "mapVersion of downloadMap is missing");
         }
     }
@@ -142,8 +142,8 @@ fn is_remote(link: &str) -> bool {
 }
 
 /// mapId and mapVersion of an action on maps.
-fn pair(action: &Value) -> Option<(String, String)> {
-    let text = |key: &str| Some(parameter(action, key)?.as_str()?.chars().take(256).collect());
+fn pair(action: &ActionView) -> Option<(String, String)> {
+    let text = |key: &str| Some(action.argument(key).text()?.chars().take(256).collect());
     Some((text("mapId")?, text("mapVersion").unwrap_or_default()))
 }
 
@@ -169,22 +169,19 @@ impl Running for Enabled {
         if context.world.mock().is_lost(record) {
             self.reported.clear();
         }
-        if let Some(state) = record.said_json(Topic::State) {
-            let listed = state
-                .get("maps")
-                .and_then(Value::as_array)
-                .filter(|maps| !maps.is_empty());
+        if let Some(state) = record.said_state() {
+            let listed = state.maps.there().filter(|maps| !maps.is_empty());
             let enabled = listed.map(|maps| {
-                let on = maps.iter().take(KEPT).filter(|map| text(map, "mapStatus") == "ENABLED");
-                on.filter_map(|map| short(map, "mapId")).collect()
+                let on = maps.iter().take(KEPT).filter(|map| map.map_status.is("ENABLED"));
+                on.filter_map(|map| short(&map.map_id)).collect()
             });
             if self.reported.len() == 64 {
                 self.reported.pop_front();
             }
             self.reported.push_back((record.at().moment, enabled));
-            let all = elements(state, "actionStates").take(ELEMENTS);
-            for action in all.filter(|action| text(action, "actionStatus") == "FINISHED") {
-                let map = self.asked.remove(text(action, "actionId"));
+            let all = state.action_states.iter().take(ELEMENTS);
+            for action in all.filter(|action| action.action_status.is("FINISHED")) {
+                let map = self.asked.remove(action.action_id.or_empty());
                 self.usable.extend(map.filter(|_| self.usable.len() < KEPT));
             }
         }
@@ -192,12 +189,12 @@ impl Running for Enabled {
             return false;
         };
         for (scope, action) in command.actions() {
-            let (Some((map, _)), "enableMap") = (pair(action), text(action, "actionType")) else {
+            let (Some((map, _)), "enableMap") = (pair(action), action.action_type.or_empty()) else {
                 continue;
             };
-            if scope != "INSTANT" && self.usable.len() < KEPT {
+            if scope != Scope::Instant && self.usable.len() < KEPT {
                 self.usable.insert(map);
-            } else if let Some(id) = short(action, "actionId").filter(|_| self.asked.len() < KEPT) {
+            } else if let Some(id) = short(&action.action_id).filter(|_| self.asked.len() < KEPT) {
                 self.asked.insert(id, map);
             }
         }
@@ -216,8 +213,8 @@ impl Running for Enabled {
         let mut found = Found::new(record, findings);
         let mut judged = false;
         let mut said = BTreeSet::new();
-        let is_update = number(order, "orderUpdateId").is_some_and(|update| update > 0);
-        for node in in_sequence(order, "nodes") {
+        let is_update = order.order_update_id.whole().is_some_and(|update| update > 0);
+        for node in nodes_in_sequence(order) {
             let Some((_, _, map)) = place_of(node).filter(|(_, _, map)| !map.is_empty()) else {
                 continue;
             };
@@ -253,10 +250,10 @@ impl Running for OnBoard {
             self.listed.clear();
         }
         let now = record.at().moment;
-        if let Some(state) = record.said_json(Topic::State) {
-            let name = |map: &Value, member| short(map, member).unwrap_or_default();
-            let maps = elements(state, "maps").take(KEPT);
-            let maps = maps.map(|map| (name(map, "mapId"), name(map, "mapVersion"))).collect();
+        if let Some(state) = record.said_state() {
+            let name = |member| short(member).unwrap_or_default();
+            let maps = state.maps.iter().take(KEPT);
+            let maps = maps.map(|map| (name(&map.map_id), name(&map.map_version))).collect();
             if self.listed.len() == 64 {
                 self.listed.pop_front();
             }
@@ -280,7 +277,7 @@ impl Running for OnBoard {
         let mut found = Found::new(record, findings);
         let mut judged = false;
         for (_, action) in command.actions() {
-            let (Some((id, version)), "enableMap") = (pair(action), text(action, "actionType")) else {
+            let (Some((id, version)), "enableMap") = (pair(action), action.action_type.or_empty()) else {
                 continue;
             };
             judged = true;
@@ -313,18 +310,17 @@ struct Duplicates {
 }
 
 impl Duplicates {
-    fn note_state(&mut self, state: &Value, at: Moment) {
+    fn note_state(&mut self, state: &StateView, at: Moment) {
         let has = |pair: &(String, String)| {
-            elements(state, "maps")
-                .take(KEPT)
-                .any(|map| text(map, "mapId") == pair.0 && text(map, "mapVersion") == pair.1)
+            let mut maps = state.maps.iter().take(KEPT);
+            maps.any(|map| map.map_id.or_empty() == pair.0 && map.map_version.or_empty() == pair.1)
         };
-        for action in elements(state, "actionStates").take(ELEMENTS) {
-            if text(action, "actionStatus") != "FAILED" {
+        for action in state.action_states.iter().take(ELEMENTS) {
+            if !action.is_failed() {
                 continue;
             }
             // Each action is looked at once.
-            let id = text(action, "actionId");
+            let id = action.action_id.or_empty();
             if let Some(pair) = self.asked.remove(id).or_else(|| self.deleted.remove(id))
                 && has(&pair)
             {
@@ -346,7 +342,7 @@ impl Running for Duplicates {
             self.refused.clear();
             self.deleted.clear();
         }
-        if let Some(state) = record.said_json(Topic::State) {
+        if let Some(state) = record.said_state() {
             self.note_state(state, record.at().moment);
         }
         let Some(command) = Command::read(record) else {
@@ -356,16 +352,16 @@ impl Running for Duplicates {
         let mut judged = false;
         for (_, action) in command.actions() {
             let Some(pair) = pair(action) else { continue };
-            match text(action, "actionType") {
+            match action.action_type.or_empty() {
                 "deleteMap" => {
                     judged |= self.refused.remove(&pair).is_some();
                     if self.deleted.len() < KEPT {
-                        let id = short(action, "actionId").unwrap_or_default();
+                        let id = short(&action.action_id).unwrap_or_default();
                         self.deleted.insert(id, pair);
                     }
                 }
                 "downloadMap" => {
-                    let id = short(action, "actionId").unwrap_or_default();
+                    let id = short(&action.action_id).unwrap_or_default();
                     if self.sent.len() == KEPT {
                         self.sent.pop_first();
                     }

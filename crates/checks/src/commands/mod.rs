@@ -51,12 +51,12 @@ pub(super) use parameters::{KEYS, MANDATORY, VALUES};
 pub(super) use place::{CANCELLED_BETWEEN, CANCELLED_ON_NODE, FIRST_PLACE, START};
 pub(super) use trajectories::{ENDS, TRAJECTORY};
 
-use serde_json::Value;
-
 use crate::finding::{broken, remark};
 use tck_check::{CheckContext, CheckFinding, Running};
-use tck_world::members::{ELEMENTS, elements, in_sequence, instant_actions, place_of, released, short, text};
-use tck_world::{Observation, Topic};
+use tck_view::{ActionView, Element, InstantActionsView, OrderView, Scope};
+use tck_world::Observation;
+use tck_world::members::ELEMENTS;
+use tck_world::ordered::{allowed_deviation, edges_in_sequence, elements, nodes_in_sequence, place_of, short};
 
 /// How many findings of one kind a message is worth.
 const REPORTED: usize = 4;
@@ -64,42 +64,37 @@ const REPORTED: usize = 4;
 /// A message of the master control to the vehicle.
 #[derive(Clone, Copy, Debug)]
 enum Command<'e> {
-    Order(&'e Value),
-    Instant(&'e Value),
+    Order(&'e OrderView),
+    Instant(&'e InstantActionsView),
 }
 
 impl<'e> Command<'e> {
     /// Reads a record; only what is a JSON object.
     fn read(record: &Observation<'e>) -> Option<Self> {
-        let order = record.delivered_json(Topic::Order).map(Self::Order);
-        order.or_else(|| record.delivered_json(Topic::InstantActions).map(Self::Instant))
+        let order = record.order().map(|order| Self::Order(order));
+        order.or_else(|| record.instant_actions().map(|message| Self::Instant(message)))
     }
 
-    fn order(self) -> Option<&'e Value> {
+    fn order(self) -> Option<&'e OrderView> {
         match self {
             Self::Order(order) => Some(order),
             Self::Instant(_) => None,
         }
     }
 
-    fn value(self) -> &'e Value {
+    /// Every action in it, with its scope.
+    fn actions(self) -> Vec<(Scope, &'e ActionView)> {
         match self {
-            Self::Order(value) | Self::Instant(value) => value,
-        }
-    }
-
-    /// Every action in it, with its scope in the words of a factsheet.
-    fn actions(self) -> Vec<(&'static str, &'e Value)> {
-        match self {
-            Self::Instant(message) => instant_actions(message).map(|action| ("INSTANT", action)).collect(),
+            Self::Instant(message) => {
+                let all = message.commanded().take(ELEMENTS);
+                all.map(|action| (Scope::Instant, action)).collect()
+            }
             Self::Order(order) => {
-                let of = |list, scope| {
-                    elements(order, list)
-                        .take(ELEMENTS)
-                        .flat_map(|element| elements(element, "actions"))
-                        .map(move |action| (scope, action))
+                let of_element = |element: Element<'e>| {
+                    let scope = if element.is_edge() { Scope::Edge } else { Scope::Node };
+                    element.actions().iter().map(move |action| (scope, action))
                 };
-                of("nodes", "NODE").chain(of("edges", "EDGE")).take(ELEMENTS).collect()
+                elements(order).flat_map(of_element).take(ELEMENTS).collect()
             }
         }
     }
@@ -165,12 +160,4 @@ impl Running for Each {
         };
         (self.rule)(command, context, &mut Found::new(record, findings))
     }
-}
-
-/// Of a parameter of an action.
-fn parameter<'v>(action: &'v Value, key: &str) -> Option<&'v Value> {
-    elements(action, "actionParameters")
-        .take(ELEMENTS)
-        .find(|parameter| text(parameter, "key") == key)?
-        .get("value")
 }

@@ -3,7 +3,7 @@
 use super::{Command, Found};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::text;
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Outside, Topic};
 
 /// `commands/modes`.
@@ -23,7 +23,7 @@ pub(crate) const MODES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[StateView::operating_mode],
     start: |_| Box::new(Modes::default()),
 };
 
@@ -60,14 +60,14 @@ impl Running for Modes {
         }
         // That nothing comes is seen with every state.
         let Some(command) = Command::read(record) else {
-            return record.said_json(Topic::State).is_some();
+            return record.said_state().is_some();
         };
         let mut found = Found::new(record, findings);
         let asks = |kind: &str| matches!(kind, "stateRequest" | "factsheetRequest");
         let actions = command.actions();
         let only_asks = command.order().is_none()
             && !actions.is_empty()
-            && actions.iter().all(|(_, action)| asks(text(action, "actionType")));
+            && actions.iter().all(|(_, action)| asks(action.action_type.or_empty()));
         if only_asks {
             found.remark("MODE-04", format!("a request is sent to a vehicle in {}", seen.mode));
         } else {

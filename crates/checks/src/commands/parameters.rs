@@ -2,11 +2,11 @@
 
 use serde_json::Value;
 
-use super::{Command, ELEMENTS, Found, parameter};
+use super::{Command, ELEMENTS, Found};
 use crate::factsheet_actions::{How, look};
 use crate::finding::{quote, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ActionView, Edge, Field, InstantActionsView, Json, Kind, Member, Node, OrderView, Parameter, Presence};
 use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/parameter-form`.
@@ -22,7 +22,7 @@ pub(crate) const VALUES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ActionView::action_parameters],
     start: |_| Box::new(Values),
 };
 
@@ -39,16 +39,16 @@ impl Running for Values {
             return false;
         };
         let mut found = Found::new(record, findings);
-        let judged = form(command, &mut found);
+        let judged = form(command, record, &mut found);
         let sheets = context.world.factsheets().valid(record, context);
         if sheets.is_empty() {
             return judged;
         }
         for (_, action) in command.actions() {
-            let kind = text(action, "actionType");
-            for parameter in elements(action, "actionParameters").take(ELEMENTS) {
-                let key = text(parameter, "key");
-                let Some(value) = parameter.get("value").filter(|value| !value.is_null()) else {
+            let kind = action.action_type.or_empty();
+            for parameter in action.action_parameters.iter().take(ELEMENTS) {
+                let key = parameter.key.or_empty();
+                let Some(value) = parameter.value.there() else {
                     continue;
                 };
                 // Wrong is what no factsheet that counts allows.
@@ -86,7 +86,7 @@ pub(crate) const KEYS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ActionView::action_parameters],
     start: |_| Box::new(Keys),
 };
 
@@ -102,49 +102,85 @@ pub(crate) const MANDATORY: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[ActionView::action_parameters],
     start: |_| Box::new(Mandatory),
 };
 
-fn form(command: Command<'_>, found: &mut Found<'_>) -> bool {
-    let mut judged = false;
-    for (_, action) in command.actions() {
-        let Some(parameters) = action.get("actionParameters") else {
-            continue;
-        };
-        let kind = quote(text(action, "actionType"));
-        let Some(list) = parameters.as_array() else {
-            judged = true;
-            found.broken(
-                "BP-04",
-                format!("actionParameters of {kind} is no array: {}", show(parameters)),
-            );
-            continue;
-        };
-        for parameter in list.iter().take(ELEMENTS) {
-            judged = true;
-            let Some(members) = parameter.as_object() else {
-                found.broken(
-                    "BP-04",
-                    format!("a parameter of {kind} is no object: {}", show(parameter)),
-                );
-                continue;
+/// The actions of a message as they are written, in the order of [`Command::actions`].
+fn written<'e>(command: Command<'_>, record: &Observation<'e>) -> Vec<&'e Value> {
+    let (names, message) = (record.names(), record.json().unwrap_or(&Value::Null));
+    let lists: &[(Field, Field)] = match command {
+        Command::Order(_) => &[(OrderView::nodes, Node::actions), (OrderView::edges, Edge::actions)],
+        Command::Instant(instant) => {
+            let list = match instant.actions {
+                Member::There(_) => InstantActionsView::actions,
+                _ => InstantActionsView::misnamed_actions,
             };
-            let lacks = ["key", "value"].into_iter().find(|name| !members.contains_key(*name));
-            if let Some(name) = lacks {
-                let text = format!("a parameter of {kind} has no {name}: {}", show(parameter));
+            return names.raw_elements(message, list).iter().take(ELEMENTS).collect();
+        }
+    };
+    let of = |(list, actions): &(Field, Field)| {
+        let actions = *actions;
+        let all = names.raw_elements(message, *list).iter().take(ELEMENTS);
+        all.flat_map(move |element| names.raw_elements(element, actions))
+    };
+    lists.iter().flat_map(of).take(ELEMENTS).collect()
+}
+
+fn form(command: Command<'_>, record: &Observation<'_>, found: &mut Found<'_>) -> bool {
+    let mut judged = false;
+    for (at, (_, action)) in command.actions().into_iter().enumerate() {
+        let kind = quote(action.action_type.or_empty());
+        let list = match &action.action_parameters {
+            Member::Absent => continue,
+            Member::There(list) => list,
+            Member::Null => {
+                judged = true;
+                found.broken("BP-04", format!("actionParameters of {kind} is no array: null"));
+                continue;
+            }
+            Member::Other(other) => {
+                judged = true;
+                let text = format!("actionParameters of {kind} is no array: {}", show(other));
+                found.broken("BP-04", text);
+                continue;
+            }
+        };
+        for (place, parameter) in list.iter().take(ELEMENTS).enumerate() {
+            judged = true;
+            let shown = || {
+                let actions = written(command, record);
+                let list = actions.get(at).map(|action| {
+                    let all = record.names().raw_elements(action, ActionView::action_parameters);
+                    all.get(place).map(show).unwrap_or_default()
+                });
+                list.unwrap_or_default()
+            };
+            if let Some(odd) = parameter.odd() {
+                let text = format!("a parameter of {kind} is no object: {}", show(odd));
+                found.broken("BP-04", text);
+                continue;
+            }
+            let members = [
+                (Parameter::key, parameter.key.presence()),
+                (Parameter::value, parameter.value.presence()),
+            ];
+            let lacks = members.iter().find(|(_, presence)| *presence == Presence::Absent);
+            if let Some((field, _)) = lacks {
+                let text = format!("a parameter of {kind} has no {}: {}", field.usual_name(), shown());
                 found.broken("BP-04", text.clone());
                 found.broken("BP-05", text);
-            } else if !parameter.get("key").is_some_and(Value::is_string) {
-                found.broken(
-                    "BP-05",
-                    format!("the key of a parameter of {kind} is no text: {}", show(parameter)),
-                );
-            } else if parameter.get("value").is_some_and(Value::is_null) {
-                found.broken(
-                    "BP-05",
-                    format!("parameter {} of {kind} is null", quote(text(parameter, "key"))),
-                );
+                continue;
+            }
+            match parameter.key.text() {
+                None => {
+                    let text = format!("the key of a parameter of {kind} is no text: {}", shown());
+                    found.broken("BP-05", text);
+                }
+                Some(key) if parameter.value.is_null() => {
+                    found.broken("BP-05", format!("parameter {} of {kind} is null", quote(key)));
+                }
+                Some(_) => {}
             }
         }
     }
@@ -152,12 +188,12 @@ fn form(command: Command<'_>, found: &mut Found<'_>) -> bool {
 }
 
 /// The parameters of a predefined action.
-fn predefined<'c>(action: &Value, context: &'c CheckContext<'_>) -> Option<&'c serde_json::Map<String, Value>> {
+fn predefined<'c>(action: &ActionView, context: &'c CheckContext<'_>) -> Option<&'c serde_json::Map<String, Value>> {
     let known = context
         .pack
         .vocabulary()
         .get("action")?
-        .get(text(action, "actionType"))?;
+        .get(action.action_type.or_empty())?;
     known.get("parameters")?.as_object()
 }
 
@@ -180,10 +216,12 @@ impl Running for Keys {
             let Some(predefined) = predefined(action, context).filter(|known| !known.is_empty()) else {
                 continue;
             };
-            let kind = text(action, "actionType");
-            let keys: Vec<&str> = elements(action, "actionParameters")
+            let kind = action.action_type.or_empty();
+            let keys: Vec<&str> = action
+                .action_parameters
+                .iter()
                 .take(ELEMENTS)
-                .map(|parameter| text(parameter, "key"))
+                .map(|parameter| parameter.key.or_empty())
                 .collect();
             judged |= !keys.is_empty();
             let lists = |sheet: &Factsheet, key: &str| {
@@ -198,13 +236,12 @@ impl Running for Keys {
                 .filter(|key| !predefined.contains_key(*key))
                 .filter(|key| !sheets.iter().any(|sheet| lists(sheet, key)))
                 .collect();
-            for parameter in elements(action, "actionParameters").take(ELEMENTS) {
-                let (key, inside) = (
-                    text(parameter, "key"),
-                    parameter.get("value").and_then(Value::as_object),
-                );
-                let inside = inside.filter(|_| further.contains(&key));
-                let hidden = inside.and_then(|inside| inside.keys().find(|name| predefined.contains_key(*name)));
+            for parameter in action.action_parameters.iter().take(ELEMENTS) {
+                let key = parameter.key.or_empty();
+                let inside = parameter.value.there().and_then(Json::members);
+                let names = inside.into_iter().flatten().map(|(name, _)| name.as_str());
+                let mut hidden = names.filter(|name| predefined.contains_key(*name));
+                let hidden = hidden.next().filter(|_| further.contains(&key));
                 if let Some(hidden) = hidden {
                     let name = quote(key);
                     found.broken("ACT-06", format!("{hidden} of {kind} is hidden in a parameter {name}"));
@@ -248,11 +285,12 @@ impl Running for Mandatory {
         let mut found = Found::new(record, findings);
         let mut judged = false;
         for (_, action) in command.actions() {
-            let kind = text(action, "actionType");
+            let kind = action.action_type.or_empty();
             let mandatory = predefined(action, context).into_iter().flatten();
             for (key, rule) in mandatory.filter(|(_, rule)| rule.get("optional") == Some(&Value::Bool(false))) {
                 judged = true;
-                let Some(value) = parameter(action, key) else {
+                let value = action.argument(key);
+                if value.is_absent() {
                     let message = format!("{kind} has no parameter {key}");
                     // The table and the prose disagree about it; the ruling of MAP-16 is a warning.
                     let disputed = kind == "downloadMap" && key == "mapVersion";
@@ -263,8 +301,9 @@ impl Running for Mandatory {
                         found.broken("ACT-31", message);
                     }
                     continue;
-                };
-                if !is_of_type(value, text(rule, "type")) {
+                }
+                let wanted = rule.get("type").and_then(Value::as_str).unwrap_or_default();
+                if !is_of_type(value.there().unwrap_or(&Json::Null), wanted) {
                     found.broken("ACT-31", format!("parameter {key} of {kind} is {}", show(value)));
                 }
             }
@@ -279,14 +318,15 @@ fn is_optional(sheet: &Factsheet, kind: &str, key: &str) -> bool {
     listed.is_some_and(|listed| listed.get(key) == Some(&true))
 }
 
-fn is_of_type(value: &Value, wanted: &str) -> bool {
+fn is_of_type(value: &Json, wanted: &str) -> bool {
+    let kind = value.kind();
     match wanted {
-        "FLOAT" | "NUMBER" => value.is_number(),
-        "INTEGER" => value.is_i64() || value.is_u64() || value.as_f64().is_some_and(|value| value.fract() == 0.0),
-        "STRING" => value.is_string(),
-        "BOOL" => value.is_boolean(),
-        "OBJECT" => value.is_object(),
-        "ARRAY" => value.is_array(),
+        "FLOAT" | "NUMBER" => kind == Kind::Number,
+        "INTEGER" => value.number().is_some_and(|number| number.float().fract() == 0.0),
+        "STRING" => kind == Kind::Text,
+        "BOOL" => kind == Kind::Flag,
+        "OBJECT" => kind == Kind::Object,
+        "ARRAY" => kind == Kind::List,
         _ => true,
     }
 }

@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use super::{Command, Found, in_sequence, place_of};
+use super::{Command, Found, allowed_deviation, nodes_in_sequence, place_of};
 use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{number, text};
+use tck_view::{Member, Node, OrderView, StateView};
 use tck_world::{Fact, Factsheet, Listen, Observation, ShownState, Topic};
 
 /// `commands/start`.
@@ -18,7 +18,7 @@ pub(crate) const START: Check = Check {
     arguments: &["settled"],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock],
-    needs: &[],
+    needs: &[OrderView::order_id, Node::node_id, StateView::last_node_id],
     start: |context| {
         let settled = context.with.get("settled") == Some(&Value::Bool(true));
         Box::new(Start {
@@ -37,7 +37,7 @@ pub(crate) const CANCELLED_ON_NODE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock, Fact::Factsheets],
-    needs: &[],
+    needs: &[OrderView::order_id, Node::node_id, StateView::last_node_id],
     start: |_| Box::new(Start::new(Rule::OnNode)),
 };
 
@@ -50,7 +50,7 @@ pub(crate) const CANCELLED_BETWEEN: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock, Fact::Factsheets],
-    needs: &[],
+    needs: &[OrderView::order_id, Node::node_id, StateView::last_node_id],
     start: |_| Box::new(Start::new(Rule::Between)),
 };
 
@@ -63,7 +63,7 @@ pub(crate) const FIRST_PLACE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[Fact::Starts, Fact::Mock],
-    needs: &[],
+    needs: &[OrderView::order_id, Node::node_id, StateView::last_node_id],
     start: |_| {
         Box::new(Start {
             settled: true,
@@ -108,14 +108,14 @@ impl Start {
 
     fn judge(
         &self,
-        node: &Value,
+        node: &Node,
         recent: &[&ShownState],
         record: &Observation<'_>,
         context: &CheckContext<'_>,
         found: &mut Found<'_>,
     ) -> bool {
         let cancelled = context.world.starts().is_behind_cancellation(record);
-        let id = text(node, "nodeId");
+        let id = node.node_id.or_empty();
         let is_last = recent.iter().any(|seen| seen.last_node == id);
         // What was set up by the harness stands exactly there.
         let exact = self.settled && self.rule == Rule::Start;
@@ -189,7 +189,8 @@ impl Start {
                 if !cancelled || !between || covered == Reach::Unknown {
                     return false;
                 }
-                let allowed = node.pointer("/nodePosition/allowedDeviationXY");
+                let position = node.node_position.there();
+                let allowed = position.map_or(&Member::Absent, |position| &position.allowed_deviation_xy);
                 if covered == Reach::Yes {
                     return true;
                 }
@@ -200,10 +201,10 @@ impl Start {
                 // What the vehicle does not support need not be sent to it.
                 let sheets = context.world.factsheets().valid(record, context);
                 let unsupported = sheets.iter().any(|sheet| unlisted(sheet));
-                if is_last && allowed.is_none() && unsupported {
+                if is_last && allowed.is_absent() && unsupported {
                     return false;
                 }
-                if is_last && allowed.is_none() {
+                if is_last && allowed.is_absent() {
                     let text = format!("the order begins at node {shown} without a deviation that reaches the vehicle");
                     found.remark("ORD-CANCEL-17", text);
                 } else {
@@ -224,7 +225,7 @@ enum Reach {
 }
 
 /// The map of a node and that of the vehicle, where it was on another one in every state that counts.
-fn other_map<'a>(node: &'a Value, recent: &[&'a ShownState]) -> Option<(&'a str, &'a str)> {
+fn other_map<'a>(node: &'a Node, recent: &[&'a ShownState]) -> Option<(&'a str, &'a str)> {
     let map = place_of(node)?.2;
     let (_, _, first) = recent.first()?.pose.as_ref()?;
     let elsewhere = recent
@@ -235,11 +236,11 @@ fn other_map<'a>(node: &'a Value, recent: &[&'a ShownState]) -> Option<(&'a str,
 
 /// Whether the place of a node covers where the vehicle says it is; a deviation that is named has to reach it where
 /// that is known exactly.
-fn covers(node: &Value, seen: &ShownState, exact: bool) -> Reach {
+fn covers(node: &Node, seen: &ShownState, exact: bool) -> Reach {
     let (Some((x, y, map)), Some((at_x, at_y, on))) = (place_of(node), seen.pose.as_ref()) else {
         return Reach::Unknown;
     };
-    let allowed = node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64);
+    let allowed = allowed_deviation(node);
     let named = allowed.is_some_and(|allowed| allowed > 0.0);
     let margin = if exact && named { ROUNDED } else { MEASURED };
     let near = (x - at_x).hypot(y - at_y) <= allowed.unwrap_or_default().max(0.0) + margin;
@@ -261,14 +262,14 @@ impl Running for Start {
             return false;
         };
         // Who knows that the vehicle has nothing to do also knows that an order of another name is a new one.
-        let begins = self.settled || number(order, "orderUpdateId").is_none_or(|update| update == 0);
-        let node = in_sequence(order, "nodes").into_iter().next();
+        let begins = self.settled || order.order_update_id.whole().is_none_or(|update| update == 0);
+        let node = nodes_in_sequence(order).into_iter().next();
         let Some(node) = node.filter(|_| begins && context.world.starts().is_new(record)) else {
             return false;
         };
         let vehicle = context.world.mock();
         // A state may overtake the order it answers.
-        let own = text(order, "orderId");
+        let own = order.order_id.or_empty();
         let recent = vehicle.recent(record, context);
         let mut recent: Vec<&ShownState> = recent.filter(|seen| seen.order != own).collect();
         if self.settled {
@@ -277,7 +278,7 @@ impl Running for Start {
         }
         let settled = self.settled || (!vehicle.unsettled(record, context) && !record.link.disturbed);
         let idle = recent.first().is_some_and(|seen| seen.is_idle());
-        if !settled || !idle || !node.get("nodeId").is_some_and(Value::is_string) {
+        if !settled || !idle || !node.node_id.is_there() {
             return false;
         }
         self.judge(node, &recent, record, context, &mut Found::new(record, findings))

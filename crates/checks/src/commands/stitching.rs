@@ -2,40 +2,33 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
-
-use super::{Found, in_sequence, released, short};
+use super::{Found, edges_in_sequence, elements, nodes_in_sequence, short};
 use crate::finding::quote;
-use tck_world::members::{ELEMENTS, elements, number, text};
-use tck_world::print;
+use tck_view::{Deviation, Field, Member, Node, NodePosition, Number, OrderView, Print};
+use tck_world::members::ELEMENTS;
 
 /// The released elements of a message: sequenceId and id.
-pub(super) fn base(order: &Value) -> impl Iterator<Item = (u64, String)> {
-    [("nodes", "nodeId"), ("edges", "edgeId")]
-        .into_iter()
-        .flat_map(move |(list, id)| {
-            let all = elements(order, list).take(ELEMENTS);
-            let base = all.filter(|element| released(element) == Some(true));
-            base.filter_map(move |element| Some((number(element, "sequenceId")?, short(element, id)?)))
-        })
+pub(super) fn base(order: &OrderView) -> impl Iterator<Item = (u64, String)> {
+    let base = elements(order).filter(|element| element.released().is(true));
+    base.filter_map(|element| Some((element.sequence_id().whole()?, short(element.id())?)))
 }
 
 /// Finds an update that does not begin with the last released node; `known` are the released elements so far.
 pub(super) fn elsewhere(
     known: &BTreeMap<u64, String>,
     (end_id, end_sequence): (&str, u64),
-    message: &Value,
-    first: &Value,
+    message: &OrderView,
+    first: &Node,
     found: &mut Found<'_>,
 ) {
-    let shown = quote(text(first, "nodeId"));
-    let Some(sequence) = number(first, "sequenceId") else {
+    let shown = quote(first.node_id.or_empty());
+    let Some(sequence) = first.sequence_id.whole() else {
         return;
     };
     let wanted = format!("{} with sequenceId {}", quote(end_id), end_sequence);
     let text_of = |what: &str| format!("the update begins with node {shown}, sequenceId {sequence}, {what} {wanted}");
     found.broken("ORD-UPD-05", text_of("and not with"));
-    if text(first, "nodeId") == end_id {
+    if first.node_id.or_empty() == end_id {
         found.broken("ORD-UPD-12", text_of("which was"));
         return;
     }
@@ -47,55 +40,80 @@ pub(super) fn elsewhere(
 }
 
 /// Edges of an update that have numbers from before its first node, which other elements had already.
-pub(super) fn counted_back(message: &Value, first: &Value, found: &mut Found<'_>) {
-    let (nodes, edges) = (in_sequence(message, "nodes"), in_sequence(message, "edges"));
-    let Some(begins) = number(first, "sequenceId").filter(|_| nodes.len() == edges.len() + 1) else {
+pub(super) fn counted_back(message: &OrderView, first: &Node, found: &mut Found<'_>) {
+    let (nodes, edges) = (nodes_in_sequence(message), edges_in_sequence(message));
+    let Some(begins) = first.sequence_id.whole().filter(|_| nodes.len() == edges.len() + 1) else {
         return;
     };
     let back = edges
         .into_iter()
-        .find_map(|edge| Some((edge, number(edge, "sequenceId").filter(|sequence| *sequence < begins)?)));
+        .find_map(|edge| Some((edge, edge.sequence_id.whole().filter(|sequence| *sequence < begins)?)));
     if let Some((edge, sequence)) = back {
-        let id = quote(text(edge, "edgeId"));
+        let id = quote(edge.edge_id.or_empty());
         let text = format!("edge {id} of an update that begins with sequenceId {begins} has sequenceId {sequence}");
         found.broken("ORD-UPD-12", text);
     }
 }
 
+/// What became of a member.
+#[derive(Clone, Copy)]
+enum Change {
+    No,
+    /// It has another value.
+    Other,
+    /// It was not there before, or is not there any more.
+    CameOrWent,
+}
+
+impl Change {
+    fn of<T: PartialEq>(old: &Member<T>, new: &Member<T>, number: impl Fn(&T) -> Option<f64>) -> Self {
+        let float = |member: &Member<T>| member.there().and_then(&number);
+        let differ = match (float(old), float(new)) {
+            (Some(old), Some(new)) => (old - new).abs() > 1.0e-6,
+            _ => old != new,
+        };
+        match differ {
+            false => Self::No,
+            true if old.is_absent() || new.is_absent() => Self::CameOrWent,
+            true => Self::Other,
+        }
+    }
+}
+
+/// What became of the place of a node.
+fn moved(old: &NodePosition, new: &NodePosition) -> [(Field, Change); 6] {
+    let float = |number: &Number| Some(number.float());
+    let (xy, theta) = (&old.allowed_deviation_xy, &old.allowed_deviation_theta);
+    [
+        (NodePosition::x, Change::of(&old.x, &new.x, float)),
+        (NodePosition::y, Change::of(&old.y, &new.y, float)),
+        (NodePosition::theta, Change::of(&old.theta, &new.theta, float)),
+        (
+            NodePosition::allowed_deviation_xy,
+            Change::of(xy, &new.allowed_deviation_xy, Deviation::radius),
+        ),
+        (
+            NodePosition::allowed_deviation_theta,
+            Change::of(theta, &new.allowed_deviation_theta, float),
+        ),
+        (NodePosition::map_id, Change::of(&old.map_id, &new.map_id, |_| None)),
+    ]
+}
+
 /// A stitching node against its first transmission.
-pub(super) fn stitched(before: &Value, now: &Value, found: &mut Found<'_>) {
-    let id = quote(text(now, "nodeId"));
-    if released(now) != Some(true) {
+pub(super) fn stitched(before: &Node, now: &Node, found: &mut Found<'_>) {
+    let id = quote(now.node_id.or_empty());
+    if !now.released.is(true) {
         found.broken("ORD-UPD-06", format!("stitching node {id} is not released any more"));
     }
-    let position = |node: &Value| {
-        node.get("nodePosition")
-            .filter(|position| position.is_object())
-            .cloned()
-    };
-    match (position(before), position(now)) {
+    match (before.node_position.there(), now.node_position.there()) {
         (Some(before), Some(now)) => {
-            for name in [
-                "x",
-                "y",
-                "theta",
-                "allowedDeviationXY",
-                "allowedDeviationTheta",
-                "mapId",
-            ] {
-                let (old, new) = (before.get(name), now.get(name));
-                let differ = match (old.and_then(Value::as_f64), new.and_then(Value::as_f64)) {
-                    (Some(old), Some(new)) => (old - new).abs() > 1.0e-6,
-                    _ => old != new,
-                };
-                if !differ {
-                    continue;
-                }
-                let text = format!("{name} of stitching node {id} has changed");
-                if old.is_some() && new.is_some() {
-                    found.broken("ORD-UPD-06", text);
-                } else {
-                    found.remark("ORD-UPD-06", text);
+            for (field, change) in moved(before, now) {
+                let text = format!("{} of stitching node {id} has changed", field.usual_name());
+                match change {
+                    Change::No => {}
+                    Change::Other => found.broken("ORD-UPD-06", text),
+                    Change::CameOrWent => found.remark("ORD-UPD-06", text),
                 }
             }
         }
@@ -105,11 +123,9 @@ pub(super) fn stitched(before: &Value, now: &Value, found: &mut Found<'_>) {
             format!("nodePosition of stitching node {id} came or went"),
         ),
     }
-    let prints = |node: &Value| -> Vec<u64> {
-        elements(node, "actions")
-            .take(ELEMENTS)
-            .map(|action| print::without(action, &["actionDescription"]))
-            .collect()
+    let prints = |node: &Node| -> Vec<Print> {
+        let actions = node.actions.iter().take(ELEMENTS);
+        actions.map(|action| action.essence).collect()
     };
     let (old, new) = (prints(before), prints(now));
     if new.iter().any(|action| !old.contains(action)) {

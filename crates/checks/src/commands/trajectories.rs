@@ -1,10 +1,11 @@
 //! Trajectories that are sent with edges.
 
-use super::{Command, Each, Found, in_sequence, place_of};
+use super::{Command, Each, Found, allowed_deviation, edges_in_sequence, nodes_in_sequence, place_of};
 use crate::finding::quote;
 use tck_base::nurbs::{Curve, Flaw};
 use tck_check::{Check, CheckContext};
-use tck_world::members::text;
+use tck_view::{Edge, Member, Node, Trajectory};
+use tck_world::ordered::curve;
 use tck_world::{Listen, Topic};
 
 /// `commands/trajectory`.
@@ -17,7 +18,7 @@ pub(crate) const TRAJECTORY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[Edge::trajectory],
     start: |_| Each::start(shape),
 };
 
@@ -30,7 +31,7 @@ pub(crate) const ENDS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[Edge::trajectory, Node::node_position],
     start: |_| Each::start(ends),
 };
 
@@ -40,13 +41,15 @@ const END: f64 = 0.5;
 fn shape(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let Some(order) = command.order() else { return false };
     let mut judged = false;
-    for edge in in_sequence(order, "edges") {
-        let Some(trajectory) = edge.get("trajectory").filter(|trajectory| !trajectory.is_null()) else {
-            continue;
+    for edge in edges_in_sequence(order) {
+        let flaws = match &edge.trajectory {
+            Member::Absent | Member::Null => continue,
+            Member::There(trajectory) => curve(trajectory).1,
+            Member::Other(_) => curve(&Trajectory::default()).1,
         };
         judged = true;
-        for flaw in Curve::read(trajectory).1 {
-            let text = format!("the trajectory of edge {}: {flaw}", quote(text(edge, "edgeId")));
+        for flaw in flaws {
+            let text = format!("the trajectory of edge {}: {flaw}", quote(edge.edge_id.or_empty()));
             match flaw {
                 Flaw::Member(_) => found.broken("ORD-MSG-28", text),
                 Flaw::DegreeMissing => found.remark("ORD-MSG-28", text),
@@ -60,26 +63,23 @@ fn shape(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> b
 
 fn ends(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let Some(order) = command.order() else { return false };
-    let (nodes, edges) = (in_sequence(order, "nodes"), in_sequence(order, "edges"));
+    let (nodes, edges) = (nodes_in_sequence(order), edges_in_sequence(order));
     if nodes.len() != edges.len() + 1 {
         return false;
     }
     let mut judged = false;
     for (edge, around) in edges.iter().zip(nodes.windows(2)) {
-        let curve = edge.get("trajectory").and_then(|trajectory| Curve::read(trajectory).0);
-        let Some((start, end)) = curve.as_ref().and_then(Curve::ends) else {
+        let shape = edge.trajectory.there().and_then(|trajectory| curve(trajectory).0);
+        let Some((start, end)) = shape.as_ref().and_then(Curve::ends) else {
             continue;
         };
         for (node, point, verb) in [(around[0], start, "begins"), (around[1], end, "ends")] {
             let Some((x, y, _)) = place_of(node) else { continue };
             judged = true;
-            let allowed = node
-                .pointer("/nodePosition/allowedDeviationXY")
-                .and_then(serde_json::Value::as_f64)
-                .unwrap_or_default();
+            let allowed = allowed_deviation(node).unwrap_or_default();
             let distance = (x - point.0).hypot(y - point.1);
             if distance > END + allowed.max(0.0) {
-                let id = quote(text(edge, "edgeId"));
+                let id = quote(edge.edge_id.or_empty());
                 let text = format!("the trajectory of edge {id} {verb} {distance:.2} m from its node");
                 found.broken("ORD-MSG-30", text);
             }
