@@ -18,6 +18,7 @@ const CHECKS: [CheckInfo; 1] = [CheckInfo {
     name: "header/id-rises",
     decides: &["HDR-02"],
     arguments: &["topic"],
+    needs: &[],
 }];
 
 const HOOKS: [HookFacts; 1] = [HookFacts {

@@ -53,6 +53,7 @@ fn load() -> (Suites, Catalogue) {
             name: check.name,
             decides: check.decides,
             arguments: check.arguments,
+            needs: check.needs,
         })
         .collect();
     let hooks: Vec<HookFacts> = HOOKS

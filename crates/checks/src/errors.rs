@@ -4,11 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
-
 use crate::finding::broken;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, number, text};
+use tck_view::{ErrorView, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actionIds of instant actions are kept in mind.
@@ -33,7 +31,7 @@ pub(super) const PERSIST: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::errors, StateView::order_id, StateView::order_update_id],
     start: |_| Box::new(Persist::default()),
 };
 
@@ -74,26 +72,28 @@ impl Running for Persist {
             self.watched.clear();
             self.shown = None;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        if !state.get("errors").is_some_and(Value::is_array) {
+        if !state.errors.is_there() {
             return false;
         }
         let shown = (
-            text(state, "orderId").chars().take(512).collect(),
-            number(state, "orderUpdateId"),
-            text(state, "operatingMode").chars().take(64).collect(),
+            state.order_id.or_empty().to_owned(),
+            state.order_update_id.whole(),
+            state.operating_mode.or_empty().chars().take(64).collect(),
         );
         self.instant_pending = false;
         let before = self.shown.replace(shown);
         if before.is_none() || before != self.shown {
             self.watched.clear();
         }
-        let now: Vec<(String, bool)> = elements(state, "errors")
+        let now: Vec<(String, bool)> = state
+            .errors
+            .iter()
             .take(ACTIONS)
-            .filter(|error| requirement(text(error, "errorType")).is_some())
-            .map(|error| (text(error, "errorType").to_owned(), self.is_of_instant_action(error)))
+            .filter(|error| requirement(error.error_type.or_empty()).is_some())
+            .map(|error| (error.error_type.or_empty().to_owned(), self.is_of_instant_action(error)))
             .collect();
         let judged = !self.watched.is_empty();
         let gone: Vec<(&'static str, u64)> = self
@@ -138,17 +138,19 @@ impl Persist {
             self.after_order = false;
             self.instant_pending = true;
         }
-        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
-            let ids = actions(message).map(|action| text(action, "actionId").to_owned());
+        if let Some(message) = record.instant_actions_to_vehicle() {
+            let ids = message
+                .all_actions()
+                .map(|action| action.action_id.or_empty().to_owned());
             self.instant.extend(ids);
             let excess = self.instant.len().saturating_sub(ACTIONS);
             self.instant.drain(..excess);
         }
     }
 
-    fn is_of_instant_action(&self, error: &Value) -> bool {
-        elements(error, "errorReferences").any(|reference| {
-            let value = text(reference, "referenceValue");
+    fn is_of_instant_action(&self, error: &ErrorView) -> bool {
+        error.error_references.iter().any(|reference| {
+            let value = reference.value.or_empty();
             self.instant.iter().any(|id| id == value)
         })
     }

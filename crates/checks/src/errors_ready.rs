@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use crate::finding::remark;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
-use tck_world::{End, Listen, Observation, Topic, last_node};
+use tck_view::{SafetyState, StateView};
+use tck_world::{End, Listen, Observation, Topic};
 
 /// See the module.
 pub(super) const READY: Check = Check {
@@ -17,7 +17,13 @@ pub(super) const READY: Check = Check {
     arguments: &["order"],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[
+        StateView::errors,
+        StateView::last_node_id,
+        StateView::safety_state,
+        SafetyState::emergency_stop,
+        SafetyState::field_violation,
+    ],
     start: |_| Box::new(Ready::default()),
 };
 
@@ -32,15 +38,13 @@ struct Ready {
 }
 
 /// Whether the vehicle reports warnings, nothing worse, and nothing else that holds it.
-fn only_warns(state: &Value) -> bool {
-    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
-    let mut errors = elements(state, "errors").peekable();
-    errors.peek().is_some()
-        && errors.all(|error| text(error, "errorLevel") == "WARNING")
-        && state.get("paused") != Some(&Value::Bool(true))
-        && safety("eStop").and_then(Value::as_str) == Some("NONE")
-        && safety("fieldViolation") == Some(&Value::Bool(false))
-        && matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
+fn only_warns(state: &StateView) -> bool {
+    !state.errors.is_empty()
+        && state.errors.iter().all(|error| error.error_level.is("WARNING"))
+        && !state.paused.is(true)
+        && state.emergency_stop() == Some("NONE")
+        && state.field_violation() == Some(false)
+        && matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC")
 }
 
 impl Running for Ready {
@@ -50,26 +54,26 @@ impl Running for Ready {
         context: &CheckContext<'_>,
         _findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        if let Some(order) = record.to_vehicle_json(Topic::Order) {
-            self.order = Some(text(order, "orderId").chars().take(512).collect());
+        if let Some(order) = record.order_to_vehicle() {
+            self.order = Some(order.order_id.or_empty().to_owned());
             self.waits = None;
             self.started_at = None;
             self.set_out = false;
         }
-        let Some(state) = record.state_json().filter(|_| self.order.is_some()) else {
+        let Some(state) = record.state().filter(|_| self.order.is_some()) else {
             return false;
         };
-        let here = last_node(state);
+        let here = state.last_node().map(|(node, sequence)| (node.to_string(), sequence));
         let moved = self.started_at.is_some() && here != self.started_at;
         if self.started_at.is_none() {
             self.started_at = here;
         }
-        self.set_out |= moved || state.get("driving").and_then(Value::as_bool) == Some(true);
+        self.set_out |= moved || state.driving.is(true);
         let warns = only_warns(state);
         let order = self.order.as_deref();
-        let ahead = elements(state, "nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
+        let ahead = state.node_states.iter().any(|node| node.released.is(true));
         let asked = context.with.get("order").and_then(Value::as_str) == order;
-        let taken = Some(text(state, "orderId")) == order && ahead;
+        let taken = Some(state.order_id.or_empty()) == order && ahead;
         self.waits = (warns && !self.set_out && (asked || taken)).then_some(record.seq());
         warns && self.set_out
     }

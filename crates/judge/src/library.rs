@@ -140,6 +140,7 @@ fn check_infos(checks: &[Check]) -> Vec<CheckInfo> {
             name: check.name,
             decides: check.decides,
             arguments: check.arguments,
+            needs: check.needs,
         })
         .collect()
 }

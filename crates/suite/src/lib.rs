@@ -36,6 +36,7 @@ pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Variable, Vocabulary
 use model::{Monitor, Test};
 use tck_base::diagnostic::Diagnostic;
 use tck_pack::{Assets, Catalogue, Packs};
+use tck_view::Field;
 
 /// What the linter has to know of a named check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +47,8 @@ pub struct CheckInfo {
     pub decides: &'static [&'static str],
     /// Names of arguments it takes.
     pub arguments: &'static [&'static str],
+    /// Members of messages it cannot do without.
+    pub needs: &'static [Field],
 }
 
 /// All tests and monitors, sorted by id.

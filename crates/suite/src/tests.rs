@@ -9,11 +9,13 @@ use super::model::{Extent, From, RoutePlace, Section, Verb};
 use super::*;
 use tck_base::pattern::TermKind;
 use tck_pack::Role;
+use tck_view::StateView;
 
 const CHECKS: [CheckInfo; 1] = [CheckInfo {
     name: "header/id-rises",
     decides: &["HDR-02"],
     arguments: &["topic"],
+    needs: &[],
 }];
 
 const HOOKS: [HookFacts; 2] = [
@@ -297,6 +299,35 @@ fn two_monitors_do_not_share_a_name() {
         .unwrap_or_default();
     let codes: Vec<_> = problems.iter().map(|problem| problem.code).collect();
     assert_eq!(codes, ["duplicate-monitor"]);
+}
+
+#[test]
+fn a_check_is_refused_for_a_version_without_the_members_it_needs() {
+    let problems = |needs: &'static [Field], spec: &str| {
+        let text = format!(
+            "monitor: own/ids\ntitle: Ids\nspec: \"{spec}\"\nwhy: Because.\nchecks: [HDR-02]\ncheck: header/id-rises\n"
+        );
+        let world = World::new();
+        let vocabulary = PackVocabulary::new(&world.packs, &world.catalogue, &HOOKS);
+        let checks = [CheckInfo { needs, ..CHECKS[0] }];
+        let files = [("suites/monitors/own/ids.yaml", text.as_str())];
+        Suites::load_files(files.into_iter(), &vocabulary, &checks)
+            .err()
+            .unwrap_or_default()
+    };
+    let maps: &[Field] = &[StateView::order_id, StateView::maps];
+    assert!(problems(maps, ">=2.1, <3").is_empty());
+    let refused = problems(maps, ">=2.0, <3");
+    let [refused] = refused.as_slice() else {
+        panic!("{}", rendered(&refused));
+    };
+    assert_eq!(refused.code, "check-without-member");
+    let shown = refused.to_string();
+    for part in ["suites/monitors/own/ids.yaml:6:", "`state.maps`", "2.0.0"] {
+        assert!(shown.contains(part), "{part} in {shown}");
+    }
+    // Neither version of this program has what 3.0 brings.
+    assert_eq!(problems(&[StateView::zone_sets], ">=2.1, <3").len(), 1);
 }
 
 #[test]

@@ -2,10 +2,9 @@
 
 use tck_base::clock::Moment;
 
-use crate::members::{actions, elements, text};
 use crate::observation::Observation;
 use crate::orders::sets_position;
-use tck_view::Topic;
+use tck_view::ActionView;
 
 /// How many actions of an order are looked at.
 const ACTIONS: usize = 1024;
@@ -31,14 +30,13 @@ impl Displaced {
 }
 
 fn places(record: &Observation<'_>) -> bool {
+    let places = |action: &ActionView| sets_position(action.action_type.or_empty());
     let told = record
-        .to_vehicle_json(Topic::InstantActions)
-        .is_some_and(|message| actions(message).any(|action| sets_position(text(action, "actionType"))));
-    let placed = record.to_vehicle_json(Topic::Order).is_some_and(|order| {
-        let mut all = elements(order, "nodes")
-            .flat_map(|node| elements(node, "actions"))
-            .take(ACTIONS);
-        all.any(|action| sets_position(text(action, "actionType")))
+        .instant_actions_to_vehicle()
+        .is_some_and(|message| message.all_actions().any(places));
+    let placed = record.order_to_vehicle().is_some_and(|order| {
+        let all = order.nodes.iter().flat_map(|node| node.actions.iter());
+        all.take(ACTIONS).any(places)
     });
     told || placed
 }

@@ -4,13 +4,10 @@
 
 use std::collections::VecDeque;
 
-use serde_json::Value;
-
-use crate::members::{kept, number, text};
 use crate::observation::Observation;
 use crate::orders::OrdersSent;
 use crate::setting::Setting;
-use tck_view::Topic;
+use tck_view::{StateView, Topic};
 
 /// How many orders of either kind are kept.
 const MESSAGES: usize = 64;
@@ -51,12 +48,12 @@ impl MalformedOrders {
     }
 
     fn note_order(&mut self, record: &Observation<'_>, setting: &Setting<'_>, orders: &OrdersSent) {
-        let Some(message) = record.json() else {
+        let (Some(document), Some(message)) = (record.json(), record.order_to_vehicle()) else {
             self.order = Some((record.seq(), true));
             return;
         };
         let schema = setting.pack.schema("order");
-        let obeys = schema.is_none_or(|schema| schema.findings(message).is_empty());
+        let obeys = schema.is_none_or(|schema| schema.findings(document).is_empty());
         let good = orders
             .now(record)
             .filter(|sent| obeys && sent.sound && !sent.order.is_empty());
@@ -68,11 +65,11 @@ impl MalformedOrders {
                 self.good.drain(..excess);
             }
             None => {
-                let name = kept(message, "orderId");
+                let name = message.order_id.or_empty().to_owned();
                 if name.is_empty() {
                     self.nameless = [true; 2];
                 }
-                self.broken_ones.push_back((name, number(message, "orderUpdateId")));
+                self.broken_ones.push_back((name, message.order_update_id.whole()));
                 let excess = self.broken_ones.len().saturating_sub(MESSAGES);
                 self.broken_ones.drain(..excess);
             }
@@ -80,11 +77,11 @@ impl MalformedOrders {
     }
 
     /// Whether a state shows a malformed order; `which` of the two counts is asked.
-    fn shows(&mut self, state: &Value, which: usize) -> bool {
+    fn shows(&mut self, state: &StateView, which: usize) -> bool {
         if self.broken_ones.is_empty() {
             return false;
         }
-        let (order, update) = (text(state, "orderId"), number(state, "orderUpdateId"));
+        let (order, update) = (state.order_id.or_empty(), state.order_update_id.whole());
         let is_it = |(id, number): &(String, u64)| id == order && Some(*number) == update;
         if !order.is_empty() && self.good.iter().any(is_it) {
             // The one that came last is what the vehicle holds, unless it goes by no name at all.
@@ -102,10 +99,9 @@ impl MalformedOrders {
         if record.is_to_vehicle(Topic::Order) {
             self.note_order(record, setting, orders);
         }
-        if let Some(state) = record.state_json() {
-            let is_named =
-                state.get("orderId").is_some_and(Value::is_string) && number(state, "orderUpdateId").is_some();
-            let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
+        if let Some(state) = record.state() {
+            let is_named = state.order_id.is_there() && state.order_update_id.whole().is_some();
+            let in_command = matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC");
             let shown = self.shows(state, 0);
             let in_command = is_named && in_command && self.shows(state, 1);
             self.state = Some((record.seq(), [shown, in_command]));

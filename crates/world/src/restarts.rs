@@ -2,7 +2,6 @@
 
 use tck_journal::event::{Event, LinkFault};
 
-use crate::members::number;
 use crate::observation::Observation;
 
 /// Tells a possible restart from a link that the harness broke.
@@ -34,8 +33,8 @@ impl Restarts {
         if let Event::Fault { fault } = record.event() {
             self.cut |= *fault != LinkFault::Restore;
         }
-        let restarted = if let Some(state) = record.state_json() {
-            let header = number(state, "headerId");
+        let restarted = if let Some(state) = record.state() {
+            let header = state.header.header_id.whole();
             let goes_on = matches!((self.header, header), (Some(before), Some(now)) if now > before);
             let restarted = self.pending && !goes_on;
             self.header = header;

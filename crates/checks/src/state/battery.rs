@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::finding::broken;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{BatteryState, StateView};
 use tck_world::{End, Listen, Observation, Topic};
 
 /// See the module.
@@ -17,7 +18,7 @@ pub(crate) const LEVELS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::battery_state, BatteryState::battery_charge],
     start: |_| Box::new(Levels::default()),
 };
 
@@ -43,8 +44,8 @@ fn hundredths(charge: f64) -> Option<i64> {
 impl Running for Levels {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, _findings: &mut Vec<CheckFinding>) -> bool {
         let charge = record
-            .state_json()
-            .and_then(|state| state.get("batteryState")?.get("batteryCharge")?.as_f64())
+            .state()
+            .and_then(|state| state.battery_state.there()?.battery_charge.float())
             .and_then(hundredths);
         let Some(charge) = charge.filter(|_| self.seen.len() <= 2) else {
             return false;

@@ -4,11 +4,9 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ActionState, MessageView, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many loads, places and actions are looked at.
@@ -32,7 +30,7 @@ pub(crate) const LOADS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::loads],
     start: |_| Box::new(Loads::default()),
 };
 
@@ -51,9 +49,9 @@ struct Loads {
 }
 
 impl Loads {
-    fn place(&mut self, state: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
-        for load in elements(state, "loads").take(MANY) {
-            let Some(place) = load.get("loadPosition").and_then(Value::as_str) else {
+    fn place(&mut self, state: &StateView, seq: u64, findings: &mut Vec<CheckFinding>) {
+        for load in state.loads.iter().take(MANY) {
+            let Some(place) = load.load_position.text() else {
                 continue;
             };
             let known = self.places.is_empty() || self.places.iter().any(|known| known == place);
@@ -77,34 +75,30 @@ impl Running for Loads {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         if record.is_delivered(Topic::Factsheet)
-            && let Some(sheet) = record.json()
+            && let Some(sheet) = record.message().and_then(MessageView::factsheet)
         {
-            let places = sheet
-                .pointer("/loadSpecification/loadPositions")
-                .and_then(Value::as_array);
-            let places = places.into_iter().flatten().filter_map(Value::as_str).take(MANY);
+            let specification = sheet.load_specification.there().into_iter();
+            let places = specification.flat_map(|loads| loads.load_positions.texts()).take(MANY);
             self.places = places.map(str::to_owned).collect();
         }
         if context.world.restarts().now(record) || record.outside_influence() {
             self.loaded = false;
             self.open.clear();
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         self.place(state, record.seq(), findings);
-        let fatal = elements(state, "errors").any(|error| text(error, "errorLevel") != "WARNING");
-        let status = |action: &Value| text(action, "actionStatus") == "FINISHED";
-        let all = || elements(state, "actionStates").take(MANY);
-        let ended = all().any(|action| status(action) && self.open.contains(text(action, "actionId")));
+        let fatal = state.errors.iter().any(|error| !error.error_level.is("WARNING"));
+        let status = |action: &ActionState| action.action_status.is("FINISHED");
+        let all = || state.action_states.iter().take(MANY);
+        let ended = all().any(|action| status(action) && self.open.contains(action.action_id.or_empty()));
         let open = all().filter(|action| !status(action));
-        self.open = open
-            .map(|action| text(action, "actionId").chars().take(512).collect())
-            .collect();
-        let loads = state.get("loads").and_then(Value::as_array);
-        self.empty |= loads.is_some_and(Vec::is_empty);
-        let was_loaded = std::mem::replace(&mut self.loaded, loads.is_some_and(|loads| !loads.is_empty()));
-        if was_loaded && state.get("loads").is_none() && !fatal {
+        self.open = open.map(|action| action.action_id.or_empty().to_owned()).collect();
+        let loads = state.loads.there();
+        self.empty |= loads.is_some_and(|loads| loads.total() == 0);
+        let was_loaded = std::mem::replace(&mut self.loaded, loads.is_some_and(|loads| loads.total() > 0));
+        if was_loaded && state.loads.is_absent() && !fatal {
             self.gone += 1;
             if !self.empty && (ended || self.gone == 2) {
                 let text = "loads listed a load and is left out now that there is none; it was never seen empty";

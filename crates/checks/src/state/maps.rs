@@ -4,11 +4,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, text};
+use tck_view::{ActionView, Json, StateView};
 use tck_world::{Listen, Observation, Topic};
 
 /// How many maps and how many deleteMap actions are kept in mind.
@@ -29,7 +27,7 @@ pub(crate) const MAPS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::maps],
     start: |_| Box::new(Maps::default()),
 };
 
@@ -47,27 +45,30 @@ impl Running for Maps {
         if record.outside_influence() {
             self.listed = None;
         }
-        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
-            for action in actions(message).filter(|action| text(action, "actionType") == "deleteMap") {
+        if let Some(message) = record.instant_actions_to_vehicle() {
+            for action in message
+                .all_actions()
+                .filter(|action| action.action_type.is("deleteMap"))
+            {
                 if self.deleted.len() < LIMIT {
                     self.deleted
                         .insert((parameter(action, "mapId"), parameter(action, "mapVersion")));
                 }
             }
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let Some(maps) = state.get("maps").and_then(Value::as_array) else {
+        let Some(maps) = state.maps.there() else {
             return false;
         };
         let seq = record.seq();
         let mut now = BTreeSet::new();
         let mut enabled: BTreeMap<&str, u32> = BTreeMap::new();
         for map in maps.iter().take(LIMIT) {
-            let pair = (short(text(map, "mapId")), short(text(map, "mapVersion")));
-            if text(map, "mapStatus") == "ENABLED" {
-                *enabled.entry(text(map, "mapId")).or_default() += 1;
+            let pair = (short(map.map_id.or_empty()), short(map.map_version.or_empty()));
+            if map.map_status.is("ENABLED") {
+                *enabled.entry(map.map_id.or_empty()).or_default() += 1;
             }
             let label = label(&pair);
             if !now.insert(pair) {
@@ -78,14 +79,14 @@ impl Running for Maps {
             let text = format!("more than one version of map {} is ENABLED", quote(map));
             findings.push(broken("MAP-14", seq, text));
         }
-        let position = state.get("agvPosition");
-        let localized = position.and_then(|position| position.get("positionInitialized")) == Some(&Value::Bool(true));
-        let active = position.map(|position| text(position, "mapId")).unwrap_or_default();
+        let position = state.position.there();
+        let localized = position.is_some_and(|position| position.initialized.is(true));
+        let active = position.map_or("", |position| position.map_id.or_empty());
         if localized && !active.is_empty() {
-            if maps.is_empty() {
+            if maps.total() == 0 {
                 let text = format!("maps is empty although map {} is active", quote(active));
                 findings.push(broken("MAP-15", seq, text));
-            } else if !enabled.contains_key(active) && maps.len() <= LIMIT {
+            } else if !enabled.contains_key(active) && maps.total() <= LIMIT {
                 let text = format!("agvPosition.mapId {} is no ENABLED map", quote(active));
                 findings.push(broken("MAP-11", seq, text));
             }
@@ -104,7 +105,7 @@ impl Running for Maps {
             self.deleted.remove(&pair);
         }
         self.listed = Some(now);
-        elements(state, "maps").next().is_some() || localized
+        maps.total() > 0 || localized
     }
 }
 
@@ -117,9 +118,8 @@ fn label(pair: &Pair) -> String {
 }
 
 /// The value of an action parameter as text.
-fn parameter(action: &Value, key: &str) -> String {
-    let found = elements(action, "actionParameters").find(|parameter| text(parameter, "key") == key);
-    short(found.map(|parameter| text(parameter, "value")).unwrap_or_default())
+fn parameter(action: &ActionView, key: &str) -> String {
+    short(action.parameter(key).and_then(Json::text).unwrap_or_default())
 }
 
 #[cfg(test)]

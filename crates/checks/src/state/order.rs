@@ -4,11 +4,9 @@
 
 use std::collections::VecDeque;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, number, text};
+use tck_view::{Member, Number, StateView, Text};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many orders on their way are kept in mind.
@@ -33,7 +31,11 @@ pub(crate) const ORDER_KEPT: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[
+        StateView::order_id,
+        StateView::order_update_id,
+        StateView::operating_mode,
+    ],
     start: |_| Box::new(OrderKept::default()),
 };
 
@@ -58,26 +60,26 @@ impl Running for OrderKept {
             self.shown = None;
         }
         let cancels = record
-            .to_vehicle_json(Topic::InstantActions)
-            .is_some_and(|message| actions(message).any(|action| text(action, "actionType") == "cancelOrder"));
+            .instant_actions_to_vehicle()
+            .is_some_and(|message| message.all_actions().any(|action| action.action_type.is("cancelOrder")));
         if cancels {
             self.cancelled = self.shown.as_ref().map(|shown| shown.0.clone());
         }
-        if let Some(order) = record.to_vehicle_json(Topic::Order) {
-            self.sent.push_back(named(order));
+        if let Some(order) = record.order_to_vehicle() {
+            self.sent.push_back(named(&order.order_id, &order.order_update_id));
             if self.sent.len() > ORDERS {
                 self.sent.pop_front();
             }
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
-        if !in_command || !state.get("orderId").is_some_and(Value::is_string) {
+        let in_command = matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC");
+        if !in_command || !state.order_id.is_there() {
             self.shown = None;
             return false;
         }
-        let now = named(state);
+        let now = named(&state.order_id, &state.order_update_id);
         let Some(before) = self.shown.replace(now.clone()) else {
             return false;
         };
@@ -107,9 +109,8 @@ impl Running for OrderKept {
     }
 }
 
-fn named(message: &Value) -> (String, u64) {
-    let id: String = text(message, "orderId").chars().take(512).collect();
-    (id, number(message, "orderUpdateId").unwrap_or_default())
+fn named(order: &Member<Text>, update: &Member<Number>) -> (String, u64) {
+    (order.or_empty().to_owned(), update.whole().unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -2,12 +2,10 @@
 
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::text;
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// So long a vehicle may take to come to rest.
@@ -30,7 +28,7 @@ pub(crate) const PAUSE_STANDS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Displaced],
-    needs: &[],
+    needs: &[StateView::paused, StateView::driving, StateView::operating_mode],
     start: |_| Box::new(PauseStands::default()),
 };
 
@@ -53,11 +51,11 @@ impl Running for PauseStands {
         if context.world.displaced().now(record) {
             self.since = None;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
-        if state.get("paused") != Some(&Value::Bool(true)) || !in_command {
+        let in_command = matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC");
+        if !state.paused.is(true) || !in_command {
             self.since = None;
             self.drove = false;
             self.told = false;
@@ -65,7 +63,7 @@ impl Running for PauseStands {
         }
         let now = record.at().moment;
         let since = *self.since.get_or_insert(now);
-        let drives = state.get("driving") == Some(&Value::Bool(true)) && now.since(since) > COMING_TO_REST;
+        let drives = state.driving.is(true) && now.since(since) > COMING_TO_REST;
         // One state alone may have been on its way when the pause began anew.
         if drives && self.drove && !self.told {
             self.told = true;

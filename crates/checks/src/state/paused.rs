@@ -3,12 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{SafetyState, StateView};
 use tck_world::{Listen, Observation, Topic};
 
 /// How many actions are looked at.
@@ -26,7 +24,13 @@ pub(crate) const PAUSED: Check = Check {
     arguments: &[],
     listens: &[Listen::Hook, Listen::Answer, Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[
+        StateView::paused,
+        StateView::action_states,
+        StateView::safety_state,
+        SafetyState::emergency_stop,
+        SafetyState::field_violation,
+    ],
     start: |_| Box::new(PausedActions::default()),
 };
 
@@ -38,13 +42,12 @@ struct PausedActions {
 }
 
 /// Whether something in the state may hold actions.
-fn is_held(state: &Value) -> bool {
-    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
-    state.get("paused") != Some(&Value::Bool(false))
-        || safety("fieldViolation") != Some(&Value::Bool(false))
-        || safety("eStop").and_then(Value::as_str) != Some("NONE")
-        || !matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
-        || elements(state, "errors").any(|error| text(error, "errorLevel") != "WARNING")
+fn is_held(state: &StateView) -> bool {
+    !state.paused.is(false)
+        || state.field_violation() != Some(false)
+        || state.emergency_stop() != Some("NONE")
+        || !matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC")
+        || state.errors.iter().any(|error| !error.error_level.is("WARNING"))
 }
 
 impl Running for PausedActions {
@@ -52,17 +55,17 @@ impl Running for PausedActions {
         if record.outside_influence() {
             self.before.clear();
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let before = std::mem::take(&mut self.before);
-        let listed = elements(state, "actionStates").take(ACTIONS);
+        let listed = state.action_states.iter().take(ACTIONS);
         let paused: Vec<&str> = listed
-            .filter(|action| text(action, "actionStatus") == "PAUSED")
-            .map(|action| text(action, "actionId"))
+            .filter(|action| action.action_status.is("PAUSED"))
+            .map(|action| action.action_id.or_empty())
             .collect();
         if is_held(state) {
-            return !paused.is_empty() && state.get("paused").is_some();
+            return !paused.is_empty() && !state.paused.is_absent();
         }
         let now = record.at().moment;
         for id in paused {

@@ -4,11 +4,9 @@
 
 use std::collections::HashMap;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, text};
+use tck_view::{Deviation, NodePosition, OrderView, Position, StateView};
 use tck_world::{Listen, Observation, Topic, sets_position};
 
 /// See the module.
@@ -29,7 +27,7 @@ pub(crate) const LAST_NODE_PLACE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::last_node_id, StateView::position],
     start: |_| Box::new(LastNodePlace::default()),
 };
 
@@ -51,13 +49,25 @@ struct Place {
 }
 
 impl Place {
-    fn read(position: &Value) -> Option<Self> {
-        let member = |name: &str| position.get(name).and_then(Value::as_f64);
+    fn of_node(position: &NodePosition) -> Option<Self> {
         Some(Self {
-            map: text(position, "mapId").chars().take(512).collect(),
-            x: member("x")?,
-            y: member("y")?,
-            deviation: member("allowedDeviationXY").unwrap_or_default(),
+            map: position.map_id.or_empty().to_owned(),
+            x: position.x.float()?,
+            y: position.y.float()?,
+            deviation: position
+                .allowed_deviation_xy
+                .there()
+                .and_then(Deviation::radius)
+                .unwrap_or_default(),
+        })
+    }
+
+    fn of_vehicle(position: &Position) -> Option<Self> {
+        Some(Self {
+            map: position.map_id.or_empty().to_owned(),
+            x: position.x.float()?,
+            y: position.y.float()?,
+            deviation: 0.0,
         })
     }
 
@@ -76,10 +86,10 @@ struct LastNodePlace {
 }
 
 impl LastNodePlace {
-    fn learn(&mut self, order: &Value) {
-        for node in elements(order, "nodes").take(NODES) {
-            let id: String = text(node, "nodeId").chars().take(512).collect();
-            let Some(place) = node.get("nodePosition").and_then(Place::read) else {
+    fn learn(&mut self, order: &OrderView) {
+        for node in order.nodes.iter().take(NODES) {
+            let id = node.node_id.or_empty().to_owned();
+            let Some(place) = node.node_position.there().and_then(|position| Place::of_node(position)) else {
                 continue;
             };
             if self.places.len() >= NODES && !self.places.contains_key(&id) {
@@ -100,16 +110,13 @@ impl LastNodePlace {
     }
 
     /// What is wrong about a last node that was another one before.
-    fn contradiction(&self, state: &Value, before: &str, now: &str) -> Option<String> {
-        let initialized = state.pointer("/agvPosition/positionInitialized");
-        let pose = state
-            .get("agvPosition")
-            .filter(|_| initialized == Some(&Value::Bool(true)));
-        let pose = Place::read(pose?)?;
+    fn contradiction(&self, state: &StateView, before: &str, now: &str) -> Option<String> {
+        let position = state.position.there().filter(|position| position.initialized.is(true));
+        let pose = Place::of_vehicle(position?)?;
         let (old, new) = (self.place(before)?, self.place(now)?);
         let (from_old, from_new) = (pose.distance(old), pose.distance(new));
         let there = pose.map != old.map || pose.map != new.map || from_new <= NEAR.max(new.deviation);
-        let back = elements(state, "nodeStates").any(|node| text(node, "nodeId") == before);
+        let back = state.node_states.iter().any(|node| node.node_id.or_empty() == before);
         (!there && !back && from_old < from_new).then(|| {
             format!(
                 "the last node is {}, but the vehicle stands {from_new:.1} m away from it, and {from_old:.1} m from {}, \
@@ -126,13 +133,13 @@ impl Running for LastNodePlace {
         if record.outside_influence() || record.may_be_a_restart() {
             self.last = None;
         }
-        if let Some(order) = record.to_vehicle_json(Topic::Order) {
+        if let Some(order) = record.order_to_vehicle() {
             self.learn(order);
             self.stopped = false;
         }
-        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
-            for action in actions(message) {
-                match text(action, "actionType") {
+        if let Some(message) = record.instant_actions_to_vehicle() {
+            for action in message.all_actions() {
+                match action.action_type.or_empty() {
                     "cancelOrder" | "startPause" => self.stopped = true,
                     "stopPause" => self.stopped = false,
                     other if sets_position(other) => self.last = None,
@@ -140,12 +147,12 @@ impl Running for LastNodePlace {
                 }
             }
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let now: String = text(state, "lastNodeId").chars().take(512).collect();
+        let now = state.last_node_id.or_empty().to_owned();
         let before = self.last.replace(now.clone());
-        let stands = self.stopped && state.get("driving") == Some(&Value::Bool(false));
+        let stands = self.stopped && state.driving.is(false);
         let Some(before) = before.filter(|before| stands && *before != now && !now.is_empty()) else {
             return false;
         };

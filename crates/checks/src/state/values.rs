@@ -5,11 +5,9 @@
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{MapState, Position, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// Beyond this many metres a coordinate is taken for another unit.
@@ -28,7 +26,7 @@ pub(crate) const IDLE_EMPTY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Malformed],
-    needs: &[],
+    needs: &[StateView::order_id, StateView::node_states, StateView::edge_states],
     start: |_| Box::new(IdleEmpty),
 };
 
@@ -40,7 +38,7 @@ pub(crate) const POSITION_RANGE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State), Listen::Delivered(Topic::Visualization)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::position, Position::theta],
     start: |_| Box::new(PositionRange),
 };
 
@@ -52,7 +50,7 @@ pub(crate) const IDENTIFIERS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::last_node_id, Position::map_id],
     start: |_| Box::new(Identifiers::default()),
 };
 
@@ -66,14 +64,13 @@ impl Running for IdleEmpty {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         let Some(state) = record
-            .state_json()
+            .state()
             .filter(|_state| !context.world.malformed().is_shown(record))
         else {
             return false;
         };
-        let count = |name| elements(state, name).count();
-        let (nodes, edges) = (count("nodeStates"), count("edgeStates"));
-        let never = state.get("orderId").and_then(Value::as_str) == Some("");
+        let (nodes, edges) = (state.node_states.total(), state.edge_states.total());
+        let never = state.order_id.is("");
         let seq = record.seq();
         if never && nodes + edges > 0 {
             let text = format!("{nodes} nodeStates and {edges} edgeStates without any order");
@@ -85,12 +82,7 @@ impl Running for IdleEmpty {
                 format!("{edges} edgeStates are left without any nodeState"),
             ));
         }
-        if never
-            && state
-                .get("orderUpdateId")
-                .and_then(Value::as_f64)
-                .is_some_and(|update| update != 0.0)
-        {
+        if never && state.order_update_id.float().is_some_and(|update| update != 0.0) {
             findings.push(broken(
                 "STATE-MSG-02",
                 seq,
@@ -105,23 +97,17 @@ struct PositionRange;
 
 impl Running for PositionRange {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let message = record.delivered();
-        if message.is_none_or(|message| !matches!(message.name, "state" | "visualization")) {
-            return false;
-        }
-        let Some(position) = record.json().and_then(|value| value.get("agvPosition")?.as_object()) else {
+        let of_state = record.state().and_then(|state| state.position.there());
+        let shown = of_state.or_else(|| record.visualization()?.position.there());
+        let Some(position) = shown.filter(|position| !position.initialized.is(false)) else {
             return false;
         };
-        if position.get("positionInitialized") == Some(&Value::Bool(false)) {
-            return false;
-        }
-        let number = |name| position.get(name).and_then(Value::as_f64);
-        if let Some(theta) = number("theta").filter(|theta| theta.abs() > PI + ROUNDING) {
+        if let Some(theta) = position.theta.float().filter(|theta| theta.abs() > PI + ROUNDING) {
             let text = format!("theta {theta} is not between minus pi and pi");
             findings.push(broken("MAP-02", record.seq(), text));
         }
-        for name in ["x", "y"] {
-            if let Some(value) = number(name).filter(|value| value.abs() > FAR) {
+        for (name, coordinate) in [("x", &position.x), ("y", &position.y)] {
+            if let Some(value) = coordinate.float().filter(|value| value.abs() > FAR) {
                 findings.push(remark(
                     "MAP-02",
                     record.seq(),
@@ -140,16 +126,18 @@ struct Identifiers {
 
 impl Running for Identifiers {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let position = state
-            .get("agvPosition")
-            .into_iter()
-            .map(|position| ("mapId", text(position, "mapId")));
-        let maps = elements(state, "maps").map(|map| ("mapId", text(map, "mapId")));
-        let own = ["lastNodeId", "zoneSetId"].map(|name| (name, text(state, name)));
-        for (name, id) in own.into_iter().chain(position).chain(maps) {
+        let own = [
+            (StateView::last_node_id, &state.last_node_id),
+            (StateView::zone_set_id, &state.zone_set_id),
+        ];
+        let position = state.position.there().into_iter();
+        let position = position.map(|position| (Position::map_id, &position.map_id));
+        let maps = state.maps.iter().map(|map| (MapState::map_id, &map.map_id));
+        for (field, id) in own.into_iter().chain(position).chain(maps) {
+            let (name, id) = (record.names().name(field).unwrap_or_default(), id.or_empty());
             let odd = id
                 .chars()
                 .any(|character| !(character.is_ascii_alphanumeric() || "_-.:".contains(character)));

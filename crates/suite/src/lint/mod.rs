@@ -143,7 +143,7 @@ pub(super) fn monitor(
         Rule::Check(check) => {
             check.visit_terms(&mut |term| scope.check(term, &packs, linter.problems));
             let ids: Vec<&RequirementId> = monitor.checks.iter().map(|binding| &binding.requirement).collect();
-            linter.check_use(check, &ids);
+            linter.check_use(check, &ids, &packs);
             return;
         }
         Rule::Never { topic, pattern } => (topic, vec![pattern]),
@@ -420,7 +420,7 @@ impl Linter<'_> {
                 None => bindings.iter().map(|binding| &binding.requirement).collect(),
                 Some(_) => Vec::new(),
             };
-            self.check_use(check, &ids);
+            self.check_use(check, &ids, packs);
         }
     }
 
@@ -431,7 +431,7 @@ impl Linter<'_> {
                 self.pattern(pattern, topic, packs, Some(&having));
             }
             if let Some(check) = &assertion.selection.check {
-                self.check_use(check, &[&assertion.requirement]);
+                self.check_use(check, &[&assertion.requirement], packs);
             }
         }
     }
@@ -468,7 +468,7 @@ impl Linter<'_> {
         }
     }
 
-    fn check_use(&mut self, check: &CheckUse, requirements: &[&RequirementId]) {
+    fn check_use(&mut self, check: &CheckUse, requirements: &[&RequirementId], packs: &[usize]) {
         let known = self.known;
         let Some(info) = known.iter().find(|info| info.name == check.name) else {
             let names: Vec<&str> = known.iter().map(|info| info.name).collect();
@@ -495,6 +495,34 @@ impl Linter<'_> {
                 self.problems
                     .unknown("unknown-argument", &term.span, "argument", argument, names);
             }
+        }
+        self.needs(info, check, requirements, packs);
+    }
+
+    /// A check finds nothing where messages do not have what it looks at, and would pass whatever a device does.
+    fn needs(&mut self, info: &CheckInfo, check: &CheckUse, requirements: &[&RequirementId], packs: &[usize]) {
+        let vocabulary = self.vocabulary;
+        let facts: Vec<_> = requirements
+            .iter()
+            .filter_map(|id| vocabulary.requirement(id.as_str()))
+            .collect();
+        let decides = |pack: usize| facts.is_empty() || facts.iter().any(|facts| facts.packs.contains(&pack));
+        let versions = vocabulary.versions();
+        for pack in packs.iter().copied().filter(|pack| decides(*pack)) {
+            let member = info.needs.iter().find(|member| vocabulary.lacks(pack, **member));
+            let (Some(member), Some(version)) = (member, versions.get(pack)) else {
+                continue;
+            };
+            self.problems.add(
+                Diagnostic::new(
+                    "check-without-member",
+                    check.span.clone(),
+                    format!("the check `{}` has nothing to look at in {version}", info.name),
+                    format!("it needs `{member}`, which messages of {version} do not have"),
+                )
+                .hint("let `spec` leave that version out"),
+            );
+            return;
         }
     }
 

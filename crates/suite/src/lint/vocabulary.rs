@@ -7,6 +7,7 @@ use std::rc::Rc;
 use serde_json::Value;
 
 use tck_pack::{Breakage, Catalogue, Ground, Packs, Role, Shape, Version};
+use tck_view::Field;
 
 /// What the catalogue says about one requirement.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,6 +41,8 @@ pub trait Vocabulary {
     fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String>;
     /// Every way to break a message of a topic; `None` if there is no such topic.
     fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>>;
+    /// Whether messages of a pack do not have a member.
+    fn lacks(&self, pack: usize, member: Field) -> bool;
     /// A word of the vocabulary: `error.outdatedUpdate`.
     fn word(&self, pack: usize, path: &str) -> Option<Value>;
     /// A requirement.
@@ -112,6 +115,11 @@ impl Vocabulary for PackVocabulary<'_> {
     fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>> {
         let schema = self.packs.all().get(pack)?.schema(topic)?;
         Some(schema.breakages(ground))
+    }
+
+    fn lacks(&self, pack: usize, member: Field) -> bool {
+        let pack = self.packs.all().get(pack);
+        pack.is_some_and(|pack| pack.names().lacks(member))
     }
 
     fn word(&self, pack: usize, path: &str) -> Option<Value> {
