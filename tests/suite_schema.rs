@@ -57,7 +57,7 @@ fn every_suite_is_valid() {
 
 #[test]
 fn mistakes_of_form_are_refused() {
-    const OF_FORM: [&str; 17] = [
+    const OF_FORM: [&str; 19] = [
         "always-without-extent",
         "bad-duration",
         "bad-need",
@@ -69,10 +69,12 @@ fn mistakes_of_form_are_refused() {
         "half-broken",
         "horizon-without-base",
         "monitor-rule",
+        "recordings-without-reason",
         "unknown-behaviour",
         "unknown-device",
         "unknown-fault",
         "unknown-operator",
+        "unknown-recordings",
         "unknown-verb",
         "wrong-type",
     ];

@@ -60,6 +60,42 @@ fn vehicles_times_and_monitors_can_be_chosen() {
     run(&["audit", "missing.jsonl"]).code(2).says("missing.jsonl");
 }
 
+/// A folder with the monitor `acme/never-automatic`, which says this of recordings.
+fn own_suites(bench: &Bench, recordings: &str) {
+    let folder = bench.path().join("own/monitors/acme");
+    fs::create_dir_all(&folder).unwrap();
+    let text = format!(
+        "monitor: acme/never-automatic\ntitle: Nobody drives by itself\ndevice: agv\nspec: \">=2.0, <3\"\nwhy: Ours are driven \
+         by hand.\nchecks: [MODE-01]\n{recordings}topic: state\nnever: {{ operatingMode: AUTOMATIC }}\n"
+    );
+    fs::write(folder.join("never-automatic.yaml"), text).unwrap();
+}
+
+#[test]
+fn a_monitor_of_ones_own_judges_a_recording_as_it_says() {
+    let bench = Bench::new();
+    let two = capture("two-versions.jsonl");
+    let audit = |code: i32| {
+        let arguments = ["audit", &two, "--suites", "own", "--format", "json"];
+        result(&run_in(bench.path(), &arguments).code(code))
+    };
+    let side = |audited: &Value| audited["vehicles"][0]["sides"][0].clone();
+    for recordings in ["", "recordings: unbroken\n"] {
+        own_suites(&bench, recordings);
+        let found = side(&audit(1))["findings"].clone();
+        assert_eq!(found[0]["monitor"], "acme/never-automatic", "{found}");
+        assert!(found[0]["count"].as_u64().unwrap() > 1, "{found}");
+    }
+    own_suites(&bench, "recordings: { never: our reason }\n");
+    let undecided = side(&audit(0))["undecided"].clone();
+    let undecided = undecided.as_array().unwrap().iter();
+    let own: Vec<&Value> = undecided
+        .filter(|one| one["monitor"] == "acme/never-automatic")
+        .collect();
+    assert_eq!(own.len(), 1);
+    assert_eq!(own[0]["why"], "our reason");
+}
+
 #[test]
 fn several_recordings_are_one_stream_and_what_two_recorders_saw_counts_once() {
     let bench = Bench::new();

@@ -21,7 +21,6 @@ mod outcome;
 mod own_run;
 pub mod page;
 pub mod result;
-mod scope;
 mod side;
 mod single;
 pub mod slice;

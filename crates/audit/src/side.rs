@@ -6,7 +6,6 @@ use std::sync::Arc;
 use super::news::Found;
 use super::outcome::Outcome;
 use super::result::{FindingResult, Undecided};
-use super::scope::{self, PACKETS, Use};
 use super::{Scene, cause};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
@@ -15,7 +14,7 @@ use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_judge::{Observed, SideJudge};
 use tck_pack::{Pack, Role};
 use tck_result::MonitorFinding;
-use tck_suite::model::Monitor;
+use tck_suite::model::{Monitor, Recordings};
 
 /// How many findings wait for their confirmation.
 const OPEN: usize = 256;
@@ -24,6 +23,9 @@ const DIFFERENT: usize = 512;
 
 /// How many causes are told apart, of one requirement.
 const CAUSES: usize = 16;
+
+/// Why what needs packets is not judged.
+const PACKETS: &str = "only the packets between device and broker show it";
 
 /// Monitor, requirement and verdict, and the cause.
 type Key = ((String, String, Verdict), String);
@@ -51,7 +53,7 @@ pub(super) struct Side {
 impl Side {
     /// Begins; `None` when the rules have no such side.
     pub fn begin(role: Role, header: RunHeader, begun: Stamp, timed: bool, scene: Scene<'_>) -> Option<Self> {
-        let mut each = start(&header, scene, &|id| scope::of(id) == Some(Use::EachMessage))?;
+        let mut each = start(&header, scene, &judges_each_message)?;
         each.observe(&first(&header, begun));
         Some(Self {
             role,
@@ -88,9 +90,9 @@ impl Side {
             return;
         }
         let timed = self.timed;
-        let wanted = move |id: &str| match scope::of(id) {
-            Some(Use::Unbroken) => true,
-            Some(Use::UnbrokenInTime) => timed,
+        let wanted = move |monitor: &Monitor| match monitor.recordings {
+            Recordings::Unbroken => true,
+            Recordings::UnbrokenInTime => timed,
             _ => false,
         };
         self.unbroken = start(&self.header, scene, &wanted).map(|mut judge| {
@@ -216,10 +218,10 @@ impl Side {
         let mut undecided = Vec::new();
         for monitor in of_side(scene, self.role, &self.header) {
             let id = monitor.id.clone();
-            let why = match scope::of(&id) {
-                Some(Use::Never(why)) => why,
-                Some(Use::UnbrokenInTime) if !self.timed => "the recording does not say when messages came",
-                Some(Use::Packets) if self.judged.get(&id).is_none_or(|judged| *judged == 0) => PACKETS,
+            let why = match &monitor.recordings {
+                Recordings::Never(why) => why,
+                Recordings::UnbrokenInTime if !self.timed => "the recording does not say when messages came",
+                Recordings::Packets if self.judged.get(&id).is_none_or(|judged| *judged == 0) => PACKETS,
                 _ if self.judged.get(&id).is_none_or(|judged| *judged == 0) => "nothing came that it could judge",
                 _ => continue,
             };
@@ -233,8 +235,13 @@ impl Side {
     }
 }
 
-pub(super) fn start(header: &RunHeader, scene: Scene<'_>, used: &dyn Fn(&str) -> bool) -> Option<SideJudge> {
-    let wanted = |monitor: &Monitor| used(&monitor.id) && scene.options.wants_monitor(monitor);
+/// Whether a monitor judges each message, whatever else is missing.
+fn judges_each_message(monitor: &Monitor) -> bool {
+    matches!(monitor.recordings, Recordings::Message | Recordings::MessageOnTopic)
+}
+
+pub(super) fn start(header: &RunHeader, scene: Scene<'_>, used: &dyn Fn(&Monitor) -> bool) -> Option<SideJudge> {
+    let wanted = |monitor: &Monitor| used(monitor) && scene.options.wants_monitor(monitor);
     SideJudge::begin(scene.rules, header, &wanted).ok()
 }
 

@@ -3,13 +3,13 @@
 use bytes::Bytes;
 
 use super::header::header;
-use super::scope::{self, Use};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
 use tck_journal::event::{Direction, Event, Record, Source};
 use tck_journal::{Entry, Payload};
 use tck_judge::{Rules, SideJudge};
 use tck_pack::Pack;
+use tck_suite::model::Recordings;
 
 /// What is wrong with a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,9 +60,7 @@ pub fn single(rules: &Rules, pack: &Pack, name: &str, payload: &Bytes) -> Vec<Fl
     let names = pack.topics().iter().map(|rule| rule.name.as_str());
     let topics = names.map(|name| (name.to_owned(), topic(name))).collect();
     let header = header(publisher, pack, &text("manufacturer"), &text("serialNumber"), topics);
-    // Topics are no part of a message.
-    let is_meant = |id: &str| scope::of(id) == Some(Use::EachMessage) && !id.starts_with("topic/");
-    let Ok(mut judge) = SideJudge::begin(rules, &header, &|monitor| is_meant(&monitor.id)) else {
+    let Ok(mut judge) = SideJudge::begin(rules, &header, &|monitor| monitor.recordings == Recordings::Message) else {
         return Vec::new();
     };
     let begun = Event::RunBegun {
@@ -130,6 +128,17 @@ mod tests {
     fn good(name: &str) -> String {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
         std::fs::read_to_string(format!("{folder}/fixtures/messages/2.1/good/{name}.json")).expect("fixture")
+    }
+
+    #[test]
+    fn every_built_in_monitor_says_whether_recordings_can_be_judged_by_it() {
+        let monitors = &tck_testing::library().rules.suites.monitors;
+        let silent: Vec<&str> = monitors
+            .iter()
+            .filter(|monitor| !monitor.source.text.contains("\nrecordings: "))
+            .map(|monitor| monitor.id.as_str())
+            .collect();
+        assert!(monitors.len() > 100 && silent.is_empty(), "{silent:?}");
     }
 
     #[test]

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::outcome::Outcome;
-use super::scope::{self, Use};
 use super::side::{first, start};
 use super::vehicle::Vehicle;
 use super::{Scene, is_command};
@@ -19,6 +18,7 @@ use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, Packet, Record, Source};
 use tck_judge::SideJudge;
 use tck_pack::Role;
+use tck_suite::model::Recordings;
 
 /// How many connections are kept in mind.
 const CONNECTIONS: usize = 16_384;
@@ -274,7 +274,7 @@ impl Judged {
             return;
         };
         "tap".clone_into(&mut header.vantage);
-        let Some(mut judge) = start(&header, scene, &|id| scope::of(id) == Some(Use::Packets)) else {
+        let Some(mut judge) = start(&header, scene, &|monitor| monitor.recordings == Recordings::Packets) else {
             return;
         };
         let at = Stamp {

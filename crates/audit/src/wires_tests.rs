@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 
-use super::scope::{self, Use};
 use super::*;
 use tck_base::clock::Moment;
 use tck_capture::{Item, Packets};
@@ -11,6 +10,7 @@ use tck_journal::event::{Close, Direction, Event, Packet, Record};
 use tck_judge::Library;
 use tck_pack::Role;
 use tck_run::{VirtualRun, run_silently};
+use tck_suite::model::Recordings;
 use tck_testing_captures::{Link, Stream, mqtt, pcap};
 
 const SEGMENT: usize = 1_400;
@@ -24,12 +24,8 @@ fn run(library: &Library, role: Role, tests: &[&str], fault: Option<&str>) -> (V
     assert!(!run.tests.is_empty());
     run.faults = fault.iter().map(|fault| (*fault).to_owned()).collect();
     let finished = run_silently(library, pack, run).expect("a run");
-    let of_packets = |id: &str| scope::of(id) == Some(Use::Packets);
-    let monitors = finished
-        .result
-        .monitors
-        .iter()
-        .filter(|monitor| of_packets(&monitor.id));
+    let monitors = finished.result.monitors.iter();
+    let monitors = monitors.filter(|monitor| is_of_packets(library, &monitor.id));
     let found = monitors.flat_map(|monitor| {
         let findings = monitor.findings.iter();
         findings.map(|finding| format!("{} {} {:?}", monitor.id, finding.requirement, finding.verdict))
@@ -40,6 +36,11 @@ fn run(library: &Library, role: Role, tests: &[&str], fault: Option<&str>) -> (V
         journal.entries().iter().map(|entry| entry.record.clone()).collect(),
         found,
     )
+}
+
+fn is_of_packets(library: &Library, id: &str) -> bool {
+    let mut monitors = library.rules.suites.monitors.iter();
+    monitors.any(|monitor| monitor.id == id && monitor.recordings == Recordings::Packets)
 }
 
 /// The packets of the device as TCP segments, each connection on a port of its own.
@@ -92,13 +93,13 @@ fn audited(library: &Library, file: Vec<u8>) -> AuditResult {
 }
 
 /// What the monitors of connections found.
-fn found(result: &AuditResult, role: Role) -> BTreeSet<String> {
+fn found(library: &Library, result: &AuditResult, role: Role) -> BTreeSet<String> {
     let sides = result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
     let findings = sides
         .filter(|side| side.role == role.word())
         .flat_map(|side| &side.findings);
     findings
-        .filter(|finding| scope::of(&finding.monitor) == Some(Use::Packets))
+        .filter(|finding| is_of_packets(library, &finding.monitor))
         .map(|finding| format!("{} {} {:?}", finding.monitor, finding.requirement, finding.verdict))
         .collect()
 }
@@ -137,7 +138,7 @@ fn a_capture_of_a_run_gives_what_its_tap_gave() {
         assert_eq!(wanted.is_empty(), fault.is_none(), "{fault:?}: {wanted:?}");
         let frames = frames(&records);
         let result = audited(library, pcap(Link::Ethernet, &frames, 65_535));
-        assert_eq!(found(&result, role), wanted, "{role} {fault:?}");
+        assert_eq!(found(library, &result, role), wanted, "{role} {fault:?}");
         assert!(result.vehicles.iter().any(|vehicle| vehicle.vantage == "tap"));
         // From the middle on, and with losses, nobody is accused of anything else.
         let mut worse = frames[frames.len() / 3..].to_vec();
@@ -146,7 +147,7 @@ fn a_capture_of_a_run_gives_what_its_tap_gave() {
             number += 1;
             number % 50 != 0
         });
-        let found = found(&audited(library, pcap(Link::Ethernet, &worse, 65_535)), role);
+        let found = found(library, &audited(library, pcap(Link::Ethernet, &worse, 65_535)), role);
         assert!(found.is_subset(&wanted), "{role} {fault:?}: {found:?}");
     }
 }
@@ -174,5 +175,5 @@ fn a_bridge_is_not_held_against_the_vehicles_behind_it() {
     }
     let result = audited(library, pcap(Link::Ethernet, &frames(&both), 65_535));
     assert_eq!(result.vehicles.len(), 2);
-    assert_eq!(found(&result, Role::Agv), BTreeSet::new());
+    assert_eq!(found(library, &result, Role::Agv), BTreeSet::new());
 }

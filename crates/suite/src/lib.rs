@@ -18,6 +18,7 @@ mod load;
 mod matrix;
 pub mod model;
 mod read;
+mod recordings;
 mod said;
 mod source;
 mod steps;

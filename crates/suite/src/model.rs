@@ -163,7 +163,7 @@ pub enum Need {
 
 pub use conversation::{BrokenMember, Said};
 pub use drawn::{Drawn, Kind};
-pub use monitor::{About, Monitor, Rule};
+pub use monitor::{About, Monitor, Recordings, Rule};
 pub use path::Path;
 pub use tck_course::CourseNeed;
 pub use tck_journal::ServeBehaviour;

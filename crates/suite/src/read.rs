@@ -13,6 +13,7 @@ use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::matrix;
 use super::model::{About, Binding, CourseNeed, Drawn, Monitor, Need, Rule, Test};
+use super::recordings::recordings;
 use super::said::conversation;
 use super::source::{States, parse};
 use super::steps::{StepReader, check_use, checks, version_range};
@@ -39,8 +40,22 @@ const TEST_KEYS: &[&str] = &[
     "finally",
 ];
 const MONITOR_KEYS: &[&str] = &[
-    "monitor", "title", "device", "spec", "needs", "why", "checks", "about", "check", "with", "topic", "always",
-    "when", "never", "hides",
+    "monitor",
+    "title",
+    "device",
+    "spec",
+    "needs",
+    "why",
+    "checks",
+    "about",
+    "check",
+    "with",
+    "topic",
+    "always",
+    "when",
+    "never",
+    "hides",
+    "recordings",
 ];
 const ROLES: [(&str, Role); 2] = [("agv", Role::Agv), ("master-control", Role::MasterControl)];
 
@@ -439,6 +454,7 @@ pub(super) fn read_monitor(
         );
     }
     let rule = rule(&fields, &at, problems);
+    let recordings = recordings(&fields, rule.as_ref(), problems);
     let hides: Vec<&Node> = fields.list("hides", problems).iter().collect();
     let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
     let monitor = Monitor {
@@ -448,6 +464,7 @@ pub(super) fn read_monitor(
         spec: header.spec?,
         needs,
         checks: bindings,
+        recordings: recordings?,
         about: about(&fields, problems),
         why: header.why,
         rule: rule?,

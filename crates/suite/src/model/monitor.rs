@@ -22,6 +22,8 @@ pub struct Monitor {
     pub needs: Vec<Need>,
     /// What it decides.
     pub checks: Vec<Binding>,
+    /// Whether and how a recording can be judged by it.
+    pub recordings: Recordings,
     /// What must have come by for a requirement to be decided; one that is not listed is decided by anything judged.
     pub about: Vec<About>,
     /// Why anybody cares.
@@ -44,6 +46,38 @@ pub struct About {
     pub topic: String,
     /// What a message must show.
     pub pattern: Pattern,
+}
+
+/// Whether and how recorded traffic, which somebody else has caused and which may lack messages, can be judged by a monitor.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Recordings {
+    /// Each message by itself, whatever else is missing.
+    Message,
+    /// Each message with the topic that it came on, whatever else is missing.
+    MessageOnTopic,
+    /// Only where nothing is missing: it holds messages against earlier ones.
+    Unbroken,
+    /// Only where nothing is missing, and where the recording says when messages came.
+    UnbrokenInTime,
+    /// Only by the packets between a client and its broker.
+    Packets,
+    /// Not at all, and why.
+    Never(String),
+}
+
+impl Recordings {
+    /// What holds of a monitor that does not say it: a picture shows one message, and of a named check nothing is known.
+    #[must_use]
+    pub fn of_rule(rule: &Rule) -> Self {
+        match rule {
+            Rule::Check(_) => Self::Never("the monitor does not say how, by its key `recordings`".to_owned()),
+            Rule::Always { topic, .. } | Rule::Never { topic, .. } if topic.starts_with("mqtt/") => Self::Packets,
+            Rule::Always { topic, .. } | Rule::Never { topic, .. } if topic.starts_with("http/") => {
+                Self::Never("a recording shows nothing of the server of maps".to_owned())
+            }
+            Rule::Always { .. } | Rule::Never { .. } => Self::Message,
+        }
+    }
 }
 
 /// What a monitor holds true.
