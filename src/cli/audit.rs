@@ -24,6 +24,7 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
         topic_template: arguments.topic_template.clone(),
         vehicles: arguments.vehicle.clone(),
         only: arguments.only.clone(),
+        protocol: arguments.protocol.clone(),
     };
     if arguments.follow {
         return super::follow::follow(arguments, &library, options);
@@ -110,12 +111,9 @@ fn read(
         .zip(merged.counted().into_iter().map(|(_, counted)| counted));
     let mut counted: Vec<_> = counted.chain(of_runs).collect();
     counted.sort_by_key(|(number, _)| *number);
-    let counted = counted.into_iter().map(|(number, counted)| Recording {
-        name: names[number].clone(),
-        unit: units[number].to_owned(),
-        lines: counted.lines,
-        skipped: counted.skipped,
-    });
+    let counted = counted
+        .into_iter()
+        .map(|(number, counted)| Recording::new(names[number].clone(), units[number], counted));
     Ok(counted.collect())
 }
 

@@ -54,12 +54,7 @@ pub fn follow(arguments: &Arguments, library: &Library, options: Options) -> Res
     result.recordings = merged
         .counted()
         .into_iter()
-        .map(|(name, counted)| Recording {
-            name,
-            unit: unit.to_owned(),
-            lines: counted.lines,
-            skipped: counted.skipped,
-        })
+        .map(|(name, counted)| Recording::new(name, unit, counted))
         .collect();
     show(&result, arguments.format)
 }

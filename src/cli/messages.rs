@@ -16,7 +16,7 @@ use tck_journal::event::PAYLOAD_LIMIT;
 use tck_journal::json::{JsonProblem, Parsed};
 use tck_journal::place;
 use tck_judge::Library;
-use tck_pack::Pack;
+use tck_pack::{Pack, Said};
 use tck_report::clean::{line, short};
 
 /// What was counted in a file.
@@ -136,6 +136,22 @@ struct Begin {
     column: usize,
 }
 
+impl Begin {
+    /// Where that byte of the message stands.
+    fn at(self, text: &[u8], byte: usize) -> Self {
+        match place::line_and_column(text, byte) {
+            (1, column) => Self {
+                line: self.line,
+                column: self.column + column - 1,
+            },
+            (line, column) => Self {
+                line: self.line + line - 1,
+                column,
+            },
+        }
+    }
+}
+
 impl Checked {
     /// A message that could not be judged, and what to do about it.
     fn refused(begin: Begin, title: String, hint: Option<String>) -> Self {
@@ -181,15 +197,18 @@ fn message(text: &[u8], begin: Begin, arguments: &Validate, library: &Library) -
     let packs = &library.rules.packs;
     let said = value.and_then(|value| value.get("version")?.as_str());
     let wanted = arguments.protocol.as_deref().or(said);
-    let known = || packs.all().iter().map(|pack| pack.version.to_string());
-    let pack = match wanted.map(|version| (version, packs.get(version))) {
-        Some((_, Some(pack))) => pack,
+    let pack = match wanted.map(|version| (version, packs.said(version))) {
+        Some((_, Said::Known(pack))) => pack,
         None => packs.latest(),
-        Some((version, None)) => {
-            let known: Vec<String> = known().collect();
-            return own(
-                format!("there is no protocol version {version}"),
-                Some(format!("known versions: {}", known.join(", "))),
+        // What is no version is a mistake like others: the rest is judged.
+        Some((version, Said::NoVersion)) if arguments.protocol.is_none() => packs.nearest(version, None),
+        Some((version, _)) => {
+            let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
+            let at = value.filter(|_| arguments.protocol.is_none()).and_then(|_| place::of(text, "/version"));
+            return Checked::refused(
+                begin.at(text, at.map_or(0, |range| range.start)),
+                format!("version {version} is not known to this program ({})", known.join(", ")),
+                Some("say with --protocol by which of them it is to be judged".to_owned()),
             );
         }
     };
@@ -218,10 +237,7 @@ fn message(text: &[u8], begin: Begin, arguments: &Validate, library: &Library) -
     let flaws = single(&library.rules, pack, topic, &Bytes::copy_from_slice(text));
     let placed = flaws.into_iter().map(|flaw| {
         let (pointer, at) = whereabouts(&flaw, topic, text, value);
-        let (line, column) = match place::line_and_column(text, at) {
-            (1, column) => (begin.line, begin.column + column - 1),
-            (line, column) => (begin.line + line - 1, column),
-        };
+        let Begin { line, column } = begin.at(text, at);
         let sentences = flaw.requirements.iter().rev();
         let mut sentences = sentences.filter_map(|id| library.rules.catalogue.get(id));
         let nearest = pointer

@@ -28,6 +28,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
             topic_template: arguments.topic_template.clone(),
             vehicles: arguments.vehicle.clone(),
             only: arguments.only.clone(),
+            protocol: None,
         },
         record: arguments.record.clone().map(|path| (path, rotation)),
         metrics: arguments.metrics.clone(),

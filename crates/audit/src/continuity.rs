@@ -60,6 +60,16 @@ fn print(what: impl Hash) -> u64 {
     hasher.finish()
 }
 
+/// A recording begins with this one state: what was sent shortly before it may still be under way.
+#[derive(Debug)]
+struct Early {
+    since: Moment,
+    /// Prints of its errors.
+    errors: BTreeSet<u64>,
+    /// Prints of the orders that were sent since.
+    orders: BTreeSet<u64>,
+}
+
 /// See the module.
 #[derive(Debug, Default)]
 pub(super) struct Continuity {
@@ -69,6 +79,8 @@ pub(super) struct Continuity {
     shown: Option<BTreeSet<u64>>,
     /// Since when commands come one after the other, and what a state shows that knows the last of them.
     command: Option<(Moment, Moment, BTreeSet<u64>)>,
+    /// Until the state behind the first one shows that nothing was under way.
+    early: Option<Early>,
     /// How many holes there are.
     pub holes: u64,
 }
@@ -83,7 +95,7 @@ impl Continuity {
                 .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions"));
             self.shown = None;
             self.last.insert(name.to_owned(), (id, now));
-            return Step::Begins;
+            return self.early.take().map_or(Step::Begins, |early| Step::Hole(early.since));
         }
         let before = self.last.insert(name.to_owned(), (id, now));
         let counted = match before {
@@ -100,6 +112,16 @@ impl Continuity {
         };
         if let Step::Hole(_) = step {
             self.holes += 1;
+        }
+        let early = self.early.as_ref().map(|early| early.since);
+        let step = match (step, early) {
+            (Step::Hole(since), Some(early)) => Step::Hole(since.min(early)),
+            (step, Some(early)) if message.is_some_and(|message| self.was_under_way(name, message)) => {
+                Step::Hole(early).max_of(step)
+            }
+            (step, _) => step,
+        };
+        if let Step::Hole(_) = step {
             self.forget();
         }
         self.learn(name, message);
@@ -137,10 +159,50 @@ impl Continuity {
         self.forget();
     }
 
+    /// Judging begins at the first state of a recording, that was not seen to follow another one.
+    pub fn begins_early(&mut self, state: &Value, now: Moment) {
+        self.early = Some(Early {
+            since: now,
+            errors: errors(state).map(|error| print(error.to_string())).collect(),
+            orders: BTreeSet::new(),
+        });
+    }
+
+    /// Whether what was sent before the first state may still be under way.
+    pub fn is_early(&self) -> bool {
+        self.early.is_some()
+    }
+
+    /// Whether a message shows that something was under way when the recording began: an update of an order that was not
+    /// seen, or an error about something that was not seen. The first state that shows nothing of the kind ends the doubt.
+    fn was_under_way(&mut self, name: &str, message: &Value) -> bool {
+        let Some(early) = &mut self.early else { return false };
+        match name {
+            "order" => {
+                let id = message.get("orderId").and_then(Value::as_str);
+                early.orders.extend(id.map(print));
+                message.get("orderUpdateId").and_then(whole) != Some(0)
+            }
+            "state" => {
+                let is_known = |error: &&Value| early.errors.contains(&print(error.to_string()));
+                let is_about_sent = |error: &Value| {
+                    let mut about = references(error);
+                    about.any(|print| early.orders.contains(&print) || self.sent.has(print))
+                };
+                let mut new = errors(message).filter(|error| !is_known(error));
+                let doubtful = new.any(|error| !is_about_sent(error));
+                self.early = None;
+                doubtful
+            }
+            _ => false,
+        }
+    }
+
     /// What was sent before does not count any more.
     pub fn forget(&mut self) {
         self.sent = Sent::default();
         self.shown = None;
+        self.early = None;
     }
 
     /// Keeps in mind what was sent, and what is shown.
@@ -214,17 +276,18 @@ fn marks(message: &Value) -> BTreeSet<u64> {
 
 /// Prints of what the errors of a state refer to.
 fn blamed(state: &Value) -> Vec<u64> {
-    let list = |holder: &Value, member: &str| {
-        holder
-            .get(member)
-            .and_then(Value::as_array)
-            .cloned()
-            .unwrap_or_default()
-    };
-    let errors = list(state, "errors").into_iter();
-    let references = errors.flat_map(|error| list(&error, "errorReferences"));
-    let values = references.filter_map(|reference| Some(print(reference.get("referenceValue")?.as_str()?)));
-    values.collect()
+    errors(state).flat_map(references).collect()
+}
+
+fn errors(state: &Value) -> impl Iterator<Item = &Value> {
+    state.get("errors").and_then(Value::as_array).into_iter().flatten()
+}
+
+/// Prints of what an error refers to.
+fn references(error: &Value) -> impl Iterator<Item = u64> {
+    let all = error.get("errorReferences").and_then(Value::as_array);
+    let values = all.into_iter().flatten();
+    values.filter_map(|reference| Some(print(reference.get("referenceValue")?.as_str()?)))
 }
 
 /// Prints of the order and of the actions that a state shows.

@@ -10,7 +10,7 @@ use super::Scene;
 use super::arrived::{Arrived, is_at_rest, of_side, timestamp};
 use super::continuity::{Continuity, Step};
 use super::result::SideResult;
-use super::side::Side;
+use super::side::{Apart, Side};
 use tck_base::clock::Moment;
 use tck_pack::{Pack, Role};
 
@@ -21,6 +21,8 @@ pub(super) struct Conversation {
     pack: Option<Arc<Pack>>,
     sides: Vec<Side>,
     continuity: Continuity,
+    /// Whether messages were held against each other before.
+    began: bool,
     /// By role: how far the clock of the sender is from that of the recorder.
     clocks: BTreeMap<&'static str, i64>,
 }
@@ -53,7 +55,7 @@ impl Conversation {
     pub fn interrupted(&mut self, since: Moment) {
         self.continuity.interrupted();
         for side in &mut self.sides {
-            side.broken(since);
+            side.broken(since, Apart::Missing);
         }
     }
 
@@ -73,26 +75,34 @@ impl Conversation {
             let moment = arrived.at.moment;
             if let Some(since) = self.continuity.crossed(&arrived.name, message, moment) {
                 let commanding = self.sides.iter_mut().filter(|side| side.role == Role::MasterControl);
-                commanding.for_each(|side| side.broken(since));
+                commanding.for_each(|side| side.broken(since, Apart::Crossed));
             }
             let step = self.continuity.note(&arrived.name, message, moment);
             let begins_anew = arrived.name == "connection";
             for side in &mut self.sides {
                 match step {
-                    Step::Hole(since) => side.broken(since),
+                    Step::Hole(since) => side.broken(since, Apart::Missing),
                     // Nobody knows what becomes of a vehicle while it is away.
-                    Step::Begins if begins_anew && side.role == Role::MasterControl => side.broken(arrived.at.moment),
+                    Step::Begins if begins_anew && side.role == Role::MasterControl => {
+                        side.broken(arrived.at.moment, Apart::Connection);
+                    }
                     Step::Follows if arrived.name == "state" => side.confirmed(scene),
                     _ => {}
                 }
             }
             // What was sent of an order before is not known: judging begins where none is under way.
-            let may_begin = arrived.name == "state" && step == Step::Follows && message.is_some_and(is_at_rest);
-            if may_begin && self.sides.iter().any(|side| !side.watches()) {
+            let is_first = step == Step::Begins && !self.began && self.continuity.holes == 0;
+            let may_begin = arrived.name == "state" && (step == Step::Follows || is_first);
+            let state = message.filter(|state| may_begin && is_at_rest(state));
+            if let Some(state) = state.filter(|_| self.sides.iter().any(|side| !side.watches())) {
+                self.began = true;
                 self.continuity.forget();
                 self.continuity.learn(&arrived.name, message);
+                if is_first {
+                    self.continuity.begins_early(state, moment);
+                }
                 for side in &mut self.sides {
-                    side.broken(Moment::from_micros(u64::MAX));
+                    side.broken(Moment::from_micros(u64::MAX), Apart::Missing);
                     side.mended(scene);
                 }
             }
@@ -113,7 +123,10 @@ impl Conversation {
             let apart = self.clocks.get(word).copied().unwrap_or_default();
             let entry = of_side(arrived, own, apart);
             side.observe(&entry, arrived.at.utc, scene);
-            if own && publisher == Role::Agv {
+            if own {
+                side.note(arrived, scene);
+            }
+            if own && publisher == Role::Agv && !self.continuity.is_early() {
                 side.confirmed(scene);
             }
         }

@@ -56,6 +56,8 @@ pub struct Options {
     pub vehicles: Vec<String>,
     /// Only monitors of these names, or that decide these requirements; a `*` at the end stands for anything.
     pub only: Vec<String>,
+    /// The protocol version all are judged by, whatever their messages say.
+    pub protocol: Option<String>,
 }
 
 impl Options {
@@ -91,6 +93,14 @@ pub enum AuditError {
     /// No monitor is left.
     #[error("no monitor is called `{0}`, and none decides a requirement of that name")]
     NoMonitor(String),
+    /// There are no rules for the version.
+    #[error("version {version} is not known to this program ({known})")]
+    Protocol {
+        /// What was asked for.
+        version: String,
+        /// Those that are known.
+        known: String,
+    },
 }
 
 /// Whether a topic of this name is the master control's.
@@ -140,6 +150,17 @@ impl<'r> Audit<'r> {
             if !monitors.iter().any(|monitor| alone.wants_monitor(monitor)) {
                 return Err(AuditError::NoMonitor(wanted.clone()));
             }
+        }
+        if let Some(version) = options
+            .protocol
+            .as_ref()
+            .filter(|version| rules.packs.get(version).is_none())
+        {
+            let known = rules.packs.all().iter().map(|pack| pack.version.to_string());
+            return Err(AuditError::Protocol {
+                version: version.clone(),
+                known: known.collect::<Vec<_>>().join(", "),
+            });
         }
         Ok(Self {
             topics: Topics::new(&rules.packs, options.topic_template.as_deref())?,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::result::{AuditResult, FindingResult, SideResult, VehicleResult};
+use super::result::{AuditResult, FindingResult, SideResult, Stretch, VehicleResult, Whereabouts};
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
 use tck_report::statement::many;
@@ -22,6 +22,17 @@ pub fn page(result: &AuditResult) -> String {
             let _ = write!(text, ", {} of them no message", recording.skipped);
         }
         text.push('\n');
+        for (count, what) in [
+            (recording.encrypted, "TLS"),
+            (recording.web_socket, "MQTT over WebSocket"),
+        ] {
+            if count > 0 {
+                let _ = writeln!(
+                    text,
+                    "      {count} of them {what}, and not read: record what a client subscribes to (mosquitto_sub -F %J), or use watch --listen"
+                );
+            }
+        }
     }
     if let (Some(first), Some(last)) = (&result.first, &result.last) {
         let _ = writeln!(text, "from {first} to {last}");
@@ -122,16 +133,21 @@ fn of_side(side: &SideResult, result: &AuditResult) -> String {
     let held = |known: &&super::result::Decided| known.verdict == Verdict::Pass;
     let hold = side.requirements.iter().filter(held).count();
     let others = side.requirements.len() - hold;
-    let mut text = format!(
-        "{}{who}, {}: {} kept",
-        tag(side.verdict),
-        counted(side.messages, "message"),
-        many(hold, "requirement"),
-    );
-    if others > 0 {
-        let _ = write!(text, ", {others} not");
+    let mut text = format!("{}{who}, {}: ", tag(side.verdict), counted(side.messages, "message"));
+    match &side.not_judged {
+        Some(why) if others == 0 => text.push_str(why),
+        Some(why) => {
+            let _ = write!(text, "{why}; {} not kept", many(others, "requirement"));
+        }
+        None => {
+            let _ = write!(text, "{} kept", many(hold, "requirement"));
+            if others > 0 {
+                let _ = write!(text, ", {others} not");
+            }
+        }
     }
     text.push('\n');
+    text.push_str(&not_compared(side, result));
     for finding in &side.findings {
         text.push_str(&of_finding(finding, result));
     }
@@ -148,12 +164,48 @@ fn of_side(side: &SideResult, result: &AuditResult) -> String {
     text
 }
 
-fn of_finding(finding: &FindingResult, result: &AuditResult) -> String {
-    let recording = finding.recording.and_then(|number| result.recordings.get(number));
-    let place = match (recording, finding.line) {
+/// Where most of a recording was not compared, from where to where, and why.
+fn not_compared(side: &SideResult, result: &AuditResult) -> String {
+    const SHOWN: usize = 3;
+    if side.not_judged.is_some() || side.not_compared <= side.compared {
+        return String::new();
+    }
+    let mut text = format!(
+        "      {} of {} were not compared with those before them\n",
+        side.not_compared,
+        counted(side.compared + side.not_compared, "message")
+    );
+    let mut largest: Vec<&Stretch> = side.stretches.iter().collect();
+    largest.sort_by_key(|stretch| std::cmp::Reverse(stretch.messages));
+    for stretch in largest.into_iter().take(SHOWN) {
+        let place = |whence: &Whereabouts| placed(result, whence.recording, whence.line, whence.message);
+        let (from, to) = (place(&stretch.from), place(&stretch.to));
+        let _ = writeln!(
+            text,
+            "            {from}, {}, to {to}, {}: {}",
+            stretch.from.at, stretch.to.at, stretch.why
+        );
+    }
+    if side.stretches.len() > SHOWN {
+        let _ = writeln!(
+            text,
+            "            and {} more; --format json lists them",
+            side.stretches.len() - SHOWN
+        );
+    }
+    text
+}
+
+/// Where a message stands.
+fn placed(result: &AuditResult, recording: Option<usize>, at: Option<u64>, message: u64) -> String {
+    match (recording.and_then(|number| result.recordings.get(number)), at) {
         (Some(recording), Some(at)) => format!("{}:{at}", line(&recording.name)),
-        _ => format!("message {}", finding.message),
-    };
+        _ => format!("message {message}"),
+    }
+}
+
+fn of_finding(finding: &FindingResult, result: &AuditResult) -> String {
+    let place = placed(result, finding.recording, finding.line, finding.message);
     let mut text = format!(
         "      {}{} {}, {}: {place}, {}\n",
         tag(Some(finding.verdict)),

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::time_line::TimeLine;
 use tck_base::verdict::{Accumulated, Verdict};
-use tck_capture::Place;
+use tck_capture::{Counted, Place};
 use tck_pack::Role;
 
 /// Format of the result of an audit.
@@ -52,6 +52,32 @@ pub struct Recording {
     pub lines: u64,
     /// Lines that hold no message.
     pub skipped: u64,
+    /// Frames of connections that are encrypted, and were not read.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub encrypted: u64,
+    /// Frames of connections that speak WebSocket, and were not read.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub web_socket: u64,
+}
+
+impl Recording {
+    /// The recording of that name, after so much was read of it.
+    #[must_use]
+    pub fn new(name: String, unit: &str, counted: Counted) -> Self {
+        Self {
+            name,
+            unit: unit.to_owned(),
+            lines: counted.lines,
+            skipped: counted.skipped,
+            encrypted: counted.encrypted,
+            web_socket: counted.web_socket,
+        }
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// One vehicle, with the master control that commands it.
@@ -106,6 +132,46 @@ pub struct SideResult {
     pub requirements: Vec<Decided>,
     /// The monitors that could not judge.
     pub undecided: Vec<Undecided>,
+    /// Why nothing is said of this side, though messages of it came.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<String>,
+    /// Live messages of this side that were held against those before them.
+    pub compared: u64,
+    /// Those that were not.
+    pub not_compared: u64,
+    /// Where those stand, as far as they are kept.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stretches: Vec<Stretch>,
+}
+
+/// Messages that come one after the other and were not held against those before them.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Stretch {
+    /// How many of this side.
+    pub messages: u64,
+    /// The first one.
+    pub from: Whereabouts,
+    /// The last one.
+    pub to: Whereabouts,
+    /// Why.
+    pub why: String,
+}
+
+/// Where a message stands, and when it came.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Whereabouts {
+    /// Its number, counted from 1.
+    pub message: u64,
+    /// Number of its recording, counted from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recording: Option<usize>,
+    /// Its line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<u64>,
+    /// When it came.
+    pub at: String,
 }
 
 /// What a monitor found, with all of its kind.
@@ -209,7 +275,22 @@ impl SideResult {
             information,
             requirements: requirements.collect(),
             undecided,
+            not_judged: None,
+            compared: 0,
+            not_compared: 0,
+            stretches: Vec::new(),
         }
+    }
+
+    /// The same, but that nothing is said to be kept where too little was seen; what is wrong is wrong.
+    #[must_use]
+    pub fn unless(mut self, why: Option<&str>) -> Self {
+        if let Some(why) = why {
+            self.not_judged = Some(why.to_owned());
+            self.requirements.retain(|known| known.verdict != Verdict::Pass);
+            self.verdict = self.verdict.filter(|verdict| *verdict != Verdict::Pass);
+        }
+        self
     }
 }
 

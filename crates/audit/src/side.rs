@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use super::arrived::Arrived;
 use super::news::Found;
 use super::outcome::Outcome;
-use super::result::{FindingResult, Undecided};
+use super::result::{FindingResult, SideResult, Stretch, Undecided, Whereabouts};
 use super::{Scene, cause};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
@@ -30,6 +31,41 @@ const PACKETS: &str = "only the packets between device and broker show it";
 /// Monitor, requirement and verdict, and the cause.
 type Key = ((String, String, Verdict), String);
 
+/// How many stretches that were not compared a side keeps.
+const STRETCHES: usize = 32;
+
+/// Why messages are not held against those before them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Apart {
+    /// Nothing came yet where judging could begin.
+    NotBegun,
+    /// Messages are missing.
+    Missing,
+    /// A command and a state crossed.
+    Crossed,
+    /// The vehicle was away, or may have been.
+    Connection,
+}
+
+impl Apart {
+    fn why(self) -> &'static str {
+        match self {
+            Self::NotBegun => {
+                "before the first state without an order and an action under way nobody knows what was sent"
+            }
+            Self::Missing => {
+                "messages are missing; it goes on at the next state without an order and an action under way"
+            }
+            Self::Crossed => {
+                "a command and a state crossed; it goes on at the next state without an order and an action under way"
+            }
+            Self::Connection => {
+                "the connection changed; it goes on at the next state without an order and an action under way"
+            }
+        }
+    }
+}
+
 /// See the module.
 pub(super) struct Side {
     pub role: Role,
@@ -46,6 +82,15 @@ pub(super) struct Side {
     judged: BTreeMap<String, u64>,
     decided: BTreeSet<(String, String)>,
     pub messages: u64,
+    /// Whether something came without which nothing can be said of this side.
+    spoke: bool,
+    /// Why nothing is compared at the moment.
+    apart: Apart,
+    compared: u64,
+    not_compared: u64,
+    stretches: Vec<Stretch>,
+    /// Whether the last message belongs to the last stretch.
+    in_stretch: bool,
     /// What was found since it was taken last, where somebody wants to know at once.
     pub news: Vec<Found>,
 }
@@ -67,6 +112,12 @@ impl Side {
             judged: BTreeMap::new(),
             decided: BTreeSet::new(),
             messages: 0,
+            spoke: false,
+            apart: Apart::NotBegun,
+            compared: 0,
+            not_compared: 0,
+            stretches: Vec::new(),
+            in_stretch: false,
             news: Vec::new(),
         })
     }
@@ -76,11 +127,52 @@ impl Side {
         self.unbroken.is_some()
     }
 
-    /// Something is missing since then.
-    pub fn broken(&mut self, since: Moment) {
+    /// Nothing is known since then, for this reason.
+    pub fn broken(&mut self, since: Moment, why: Apart) {
         self.open.retain(|(at, ..)| *at < since);
         if let Some(judge) = self.unbroken.take() {
+            self.apart = why;
             self.absorb(&judge);
+        }
+    }
+
+    /// Counts a message of this side, and whether it is held against those before it.
+    pub fn note(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+        self.spoke |= matches!(arrived.name.as_str(), "state" | "order" | "instantActions");
+        if arrived.stale {
+            return;
+        }
+        if self.watches() {
+            self.compared += 1;
+            self.in_stretch = false;
+            return;
+        }
+        self.not_compared += 1;
+        let why = self.apart.why();
+        let place = scene.places.of(arrived.number);
+        let at = format!("{:.3}", arrived.at.utc);
+        let whence = Whereabouts {
+            message: arrived.number,
+            recording: place.map(|place| place.file),
+            line: place.map(|place| place.line),
+            at,
+        };
+        let is_full = self.stretches.len() >= STRETCHES;
+        match self.stretches.last_mut() {
+            Some(last) if self.in_stretch && last.why == why => {
+                last.messages += 1;
+                last.to = whence;
+            }
+            _ if is_full => self.in_stretch = false,
+            _ => {
+                self.in_stretch = true;
+                self.stretches.push(Stretch {
+                    messages: 1,
+                    from: whence.clone(),
+                    to: whence,
+                    why: why.to_owned(),
+                });
+            }
         }
     }
 
@@ -204,7 +296,7 @@ impl Side {
     }
 
     /// What came out.
-    pub fn finish(mut self, scene: Scene<'_>) -> super::result::SideResult {
+    pub fn finish(mut self, scene: Scene<'_>) -> SideResult {
         // What is found at the very end may be explained by what comes next.
         self.open.clear();
         if let Some(judge) = self.unbroken.take() {
@@ -231,7 +323,19 @@ impl Side {
             });
         }
         let judged = self.judged.values().filter(|judged| **judged > 0).count();
-        super::result::SideResult::new(self.role, self.messages, judged, findings, self.decided, undecided)
+        // Who asks for certain monitors knows what he wants to see.
+        let not_judged = (!self.spoke && scene.options.only.is_empty()).then_some(match self.role {
+            Role::Agv => "no state of it was recorded",
+            Role::MasterControl => "no command of it was recorded",
+        });
+        let (compared, not_compared, stretches) = (self.compared, self.not_compared, self.stretches);
+        SideResult {
+            compared,
+            not_compared,
+            stretches,
+            ..SideResult::new(self.role, self.messages, judged, findings, self.decided, undecided)
+        }
+        .unless(not_judged)
     }
 }
 

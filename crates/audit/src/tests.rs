@@ -122,6 +122,10 @@ fn who_did_nothing_wrong_is_accused_of_nothing_however_bad_the_recording() {
             for seed in 0..12 {
                 wrong.extend(found(&audited(library, spoiled(&whole, seed)), role));
             }
+            // Whatever was under way when the recording began.
+            for begin in (0..whole.len()).step_by(whole.len() / 12 + 1) {
+                wrong.extend(found(&audited(library, whole[begin..].to_vec()), role));
+            }
         }
     }
     let shown: Vec<String> = wrong.into_iter().collect();
@@ -151,6 +155,119 @@ fn what_is_wrong_is_found_with_its_place() {
         );
         assert_eq!(result.verdict, Some(Verdict::Fail), "{fault}");
     }
+}
+
+/// A vehicle that never takes a node off, in a recording that begins with one idle state.
+fn one_idle_state(change: impl Fn(String) -> String) -> AuditResult {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../fixtures/captures/one-idle-state.jsonl"
+    );
+    let text = change(std::fs::read_to_string(path).expect("fixture"));
+    let reader = Box::new(std::io::Cursor::new(text));
+    let mut lines = tck_capture::Lines::new(reader, 0, tck_capture::Mapping::default());
+    let mut messages = Vec::new();
+    while let Some(item) = lines.read().expect("readable") {
+        match item {
+            tck_capture::Item::Message(message) => messages.push(message),
+            other => panic!("no message: {other:?}"),
+        }
+    }
+    audited(tck_testing::library(), messages)
+}
+
+fn side(result: &AuditResult, role: Role) -> &result::SideResult {
+    let mut sides = result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
+    sides.find(|side| side.role == role.word()).expect("a side")
+}
+
+#[test]
+fn one_idle_state_is_enough_to_begin_with() {
+    let result = one_idle_state(|text| text);
+    let broken = &side(&result, Role::Agv).findings;
+    let broken: BTreeSet<&str> = broken.iter().map(|finding| finding.requirement.as_str()).collect();
+    assert!(broken.contains("STATE-12") && broken.contains("NODE-03"), "{broken:?}");
+    assert_eq!(result.verdict, Some(Verdict::Fail));
+}
+
+#[test]
+fn a_version_that_is_none_is_a_mistake_of_one_vehicle_and_the_rest_is_judged() {
+    for (written, protocol) in [("v2.0.0", "2.0.0"), ("1.3.2", "2.1.0"), ("", "2.1.0"), ("2.1", "2.1.0")] {
+        let result = one_idle_state(|text| text.replace("\"2.1.0\"", &format!("\"{written}\"")));
+        assert_eq!(result.vehicles.len(), 1, "{written}");
+        let vehicle = &result.vehicles[0];
+        assert_eq!(
+            (vehicle.protocol.as_deref(), &vehicle.not_judged),
+            (Some(protocol), &None),
+            "{written}"
+        );
+        let found = found(&result, Role::Agv);
+        for wanted in ["HDR-04", "STATE-12"] {
+            assert!(
+                found.iter().any(|finding| finding.starts_with(wanted)),
+                "{written}: {found:?}"
+            );
+        }
+    }
+    // In some messages only.
+    let result = one_idle_state(|text| text.replacen("\"2.1.0\"", "\"2.1\"", 3));
+    assert_eq!(result.vehicles.len(), 1);
+    assert!(
+        found(&result, Role::Agv)
+            .iter()
+            .any(|finding| finding.starts_with("HDR-04"))
+    );
+    let later = one_idle_state(|text| text.replace("\"2.1.0\"", "\"3.0.0\""));
+    let why = later.vehicles[0].not_judged.as_deref().expect("a reason");
+    assert_eq!(why, "version 3.0.0 is not known to this program (2.0.0, 2.1.0)");
+}
+
+#[test]
+fn the_version_may_be_told() {
+    let library = tck_testing::library();
+    let told = |version: &str| {
+        let options = Options {
+            protocol: Some(version.to_owned()),
+            ..Options::default()
+        };
+        Audit::new(&library.rules, options).map(|_| ())
+    };
+    assert!(told("2.0").is_ok());
+    let refused = told("9.1.0").expect_err("no rules").to_string();
+    assert!(refused.contains("9.1.0 is not known to this program"), "{refused}");
+}
+
+#[test]
+fn what_was_under_way_before_the_first_state_is_held_against_nobody_and_it_is_said() {
+    let update = |text: String| text.replace("\"orderUpdateId\": 0, \"nodes\"", "\"orderUpdateId\": 1, \"nodes\"");
+    let shown = |text: String| {
+        text.replace(
+            "\"orderId\": \"o1\", \"orderUpdateId\": 0, \"last",
+            "\"orderId\": \"o1\", \"orderUpdateId\": 1, \"last",
+        )
+    };
+    let result = one_idle_state(|text| shown(update(text)));
+    assert_eq!(found(&result, Role::Agv), BTreeSet::new());
+    assert_eq!(found(&result, Role::MasterControl), BTreeSet::new());
+    let vehicle = side(&result, Role::Agv);
+    assert!(vehicle.not_compared > vehicle.compared, "{vehicle:#?}");
+    let page = page::page(&result);
+    assert!(page.contains("were not compared"), "{page}");
+    assert!(page.contains("messages are missing"), "{page}");
+}
+
+#[test]
+fn a_side_of_which_nothing_relevant_was_seen_does_not_pass() {
+    let first = |text: String| text.lines().take(1).collect::<String>();
+    let result = one_idle_state(first);
+    assert_eq!(result.verdict, None);
+    let vehicle = side(&result, Role::Agv);
+    assert_eq!((vehicle.verdict, vehicle.requirements.len()), (None, 0));
+    let page = page::page(&result);
+    assert!(
+        page.contains("n/a   the vehicle, 1 message: no state of it was recorded"),
+        "{page}"
+    );
 }
 
 #[test]

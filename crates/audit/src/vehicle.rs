@@ -2,6 +2,7 @@
 //! the protocol its [`conversation`](super::conversation) is judged.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -22,7 +23,7 @@ use tck_base::pattern::whole;
 use tck_capture::Message;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_journal::{Entry, Payload};
-use tck_pack::{Pack, Role, Version};
+use tck_pack::{Pack, Role, Said};
 
 /// How many messages wait until the vehicle has said which version it speaks.
 const WAITING: usize = 64;
@@ -217,7 +218,7 @@ impl Vehicle {
         if let Some(message) = arrived.entry.json().filter(|_| !arrived.stale) {
             self.time_line.note(&arrived.name, message, arrived.at.utc);
         }
-        if self.is_updated(&arrived) {
+        if self.is_updated(&arrived, scene) {
             let concluded = self.conclude(scene);
             self.earlier.push(concluded);
         }
@@ -237,9 +238,10 @@ impl Vehicle {
 
     /// Whether the vehicle speaks another version from this message on: it is back with other software. Where its count
     /// goes on as if nothing had been, the version of the message is wrong instead.
-    fn is_updated(&self, arrived: &Arrived) -> bool {
+    fn is_updated(&self, arrived: &Arrived, scene: Scene<'_>) -> bool {
         let is_command = matches!(arrived.name.as_str(), "order" | "instantActions");
-        if arrived.stale || is_command || self.earlier.len() >= STRETCHES {
+        let is_told = scene.options.protocol.is_some();
+        if arrived.stale || is_command || is_told || self.earlier.len() >= STRETCHES {
             return false;
         }
         let Some(message) = arrived.entry.json() else {
@@ -247,8 +249,12 @@ impl Vehicle {
         };
         let Some(said) = version(message) else { return false };
         let is_other = match (self.conversation.pack(), &self.foreign) {
-            (Some(pack), _) => said.parse().is_ok_and(|said: Version| said != pack.version),
-            (None, Some(foreign)) => said != *foreign,
+            (Some(pack), _) => match scene.rules.packs.said(&said) {
+                Said::Known(said) => said.version != pack.version,
+                Said::Unknown(_) => true,
+                Said::NoVersion => false,
+            },
+            (None, Some(foreign)) => said != *foreign && !matches!(scene.rules.packs.said(&said), Said::NoVersion),
             (None, None) => false,
         };
         is_other && !self.conversation.goes_on(&arrived.name, message)
@@ -261,17 +267,28 @@ impl Vehicle {
         // What was stored may be from before a change of the vehicle's software.
         let lately = said.iter().filter(|arrived| at_last || !arrived.stale);
         let versions = lately.chain(sent.iter().filter(|_| at_last));
-        let mut versions = versions.filter_map(|arrived| version(arrived.entry.json()?));
-        let found = versions.next();
-        let (pack, begun) = match (&found, self.waiting.first()) {
-            (Some(version), Some(first)) => (scene.rules.packs.get(version), first.at),
-            _ => return,
-        };
-        let Some(pack) = pack.cloned() else {
-            self.foreign = found;
-            self.waiting.clear();
+        let versions: Vec<String> = versions.filter_map(|arrived| version(arrived.entry.json()?)).collect();
+        let Some(begun) = self.waiting.first().map(|first| first.at) else {
             return;
         };
+        let packs = &scene.rules.packs;
+        let worth = |text: &&String| !matches!(packs.said(text), Said::NoVersion);
+        let told = scene.options.protocol.as_ref().and_then(|version| packs.get(version));
+        let pack = match (told, versions.iter().find(worth), versions.first()) {
+            (Some(pack), ..) => pack,
+            (None, Some(version), _) => {
+                let Some(pack) = packs.get(version) else {
+                    self.foreign = Some(version.clone());
+                    self.waiting.clear();
+                    return;
+                };
+                pack
+            }
+            // What is no version is a mistake like others: the rest is judged.
+            (None, None, Some(text)) => packs.nearest(text, self.named.major),
+            (None, None, None) => return,
+        };
+        let pack = Arc::clone(pack);
         self.identify();
         let roles = [Role::Agv, Role::MasterControl];
         let sides = roles.map(|role| Side::begin(role, self.header(role, &pack), begun, self.timed, scene));
@@ -329,7 +346,11 @@ impl Vehicle {
         let foreign = self.foreign.take();
         let Concluded { protocol, sides, holes } = self.conversation.conclude(scene);
         let not_judged = protocol.is_none().then(|| match &foreign {
-            Some(version) => format!("protocol version {version}, which this program does not have"),
+            Some(version) => {
+                let known = scene.rules.packs.all().iter().map(|pack| pack.version.to_string());
+                let known: Vec<String> = known.collect();
+                format!("version {version} is not known to this program ({})", known.join(", "))
+            }
             None => "no message names a protocol version".to_owned(),
         });
         VehicleResult {

@@ -16,7 +16,13 @@ pub(super) fn read(written: &str) -> Option<Timestamp> {
     let text = ["Z+", "Z-"]
         .iter()
         .fold(text.to_owned(), |text, sign| text.replace(sign, &sign[1..]));
-    text.parse().ok().or_else(|| format!("{text}Z").parse().ok())
+    let parsed = text.parse().ok().or_else(|| format!("{text}Z").parse().ok());
+    parsed.or_else(|| {
+        // Some write a colon, or a comma, before the milliseconds.
+        let (before, fraction) = text.rsplit_once([':', ','])?;
+        let is_fraction = before.matches(':').count() == 2 && fraction.bytes().all(|byte| byte.is_ascii_digit());
+        is_fraction.then(|| format!("{before}.{fraction}Z").parse().ok())?
+    })
 }
 
 /// The unit follows from the size: every time between 1973 and 2286 is told apart.
@@ -48,6 +54,8 @@ mod tests {
             "2026-01-02T05:04:05.250000Z+0200".to_owned(),
             "2026-01-01T22:04:05.250000-0500".to_owned(),
             "2026-01-02 03:04:05.250".to_owned(),
+            "2026-01-02 03:04:05:250".to_owned(),
+            "2026-01-02 03:04:05,250".to_owned(),
             millis.to_string(),
             format!("{millis}000"),
             format!("{millis}000000"),

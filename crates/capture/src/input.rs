@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::CaptureError;
+use super::wide::{Order, Wide};
 
 /// How long it takes until a file is looked at again that may have grown.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -15,6 +16,30 @@ const PAUSE: Duration = Duration::from_millis(100);
 const BUFFER: usize = 1 << 16;
 const GZIP: &[u8] = &[0x1f, 0x8b];
 const ZSTD: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
+/// What is not read, by its first bytes, and what to do.
+const REFUSED: [(&[u8], &str); 6] = [
+    (
+        b"PK\x03\x04",
+        "a ZIP archive: unpack it, and name the recordings in it; gzip and zstd are read as they are",
+    ),
+    (b"PK\x05\x06", "a ZIP archive with nothing in it"),
+    (
+        b"BZh",
+        "packed with bzip2: unpack it; gzip and zstd are read as they are",
+    ),
+    (
+        b"\xfd7zX",
+        "packed with xz: unpack it; gzip and zstd are read as they are",
+    ),
+    (
+        b"7z\xbc\xaf",
+        "a 7z archive: unpack it; gzip and zstd are read as they are",
+    ),
+    (
+        b"SQLi",
+        "a data base of SQLite: export the messages as JSON lines or CSV, with topic and payload",
+    ),
+];
 
 /// Opens a recording; `-` is standard input.
 ///
@@ -65,8 +90,13 @@ pub fn unpacked(raw: Box<dyn Read>) -> io::Result<Box<dyn BufRead>> {
     let mut raw = BufReader::with_capacity(BUFFER, raw);
     // A pipe may give its first bytes one by one.
     let begin = first_bytes(&mut raw)?;
+    if let Some((_, what)) = REFUSED.iter().find(|(bytes, _)| begin.starts_with(bytes)) {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, format!("it is {what}")));
+    }
     let whole = io::Cursor::new(begin.clone()).chain(raw);
-    Ok(if begin.starts_with(GZIP) {
+    Ok(if let Some(order) = Order::of(&begin) {
+        Box::new(BufReader::with_capacity(BUFFER, Wide::new(whole, order)))
+    } else if begin.starts_with(GZIP) {
         Box::new(BufReader::with_capacity(
             BUFFER,
             flate2::bufread::MultiGzDecoder::new(whole),
@@ -141,6 +171,33 @@ mod tests {
         assert_eq!(text_of(text.clone().into_bytes()).expect("plain"), text);
         assert_eq!(text_of(Vec::new()).expect("empty"), "");
         assert_eq!(text_of(b"{".to_vec()).expect("short"), "{");
+    }
+
+    #[test]
+    fn utf_16_is_read_whatever_its_order_and_with_characters_of_two_halves() {
+        let text = "{\"a\": \"\u{e4}\u{1f69a}\"}\n".repeat(9000);
+        for (mark, order) in [(true, true), (true, false), (false, true), (false, false)] {
+            let units = mark.then_some(0xfeff).into_iter().chain(text.encode_utf16());
+            let bytes = units.flat_map(|unit: u16| if order { unit.to_le_bytes() } else { unit.to_be_bytes() });
+            let read = text_of(bytes.collect()).expect("UTF-16");
+            assert_eq!(read.trim_start_matches('\u{feff}'), text);
+        }
+        assert_eq!(text_of(b"{\0\x00\xd8".to_vec()).expect("half"), "{\u{fffd}");
+        assert_eq!(text_of(b"{\0\x00".to_vec()).expect("cut"), "{");
+    }
+
+    #[test]
+    fn what_is_not_read_is_named_with_what_to_do() {
+        for (begin, wanted) in [
+            (&b"PK\x03\x04rest"[..], "ZIP archive"),
+            (b"BZh91AY", "bzip2"),
+            (b"\xfd7zXZ\0", "xz"),
+            (b"7z\xbc\xaf'", "7z"),
+            (b"SQLite format 3\0", "JSON lines or CSV"),
+        ] {
+            let error = text_of(begin.to_vec()).expect_err("refused").to_string();
+            assert!(error.contains(wanted), "{error}");
+        }
     }
 
     #[test]

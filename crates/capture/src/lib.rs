@@ -14,9 +14,12 @@ mod lines;
 mod mcap;
 mod members;
 pub mod merge;
+mod names;
 pub(crate) mod packets;
 mod recorded;
+mod table;
 pub mod taped;
+mod wide;
 
 use bytes::Bytes;
 

@@ -34,6 +34,64 @@ pub(super) fn members(text: &str) -> Option<Vec<(String, &str)>> {
     }
 }
 
+/// The elements of an array as written; `None` when it is no array that is closed at the end of the text.
+pub(super) fn elements(text: &str) -> Option<Vec<&str>> {
+    let bytes = text.as_bytes();
+    let mut at = skip_blank(bytes, 0);
+    if bytes.get(at) != Some(&b'[') {
+        return None;
+    }
+    at = skip_blank(bytes, at + 1);
+    let mut all = Vec::new();
+    if bytes.get(at) == Some(&b']') {
+        return (skip_blank(bytes, at + 1) == bytes.len()).then_some(all);
+    }
+    loop {
+        let end = skip_value(bytes, at)?;
+        all.push(text.get(at..end)?.trim_end());
+        at = skip_blank(bytes, end);
+        match bytes.get(at)? {
+            b',' => at = skip_blank(bytes, at + 1),
+            b']' => return (skip_blank(bytes, at + 1) == bytes.len()).then_some(all),
+            _ => return None,
+        }
+    }
+}
+
+/// How deep a JSON text is nested, byte after byte.
+#[derive(Debug, Default)]
+pub(super) struct Depth {
+    open: usize,
+    text: bool,
+    escaped: bool,
+}
+
+impl Depth {
+    /// Takes in the next byte; says whether the outermost bracket is closed by it.
+    pub fn closes(&mut self, byte: u8) -> bool {
+        if self.text {
+            self.text = self.escaped || byte != b'"';
+            self.escaped = byte == b'\\' && !self.escaped;
+            return false;
+        }
+        match byte {
+            b'"' => self.text = true,
+            b'{' | b'[' => self.open += 1,
+            b'}' | b']' => {
+                self.open = self.open.saturating_sub(1);
+                return self.open == 0;
+            }
+            _ => {}
+        }
+        false
+    }
+
+    /// Whether a text in quotes is open.
+    pub fn in_text(&self) -> bool {
+        self.text
+    }
+}
+
 fn skip_blank(bytes: &[u8], at: usize) -> usize {
     let blank = bytes.get(at..).unwrap_or_default().iter();
     at + blank.take_while(|byte| byte.is_ascii_whitespace()).count()
@@ -120,10 +178,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn elements_are_given_as_they_are_written() {
+        assert_eq!(
+            elements(r#" [ {"a": "]"} , [1, 2],3 ] "#),
+            Some(vec![r#"{"a": "]"}"#, "[1, 2]", "3"])
+        );
+        assert_eq!(elements("[]"), Some(Vec::new()));
+        for text in ["", "{}", "[1", "[1,]x", "[1] 2"] {
+            assert_eq!(elements(text), None, "{text}");
+        }
+    }
+
     proptest! {
         #[test]
         fn no_text_makes_it_panic(text in "[\\[\\]{}\",:\\\\ a1ü]{0,60}") {
-            let _ = members(&text);
+            let _ = (members(&text), elements(&text));
         }
 
         #[test]

@@ -176,6 +176,13 @@ mod tests {
             order.push_str(&message.topic);
         }
         assert_eq!(order, "acdbe");
-        assert_eq!(merged.counted()[1].1, Counted { lines: 4, skipped: 1 });
+        assert_eq!(
+            merged.counted()[1].1,
+            Counted {
+                lines: 4,
+                skipped: 1,
+                ..Counted::default()
+            }
+        );
     }
 }

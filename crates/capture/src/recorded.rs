@@ -15,7 +15,7 @@ pub struct Recorded {
 }
 
 enum Form {
-    Lines(Lines),
+    Lines(Box<Lines>),
     Packets(Box<Packets>),
     Mcap(Box<Mcap>),
 }
@@ -54,7 +54,7 @@ impl Recorded {
         } else if mcap::begins(begin) {
             Form::Mcap(Box::new(Mcap::new(reader, number)?))
         } else {
-            Form::Lines(Lines::new(reader, number, mapping))
+            Form::Lines(Box::new(Lines::new(reader, number, mapping)))
         };
         Ok(Self { form, back: None })
     }
@@ -115,7 +115,7 @@ impl Recorded {
 impl From<Lines> for Recorded {
     fn from(lines: Lines) -> Self {
         Self {
-            form: Form::Lines(lines),
+            form: Form::Lines(Box::new(lines)),
             back: None,
         }
     }

@@ -25,7 +25,7 @@ pub use assets::{AssetFile, Assets};
 pub use breakage::{Breakage, Ground, Way};
 pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionNote};
 pub use participant::Participant;
-pub use protocol::{Pack, PackError, Packs, TopicName, TopicRule};
+pub use protocol::{Pack, PackError, Packs, Said, TopicName, TopicRule};
 pub use schema::{Finding, FindingKind, MessageSchema};
 pub use shape::Shape;
 pub use version::{Version, VersionRange};

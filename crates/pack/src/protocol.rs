@@ -326,4 +326,45 @@ impl Packs {
             .iter()
             .find(|pack| (pack.version.major, pack.version.minor) == (version.major, version.minor))
     }
+
+    /// What a text that stands where a version is due is worth.
+    #[must_use]
+    pub fn said(&self, text: &str) -> Said<'_> {
+        if let Some(pack) = self.get(text) {
+            return Said::Known(pack);
+        }
+        match text.parse::<Version>() {
+            Ok(version) if self.may_exist(version) => Said::Unknown(version),
+            _ => Said::NoVersion,
+        }
+    }
+
+    /// Whether such a version of the protocol exists, or may come to exist.
+    fn may_exist(&self, version: Version) -> bool {
+        let is_later = (version.major, version.minor) > (self.latest.version.major, self.latest.version.minor);
+        is_later || EARLIER.contains(&(version.major, version.minor))
+    }
+
+    /// The pack by which somebody is judged who names no version: that of the text without what makes it none, of the major
+    /// version in the topics, or the newest.
+    #[must_use]
+    pub fn nearest(&self, text: &str, major: Option<u64>) -> &Arc<Pack> {
+        let number = text.trim().trim_start_matches(['v', 'V']);
+        let of_major = || self.all.iter().rev().find(|pack| Some(pack.version.major) == major);
+        self.get(number).or_else(of_major).unwrap_or(&self.latest)
+    }
+}
+
+/// Versions that were published before those that there are rules for.
+const EARLIER: [(u64, u64); 2] = [(1, 0), (1, 1)];
+
+/// What a text is worth that stands where a version is due.
+#[derive(Clone, Debug)]
+pub enum Said<'p> {
+    /// A version that there are rules for.
+    Known(&'p Arc<Pack>),
+    /// A version that there are no rules for.
+    Unknown(Version),
+    /// No version that was ever published.
+    NoVersion,
 }

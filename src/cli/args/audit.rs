@@ -48,6 +48,9 @@ pub struct Audit {
     /// How topics are built, with {serialNumber}, and {interface}, {majorVersion}, {manufacturer} and {topic} where they have them
     #[arg(long, value_name = "TEMPLATE", help_heading = "Selection")]
     pub topic_template: Option<String>,
+    /// Protocol version all are judged by; otherwise that which their messages name
+    #[arg(long, value_name = "VERSION", help_heading = "Selection")]
+    pub protocol: Option<String>,
     /// Write result.json, junit.xml and report.html, with a time line for each vehicle, into this folder
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -17,6 +17,8 @@ const HELD: usize = 64 << 20;
 /// What a client and a broker begin with.
 const CONNECT: u8 = 0x10;
 const CONNACK: u8 = 0x20;
+/// How much of the head of a request is looked at.
+const HEAD: usize = 4096;
 /// The port of MQTT.
 const MQTT: u16 = 1883;
 
@@ -33,6 +35,30 @@ struct Connection {
     heard: u64,
     /// Whether anything of it was MQTT.
     spoke: bool,
+    /// What it speaks instead, if that is known.
+    other: Option<Other>,
+}
+
+/// What carries MQTT and cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Other {
+    Tls,
+    WebSocket,
+}
+
+impl Other {
+    /// What the bytes of a segment begin with.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        match bytes {
+            // A record: its kind, the version, and a length.
+            [0x14..=0x17, 3, 0..=4, 0..=0x41, _, ..] => Some(Self::Tls),
+            [b'G', b'E', b'T', b' ', ..] => {
+                let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]).to_ascii_lowercase();
+                head.contains("upgrade: websocket").then_some(Self::WebSocket)
+            }
+            _ => None,
+        }
+    }
 }
 
 #[derive(Default)]
@@ -58,8 +84,8 @@ pub(super) struct Connections {
 }
 
 impl Connections {
-    /// Takes in a segment; gives what is told by it.
-    pub fn push(&mut self, segment: Segment, told: &mut Vec<Wire>) {
+    /// Takes in a segment; gives what is told by it. Says what its connection speaks instead of MQTT.
+    pub fn push(&mut self, segment: Segment, told: &mut Vec<Wire>) -> Option<Other> {
         self.segments += 1;
         let key = if segment.from < segment.to {
             (segment.from, segment.to)
@@ -75,7 +101,7 @@ impl Connections {
         if !self.open.contains_key(&key) {
             let is_empty = segment.data.is_empty() && segment.missing == 0 && !segment.syn;
             if is_empty {
-                return;
+                return None;
             }
             if self.open.len() >= CONNECTIONS {
                 self.drop_oldest(told);
@@ -83,10 +109,12 @@ impl Connections {
             self.numbers += 1;
             self.open.insert(key, Connection::new(self.numbers, &segment));
         }
-        let Some(connection) = self.open.get_mut(&key) else {
-            return;
-        };
+        let connection = self.open.get_mut(&key)?;
         connection.heard = self.segments;
+        if connection.other.is_none() && !connection.spoke {
+            connection.other = Other::of(&segment.data);
+        }
+        let other = connection.other;
         let before = connection.held();
         let end = connection.push(segment, told);
         self.held = self.held + connection.held() - before;
@@ -98,6 +126,7 @@ impl Connections {
         while self.held > HELD && !self.open.is_empty() {
             self.drop_oldest(told);
         }
+        other
     }
 
     /// What is held back at the end of the capture.
@@ -150,6 +179,7 @@ impl Connection {
             down: Direction::default(),
             heard: 0,
             spoke: false,
+            other: None,
         }
     }
 

@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 use std::io::{self, BufRead};
 
 use super::{Carried, Counted, Item, Message, Place, Read, Wire, WireEvent};
-use connections::Connections;
+use connections::{Connections, Other};
 use frames::{Frame, Frames};
 use tck_journal::Payload;
 use tck_journal::event::Packet;
@@ -85,7 +85,11 @@ impl Packets {
                 Some(frame) => {
                     self.counted.lines += 1;
                     match frame {
-                        Frame::Segment(segment) => self.connections.push(segment, &mut self.told),
+                        Frame::Segment(segment) => match self.connections.push(segment, &mut self.told) {
+                            Some(Other::Tls) => self.counted.encrypted += 1,
+                            Some(Other::WebSocket) => self.counted.web_socket += 1,
+                            None => {}
+                        },
                         Frame::Other => self.counted.skipped += 1,
                     }
                 }

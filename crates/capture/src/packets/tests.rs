@@ -164,6 +164,29 @@ fn what_is_lost_or_cut_off_is_a_gap_and_the_next_message_is_found() {
 }
 
 #[test]
+fn what_is_encrypted_or_speaks_web_socket_is_counted() {
+    let counted = |up_begins: &[u8], more: &[u8]| {
+        let (mut up, mut down) = Stream::pair(Link::Ethernet, false, 50_000);
+        let mut frames = vec![up.flagged("S"), down.segment(&[])];
+        frames.push(up.segment(up_begins));
+        frames.push(down.segment(more));
+        frames.push(up.segment(more));
+        let mut all = talk(Link::Ethernet, true);
+        all.extend(frames);
+        let file = pcap(Link::Ethernet, &timed(all), 65_535);
+        let mut packets = Packets::new(Box::new(Cursor::new(file)), 0).expect("a capture");
+        while packets.read().expect("readable").is_some() {}
+        (packets.counted().encrypted, packets.counted().web_socket)
+    };
+    let hello = [&[0x16, 3, 1, 2, 0, 1][..], &[7; 500]].concat();
+    let data = [&[0x17, 3, 3, 0, 90][..], &[9; 90]].concat();
+    assert_eq!(counted(&hello, &data), (3, 0));
+    let upgrade = b"GET /mqtt HTTP/1.1\r\nHost: broker\r\nUpgrade: websocket\r\n\r\n";
+    assert_eq!(counted(upgrade, &[0x82, 5, 1, 2, 3, 4, 5]), (0, 3));
+    assert_eq!(counted(b"GET / HTTP/1.1\r\n\r\n", b"text"), (0, 0));
+}
+
+#[test]
 fn a_capture_that_begins_in_the_middle_is_understood_from_the_first_message() {
     let frames = timed(talk(Link::Ethernet, false)).split_off(5);
     let begun = words(pcap(Link::Ethernet, &frames, 65_535));
