@@ -5,6 +5,8 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+#[macro_use]
+mod hooks;
 pub mod agv;
 pub mod deviations;
 pub mod master_control;

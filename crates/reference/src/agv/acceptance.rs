@@ -60,12 +60,12 @@ impl Agv {
             self.happens(Event::SeenAgain);
             return Ok(());
         }
-        let adoption = Adoption {
+        let mut adoption = Adoption {
             order: &mut order,
             message,
             update,
         };
-        match self.adopts(adoption) {
+        match self.adopts(&mut adoption) {
             true if update => self.continue_with(order),
             true => self.begin(order),
             false => {}
@@ -93,7 +93,7 @@ impl Agv {
     fn decide(&self, order: &Order) -> Result<Decision, Refusal> {
         let new = order.id != self.book.order_id;
         if !new && order.update_id == self.book.update_id {
-            self.objects(order, Relation::Known)?;
+            self.objected(order, Relation::Known)?;
             let again = self.allows(Permission::BeginAgain, false);
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
@@ -122,7 +122,7 @@ impl Agv {
             let refusal = Refusal::new(Rule::OtherOrderActive, "another order is active");
             self.object(Objection::Busy, refusal)?;
         }
-        self.objects(order, Relation::New)?;
+        self.objected(order, Relation::New)?;
         if first.sequence_id != 0 {
             let path = format!("{}.sequenceId", first.path);
             let refusal = Refusal::at_field(Rule::Malformed, "a new order begins with sequenceId 0", &path);

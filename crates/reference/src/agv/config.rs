@@ -224,7 +224,7 @@ pub struct AgvConfig {
     pub load_positions: Vec<String>,
     /// Largest message in bytes.
     pub max_message: usize,
-    /// What is switched on at the seam, by name.
+    /// The tolerances that are switched on, by name.
     pub switched_on: Vec<&'static str>,
 }
 

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use crate::{ConnectOptions, Output, Publication};
 use tck_base::clock::{Moment, Stamp};
+use crate::{ConnectOptions, Output, Publication};
 
 use super::Agv;
 use super::points::{Event, Head, Outgoing, Permission};
@@ -124,7 +124,7 @@ impl Agv {
             will,
             subscriptions: topics.map(|topic| (topic, 0)).collect(),
         };
-        self.joining(&mut options);
+        self.connects(&mut options);
         options
     }
 
@@ -208,7 +208,7 @@ impl Agv {
             },
             periodic: name == "state" && self.report.periodic,
         };
-        if !self.publishes(&mut outgoing) {
+        if !self.sends(&mut outgoing) {
             return;
         }
         let message = std::mem::take(&mut outgoing.message);

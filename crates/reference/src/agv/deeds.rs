@@ -165,7 +165,7 @@ impl Agv {
             Some(outcome) => outcome,
             None => {
                 let outcome = self.deed(&action);
-                self.turned_out(&action, outcome)
+                self.ends(&action, outcome)
             }
         };
         self.conclude(id, outcome);

@@ -9,7 +9,7 @@
 //! vehicle. `report` says all that in states, `factsheet` what the vehicle is.
 //!
 //! The vehicle asks at its points of decision whether it may, and says what happens: the words for both stand in `points`
-//! and `objections`, and `seam` is who else is asked. With nobody there the answer is what stands in the vehicle.
+//! and `objections`, and `hooks` is who else is asked. With nobody there the answer is what stands in the vehicle.
 
 mod ability;
 mod acceptance;
@@ -25,6 +25,7 @@ pub(crate) mod deeds;
 pub(crate) mod downloads;
 pub(crate) mod errors;
 mod factsheet;
+pub(crate) mod hooks;
 pub(crate) mod instant;
 pub(crate) mod maps;
 pub(crate) mod motion;
@@ -36,7 +37,6 @@ pub(crate) mod progress;
 pub(crate) mod read;
 pub(crate) mod rejection;
 pub(crate) mod report;
-pub(crate) mod seam;
 mod stations;
 #[cfg(test)]
 mod tests;
@@ -45,8 +45,9 @@ pub(crate) mod way;
 
 use std::collections::{BTreeSet, VecDeque};
 
-use crate::{ConnectOptions, Device, Input, Output};
 use tck_base::clock::{Moment, Stamp};
+use crate::hooks::SwitchedOn;
+use crate::{ConnectOptions, Device, Input, Output};
 
 pub use commands::COMMANDS;
 pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
@@ -59,7 +60,6 @@ use errors::Errors;
 use maps::Maps;
 use motion::{Motion, Pose};
 use report::Report;
-use seam::Seam;
 
 /// operatingMode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,7 +113,7 @@ pub(crate) struct Load {
 #[derive(Debug)]
 pub struct Agv {
     /// Who else is asked.
-    pub(crate) seam: Seam,
+    pub(crate) hooks: SwitchedOn<dyn hooks::Deviation>,
     pub(crate) config: AgvConfig,
     /// The time of what is happening.
     pub(crate) now: Stamp,
@@ -179,7 +179,7 @@ impl Agv {
         };
         let maps = Maps::new(config.maps.clone(), config.map_capacity);
         Self {
-            seam: Seam::default(),
+            hooks: SwitchedOn::default(),
             now: Stamp {
                 moment: Moment::START,
                 utc: jiff::Timestamp::UNIX_EPOCH,
@@ -253,7 +253,7 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
-        self.happens(seam::Event::Woken);
+        self.happens(hooks::Event::Woken);
         self.lingers_until = self.lingers_until.filter(|until| *until > moment);
         while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
             match self.inbox.pop_front() {
@@ -264,7 +264,7 @@ impl Agv {
         }
         self.attempt_connection();
         self.settle();
-        self.happens(seam::Event::Settled);
+        self.happens(hooks::Event::Settled);
         self.flush();
     }
 }
@@ -298,7 +298,7 @@ impl Agv {
         let is_message = |input: &Input| matches!(input, Input::Message { .. });
         let mut due = self.moment() + self.config.answers_after;
         if is_message(&input) {
-            due = self.moment() + self.lasts(seam::Span::Answer, self.config.answers_after);
+            due = self.moment() + self.lasts(hooks::Span::Answer, self.config.answers_after);
             let before = self.inbox.iter().filter(|(_, other)| is_message(other));
             due = before.map(|(other, _)| *other).fold(due, Moment::max);
         }

@@ -1,6 +1,6 @@
 //! The points of decision: what may be done, lasts, is said, happens and goes out.
 //!
-//! What the vehicle does at each stands where it does it; `seam` is who else is asked.
+//! What the vehicle does at each stands where it does it; `hooks` is who else is asked.
 
 use serde_json::{Map, Value};
 

@@ -19,7 +19,7 @@ impl Agv {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the order was cancelled");
             self.object(Objection::Cancelled, refusal)?;
         }
-        self.objects(order, Relation::Update)?;
+        self.objected(order, Relation::Update)?;
         let first = &order.nodes[0];
         if !self.joins(first) {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");

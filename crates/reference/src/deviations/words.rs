@@ -6,6 +6,8 @@ use serde_json::{Map, Value};
 pub trait Words {
     /// Says something, instead of what was said there.
     fn set(&mut self, key: &str, value: impl Into<Value>);
+    /// Says something where nothing is said.
+    fn supply(&mut self, key: &str, value: impl Into<Value>);
     /// Says nothing of that any more.
     fn unset(&mut self, key: &str);
     /// Says the same under another key.
@@ -31,6 +33,10 @@ pub trait Words {
 impl Words for Map<String, Value> {
     fn set(&mut self, key: &str, value: impl Into<Value>) {
         self.insert(key.to_owned(), value.into());
+    }
+
+    fn supply(&mut self, key: &str, value: impl Into<Value>) {
+        self.entry(key).or_insert_with(|| value.into());
     }
 
     fn unset(&mut self, key: &str) {

@@ -5,7 +5,7 @@
 use serde_json::{Map, Value, json};
 
 use super::Site;
-use super::seam::{Made, Permission};
+use super::hooks::Permission;
 use super::seen::ActionOffer;
 use super::vehicle::Vehicle;
 
@@ -98,7 +98,9 @@ impl Site {
             let list = parameters.into_iter();
             action["actionParameters"] = list.map(|(key, value)| json!({ "key": key, "value": value })).collect();
         }
-        self.makes(vehicle, Made::Action(&mut action, given, instant));
+        if let Value::Object(action) = &mut action {
+            self.makes(vehicle, action, given, instant);
+        }
         action
     }
 

@@ -5,7 +5,7 @@
 use serde_json::{Value, json};
 
 use super::Site;
-use super::seam::{Event, Measure, Permission};
+use super::hooks::{Event, Measure, Permission};
 use super::seen::ActionState;
 use super::vehicle::{Instant, MAX_INSTANT, Vehicle};
 
@@ -107,7 +107,7 @@ impl Site {
             vehicle.at(due);
         }
         for id in lost {
-            self.happens(vehicle, Event::InstantLost(&id));
+            self.happens(vehicle, &mut Event::InstantLost(&id));
         }
     }
 }

@@ -8,7 +8,7 @@
 //! is not released yet, `cancel` calls an order off and waits for the end of that (6.6.3). `instant` sends instant
 //! actions (6.9), made in `actions` (6.8); `maps` rolls maps out (6.7). `connecting` is its link to the broker.
 //!
-//! `seam` is where it can be made to behave otherwise; this room knows nothing of how.
+//! `hooks` is where it can be made to behave otherwise; this room knows nothing of how.
 
 pub(crate) mod actions;
 mod cancel;
@@ -18,6 +18,7 @@ mod connecting;
 pub(crate) mod dispatch;
 pub(crate) mod driving;
 mod hearing;
+pub(crate) mod hooks;
 pub(crate) mod instant;
 pub(crate) mod layout;
 pub(crate) mod maps;
@@ -25,7 +26,6 @@ pub(crate) mod order;
 mod points;
 mod publish;
 pub(crate) mod rerouting;
-pub(crate) mod seam;
 pub(crate) mod seen;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -35,14 +35,15 @@ pub(crate) mod ways;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use crate::{ConnectOptions, Device, Input, Output};
 use tck_base::clock::{Moment, Stamp};
+use crate::hooks::SwitchedOn;
+use crate::{ConnectOptions, Device, Input, Output};
 
 pub use commands::COMMANDS;
 pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig};
 
 use connecting::Connection;
-use seam::{Event, Hook, Made, Measure, Permission, Seam};
+use hooks::{Deviation, Event, Hook, Measure, Permission};
 use vehicle::Vehicle;
 
 /// More messages than this do not lie about unread.
@@ -52,7 +53,7 @@ const MAX_INBOX: usize = 10_000;
 #[derive(Debug)]
 pub(crate) struct Site {
     pub(crate) config: MasterControlConfig,
-    seam: Seam,
+    hooks: SwitchedOn<dyn Deviation>,
     /// The time of what is happening.
     pub(crate) now: Stamp,
     pub(crate) connection: Connection,
@@ -69,7 +70,7 @@ impl Site {
     pub(crate) fn next_id(&mut self, vehicle: &Vehicle, what: &str) -> String {
         self.ids += 1;
         let mut id = self.spelled(vehicle, what, self.ids);
-        self.makes(vehicle, Made::Id(what, &mut id));
+        self.names(vehicle, what, &mut id);
         id
     }
 
@@ -107,7 +108,7 @@ impl Site {
         if !self.connection.online {
             return;
         }
-        self.happens(vehicle, Event::Looked);
+        self.happens(vehicle, &mut Event::Looked);
         self.miss_factsheet(vehicle);
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);
@@ -146,11 +147,11 @@ impl MasterControl {
         Self::with(config, Vec::new())
     }
 
-    /// The same, made to behave otherwise at its seam.
+    /// A master control that behaves otherwise at its hook points.
     pub(crate) fn with(config: MasterControlConfig, hooks: Vec<Hook>) -> Self {
         let mut site = Site {
             config,
-            seam: Seam::default(),
+            hooks: SwitchedOn::default(),
             now: Stamp {
                 moment: Moment::START,
                 utc: jiff::Timestamp::UNIX_EPOCH,
@@ -218,7 +219,7 @@ impl MasterControl {
 impl Device for MasterControl {
     fn connect_options(&mut self, now: Stamp) -> ConnectOptions {
         self.advance(now);
-        self.joining().options
+        self.joining()
     }
 
     fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use crate::{Output, Publication};
 use tck_base::clock::Moment;
+use crate::{Output, Publication};
 
 use super::Site;
-use super::seam::{Outgoing, Span};
+use super::hooks::{Outgoing, Span};
 use super::vehicle::Vehicle;
 
 impl Site {
@@ -38,7 +38,7 @@ impl Site {
             retain: false,
             again,
         };
-        if !self.publishes(vehicle, &mut outgoing) {
+        if !self.sends(vehicle, &mut outgoing) {
             return;
         }
         let payload = self.text(name, &Value::Object(outgoing.message));

@@ -9,9 +9,9 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde_json::{Value, json};
 
+use tck_base::clock::{Moment, Stamp};
 use crate::agv::{Agv, AgvConfig};
 use crate::{Device, Input, Output};
-use tck_base::clock::{Moment, Stamp};
 
 use super::{MasterControl, MasterControlConfig, VehicleConfig};
 

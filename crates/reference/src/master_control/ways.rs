@@ -10,7 +10,7 @@ use super::Site;
 use super::config::SiteNode;
 use super::dispatch::Way;
 use super::layout::distance;
-use super::seam::{Measure, Permission, Plan};
+use super::hooks::{Measure, Permission};
 use super::seen::Position;
 use super::vehicle::{Leg, Stop, Transport, Vehicle};
 
@@ -59,7 +59,7 @@ impl Site {
             position: state.agv_position.clone(),
             standing: Standing::Near,
         };
-        self.plans(vehicle, Plan::Pose(&mut pose, transport));
+        self.stands(vehicle, &mut pose, transport);
         let last = self.config.node(&pose.node);
         let on = |node: &SiteNode, covers: Option<f64>| {
             let mut stop = Stop::from(node);
@@ -187,7 +187,7 @@ impl Site {
 
     fn extend(&mut self, vehicle: &mut Vehicle, way: &mut Way, from: &str, to: &str) -> Option<()> {
         let mut closed = vehicle.blocked.clone();
-        self.plans(vehicle, Plan::Route(from, to, &mut closed));
+        self.avoids(vehicle, from, to, &mut closed);
         for edge in self.config.any_way(from, to, &closed)? {
             way.legs.push(Leg::from(edge));
             way.stops.push(Stop::from(self.config.node(&edge.to)?));

@@ -1,13 +1,6 @@
 //! Deviations of what a state says about actions (section 6.10.6).
 
-use super::hooks::{Object, action, state, text};
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::{Action, Origin, Status};
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
+use super::prelude::*;
 
 records! {
     fault "action-states-omitted-when-empty" ["STATE-MSG-01", "STATE-01"] "It leaves actionStates out of the state when there are none."

@@ -1,42 +1,8 @@
 //! Deviations of how an order is cancelled (section 6.6.3 and figure 9).
 
-use super::hooks::MOMENT;
-use super::hooks::action;
-use super::hooks::allowing;
-use super::hooks::breaking;
-use super::hooks::brief;
-use super::hooks::forbidding;
-use super::hooks::goes_on;
-use super::hooks::instead;
-use super::hooks::is;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::nothing_to_cancel;
-use super::hooks::plain;
-use super::hooks::since_update;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
 use crate::agv::book::Book;
-use crate::agv::book::Stop;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::ActiveError;
-use crate::agv::errors::Life;
-use crate::agv::order_message::Edge;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Permission;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::collections::VecDeque;
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder."
@@ -222,7 +188,7 @@ records! {
                 Event::Woken if due.take_if(|due| *due <= agv.moment()).is_some() => agv.actions.retain(|action| !action.of_order()),
                 _ => {}
             })
-            .due(|due| *due);
+            .due(|due, _| *due);
     fault "paused-order-survives-cancel" ["ORD-CANCEL-02"] "Goes on with an order that was cancelled in a pause when the pause ends."
         => keep::<Option<Book>>()
             .does(|order, agv, action| {
@@ -286,7 +252,7 @@ records! {
                 _ => {}
             })
             .allows(|until, _, what, usual| usual && !(matches!(what, Permission::EndCancel) && until.is_some()))
-            .due(|until| *until);
+            .due(|until, _| *until);
     liberty "cancel-in-steps" ["ORD-CANCEL-06", "STATE-11"] "It reports cancelOrder RUNNING with all actions ended in a state of its own before it reports FINISHED."
         => when(Event::CancelBegun, Agv::flush);
     liberty "idle-cancel-error-brief" ["ORD-CANCEL-19", "STATE-05"] "It reports noOrderToCancel in one state and takes it back at once."
@@ -335,15 +301,7 @@ fn finished(agv: &mut Agv, error: &ActiveError) -> bool {
 
 /// Misses some actions when the order is cancelled.
 fn surviving(which: fn(&Action) -> bool) -> Box<dyn Deviation> {
-    struct Surviving(fn(&Action) -> bool);
-    impl Deviation for Surviving {
-        fn breaks(&self, _: &Agv, action: &Action, usual: Option<Status>) -> Option<Status> {
-            usual.filter(|_| !(self.0)(action))
-        }
-
-        fn allows(&self, _: &Agv, what: Permission<'_>, usual: bool) -> bool {
-            usual && !matches!(what, Permission::CancelAwaits(action) if (self.0)(action))
-        }
-    }
-    Box::new(Surviving(which))
+    holding(which)
+        .breaks(|which, _, action, usual| usual.filter(|_| !which(action)))
+        .allows(|which, _, what, usual| usual && !matches!(what, Permission::CancelAwaits(action) if which(action)))
 }

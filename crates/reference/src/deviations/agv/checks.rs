@@ -1,23 +1,6 @@
 //! Deviations of what is checked before an order is taken over (section 6.6.4, ORD-REJ-04 to ORD-REJ-16).
 
-use super::hooks::adopting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::objecting;
-use super::hooks::overlooking;
-use super::hooks::updating;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::order_message::Order;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Lack;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
+use super::prelude::*;
 
 records! {
     fault "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense."

@@ -1,13 +1,8 @@
 //! Deviations of the link: how it is made, lost and left, and what the connection topic says (sections 6.3 and 6.14).
 
-use super::hooks::{joining, plain, sending, unsaid, when, will};
 use crate::ConnectOptions;
-use crate::agv::Agv;
-use crate::agv::actions::{Origin, Status};
-use crate::agv::seam::{Deviation, Event, Outgoing, Permission};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::time::Duration;
+
+use super::prelude::*;
 
 records! {
     fault "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1."

@@ -1,56 +1,14 @@
 //! Deviations of driving: setting out, the way over an edge, reaching a node (sections 6.6.1, 6.10.2 and 6.12).
 
-use super::hooks::Hooks;
-use super::hooks::MOMENT;
-use super::hooks::Object;
-use super::hooks::adopting;
-use super::hooks::edge;
-use super::hooks::facing;
-use super::hooks::forbidding;
-use super::hooks::goes_on;
-use super::hooks::holding;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::lifts_pause;
-use super::hooks::linger;
-use super::hooks::node;
-use super::hooks::number;
-use super::hooks::plain;
-use super::hooks::planning;
-use super::hooks::position;
-use super::hooks::raising;
-use super::hooks::steering;
-use super::hooks::velocity;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::Mode;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::book::Stop;
-use crate::agv::deeds::Outcome;
-use crate::agv::motion;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use tck_base::nurbs::Path;
+use crate::agv::{Mode, motion};
 use crate::agv::motion::Facing;
 use crate::agv::order_message::Corridor;
-use crate::agv::order_message::Edge;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
 use crate::agv::way::is_backwards;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use serde_json::json;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use std::f64::consts::FRAC_PI_2;
-use std::f64::consts::PI;
-use tck_base::clock::Moment;
-use tck_base::nurbs::Path;
+
+use super::prelude::*;
 
 records! {
     fault "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down."
@@ -167,13 +125,13 @@ records! {
         })
         .plans(|_, agv, leg| leg.facing = Facing::Fixed(agv.motion.pose(agv.moment()).theta));
     fault "trajectory-cut" ["ORD-MSG-26"] "Drives straight to the end of an edge that has a trajectory." because "It breaks a recommendation only."
-        => Box::new(Bending(|_, _, _| None));
+        => bending(|_, _, _| None);
     fault "drives-the-control-polygon" ["ORD-MSG-26"] "It drives from control point to control point in straight lines instead of along the curve."
         because "ORD-MSG-26, that a trajectory is followed, is a recommendation; the control points are reached."
-        => Box::new(Bending(|agv, edge, path| match &edge.trajectory {
+        => bending(|agv, edge, path| match &edge.trajectory {
             Some(trajectory) if !agv.obstacles.contains(&edge.id) => Some(control_polygon(&trajectory.sent)),
             _ => Some(path),
-        }));
+        });
     fault "direction-ignored" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the same branch at a junction whatever direction it is given."
         => branching(|branches, _| branches.first().cloned());
     fault "direction-mistaken" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the branch beside the one it is told."
@@ -334,7 +292,7 @@ records! {
 
 /// Drives on into the horizon by itself, a moment after it has stopped at the decision point.
 fn slipping(speed: fn(f64) -> f64) -> Box<dyn Deviation> {
-    #[derive(Default)]
+    #[derive(Clone, Default)]
     struct Slip {
         due: Option<Moment>,
         slipped: bool,
@@ -359,7 +317,7 @@ fn slipping(speed: fn(f64) -> f64) -> Box<dyn Deviation> {
                 leg.own = speed(agv.config.speed);
             }
         })
-        .due(|(_, slip)| slip.due)
+        .due(|(_, slip), _| slip.due)
 }
 
 type Noted = fn(&mut Agv, u32);
@@ -403,13 +361,11 @@ fn ending_early(which: Early) -> Box<Hooks<Early>> {
         })
 }
 
-/// Takes another way than the trajectory of an edge; a straight one where there is none.
-struct Bending(fn(&Agv, &Edge, Path) -> Option<Path>);
+type Bending = fn(&Agv, &Edge, Path) -> Option<Path>;
 
-impl Deviation for Bending {
-    fn bends(&self, agv: &Agv, edge: &Edge, path: Path) -> Option<Path> {
-        (self.0)(agv, edge, path)
-    }
+/// Takes another way than the trajectory of an edge; a straight one where there is none.
+fn bending(way: Bending) -> Box<dyn Deviation> {
+    holding(way).bends(|way, agv, edge, path| way(agv, edge, path))
 }
 
 /// The way from control point to control point of a trajectory.
@@ -439,13 +395,7 @@ fn branching(choice: Branching) -> Box<Hooks<Branching>> {
 
 /// Understands its corridors otherwise.
 fn keeping(change: fn(&mut Corridor)) -> Box<dyn Deviation> {
-    struct Keeping(fn(&mut Corridor));
-    impl Deviation for Keeping {
-        fn keeps_to(&self, _: &Agv, corridor: &mut Corridor) {
-            (self.0)(corridor);
-        }
-    }
-    Box::new(Keeping(change))
+    holding(change).keeps_to(|change, _, corridor| change(corridor))
 }
 
 type Points = Vec<(f64, f64)>;
@@ -454,34 +404,29 @@ type Planned = fn(&Agv, &Edge, &mut Points, &mut Vec<f64>);
 
 /// Reports another path than the straight one it has planned: its points and knots.
 fn path(change: Planned) -> Box<dyn Deviation> {
-    struct Planning(Planned);
-    impl Deviation for Planning {
-        fn says(&self, agv: &Agv, part: Part<'_>, words: &mut Object) -> bool {
-            if let Part::Edge(edge) = part
-                && edge.trajectory.is_none()
-            {
-                words.part("trajectory", |path| {
-                    let number = |point: &Value, axis: &str| point[axis].as_f64().unwrap_or_default();
-                    let points = path.list("controlPoints").iter();
-                    let mut points: Points = points.map(|point| (number(point, "x"), number(point, "y"))).collect();
-                    let mut knots = vec![0.0, 0.0, 1.0, 1.0];
-                    (self.0)(agv, edge, &mut points, &mut knots);
-                    let point = |(x, y): (f64, f64)| json!({ "x": x, "y": y, "weight": 1.0 });
-                    path.set("controlPoints", points.into_iter().map(point).collect::<Vec<_>>());
-                    path.set("knotVector", knots);
-                });
-            }
-            true
+    holding(change).says(|change, agv, part, words| {
+        if let Part::Edge(edge) = part
+            && edge.trajectory.is_none()
+        {
+            words.part("trajectory", |path| {
+                let number = |point: &Value, axis: &str| point[axis].as_f64().unwrap_or_default();
+                let points = path.list("controlPoints").iter();
+                let mut points: Points = points.map(|point| (number(point, "x"), number(point, "y"))).collect();
+                let mut knots = vec![0.0, 0.0, 1.0, 1.0];
+                change(agv, edge, &mut points, &mut knots);
+                let point = |(x, y): (f64, f64)| json!({ "x": x, "y": y, "weight": 1.0 });
+                path.set("controlPoints", points.into_iter().map(point).collect::<Vec<_>>());
+                path.set("knotVector", knots);
+            });
         }
-    }
-    Box::new(Planning(change))
+        true
+    })
 }
 
 /// Counts y to the right: what it reports, and what it is told of places it does not know.
 fn mirrored() -> Box<dyn Deviation> {
-    struct Mirrored;
-    impl Deviation for Mirrored {
-        fn says(&self, agv: &Agv, part: Part<'_>, words: &mut Object) -> bool {
+    plain()
+        .says(|(), agv, part, words| {
             match part {
                 Part::Position => number(words, "y", |y| -y),
                 Part::Node(stop) if agv.config.node(&stop.node.id).is_none() => {
@@ -490,9 +435,8 @@ fn mirrored() -> Box<dyn Deviation> {
                 _ => {}
             }
             true
-        }
-
-        fn reads(&self, agv: &Agv, message: &mut Value) {
+        })
+        .reads(|(), agv, message| {
             let nodes = message.get_mut("nodes").and_then(Value::as_array_mut);
             for node in nodes.into_iter().flatten() {
                 let known = node["nodeId"].as_str().is_some_and(|id| agv.config.node(id).is_some());
@@ -500,17 +444,14 @@ fn mirrored() -> Box<dyn Deviation> {
                     number(place, "y", |y| -y);
                 }
             }
-        }
-
-        fn does(&mut self, agv: &mut Agv, action: &Action) -> Option<Outcome> {
+        })
+        .does(|(), agv, action| {
             let mut turned = action.clone();
             let y = turned.request.parameters.iter_mut().find(|(key, _)| key == "y");
             let value = y.filter(|_| is(action, Deed::InitPosition)).map(|(_, value)| value)?;
             *value = json!(-value.as_f64()?);
             Some(agv.init_position(&turned).into())
-        }
-    }
-    Box::new(Mirrored)
+        })
 }
 
 /// How far before a node on its way it may report it.

@@ -1,40 +1,11 @@
 //! Deviations of instant actions: which are read, refused, begun, and when (section 6.9).
 
-use super::hooks::Hooks;
-use super::hooks::after;
-use super::hooks::forbidding;
-use super::hooks::holding;
-use super::hooks::is;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::plain;
-use super::hooks::raising;
-use super::hooks::when;
-use crate::Output;
-use crate::Publication;
-use crate::agv::Agv;
-use crate::agv::Mode;
-use crate::agv::action_kinds;
-use crate::agv::action_kinds::Deed;
+use crate::{Output, Publication};
+use crate::agv::{Mode, action_kinds};
 use crate::agv::action_kinds::Scope;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::ActiveError;
 use crate::agv::order_message::Blocking;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use serde_json::json;
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "state-request-listed-refused" ["FACT-07", "ACT-26"] "Does not understand stateRequest although its factsheet lists it."
@@ -133,7 +104,7 @@ records! {
         });
     fault "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever."
         => plain()
-            .lasts(|_, what, usual| match what {
+            .lasts(|_, _, what, usual| match what {
                 Span::Action(action) if !action.of_order() => Duration::MAX,
                 _ => usual,
             })
@@ -210,39 +181,24 @@ type Ending = fn(&Action) -> bool;
 
 /// Takes nothing of a message behind some action that has failed.
 fn ending_batch(at: Ending) -> Box<dyn Deviation> {
-    struct Batch(Ending, bool);
-    impl Deviation for Batch {
-        fn reads_instants(&mut self, _: &mut Agv, _: &mut Vec<&Value>) {
-            self.1 = false;
-        }
-
-        fn raises(&mut self, _: &mut Agv, cause: Cause<'_>, _: &mut ActiveError) -> bool {
-            self.1 |= match cause {
-                Cause::Failure(Some(action)) => !action.of_order() && (self.0)(action),
+    holding((at, false))
+        .reads_instants(|(_, ended), _, _| *ended = false)
+        .raises(|(at, ended), _, cause, _| {
+            *ended |= match cause {
+                Cause::Failure(Some(action)) => !action.of_order() && at(action),
                 Cause::NothingToCancel => true,
                 _ => false,
             };
             true
-        }
-
-        fn allows(&self, _: &Agv, what: Permission<'_>, usual: bool) -> bool {
-            usual && !(self.1 && matches!(what, Permission::TakeInstant))
-        }
-    }
-    Box::new(Batch(at, false))
+        })
+        .allows(|(_, ended), _, what, usual| usual && !(*ended && matches!(what, Permission::TakeInstant)))
 }
 
 type Batch = fn(&mut Agv, &mut Vec<&Value>);
 
 /// Does something with the actions of a message before it reads them.
 fn batch(change: Batch) -> Box<dyn Deviation> {
-    struct Reading(Batch);
-    impl Deviation for Reading {
-        fn reads_instants(&mut self, agv: &mut Agv, actions: &mut Vec<&Value>) {
-            (self.0)(agv, actions);
-        }
-    }
-    Box::new(Reading(change))
+    holding(change).reads_instants(|change, agv, actions| change(agv, actions))
 }
 
 /// Answers master control on its own topic.

@@ -1,22 +1,11 @@
 //! Liberties in how a message is worded: what else it says, and how its JSON is written (sections 6.2 to 6.4 and 6.10).
 
-use super::hooks::Hooks;
-use super::hooks::Object;
-use super::hooks::header;
-use super::hooks::holding;
-use super::hooks::number;
-use super::hooks::plain;
-use super::hooks::sending;
-use crate::agv::Agv;
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde::Serialize as _;
-use serde_json::Value;
-use serde_json::json;
-use serde_json::ser::CompactFormatter;
-use serde_json::ser::Formatter;
 use std::io;
+
+use serde::Serialize as _;
+use serde_json::ser::{CompactFormatter, Formatter};
+
+use super::prelude::*;
 
 records! {
     liberty "vendor-information" ["INFO-01"] "Reports information nobody asked for."
@@ -139,15 +128,15 @@ records! {
     liberty "keys-reordered" ["JSON-01"] "Sends the members of its messages in reverse order."
         => wording(|_, m| *m = std::mem::take(m).into_iter().rev().collect());
     liberty "pretty-printed" ["MQTT-02"] "Sends its messages in many lines, indented."
-        => plain().writes(|_, _, text| if let Ok(message) = serde_json::from_slice::<Value>(text) {
+        => plain().writes(|_, _, _, text| if let Ok(message) = serde_json::from_slice::<Value>(text) {
             *text = format!("{message:#}\n").into_bytes();
         });
     liberty "text-escaped" ["JSON-03"] "Escapes letters in its texts that need it not."
-        => plain().writes(|_, _, text| written(text, Hand::Escaped));
+        => plain().writes(|_, _, _, text| written(text, Hand::Escaped));
     liberty "exponents" ["JSON-06"] "Writes its coordinates with an exponent."
-        => plain().writes(|_, _, text| written(text, Hand::Exponents));
+        => plain().writes(|_, _, _, text| written(text, Hand::Exponents));
     liberty "many-digits" ["JSON-06"] "Writes its coordinates with all the digits it computes."
-        => plain().writes(|_, _, text| written(text, Hand::ManyDigits));
+        => plain().writes(|_, _, _, text| written(text, Hand::ManyDigits));
     liberty "states-retained" ["MQTT-07", "STATE-01"] "It publishes its states with the retain flag."
         => sending(|_, outgoing| outgoing.retain |= outgoing.name == "state");
     liberty "header-id-wraps" ["HDR-02"] "It starts its headerIds a little below 4294967295 and goes on with 0 behind it."

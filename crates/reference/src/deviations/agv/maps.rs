@@ -1,16 +1,10 @@
 //! Deviations of what is done with maps, and of the actions a master control asks for at once (sections 6.7 and 6.8).
 
-use super::hooks::{Hooks, after, failed, fails_unseen, failure, holding, instead, is, keep, plain, succeeded};
 use crate::Output;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::{Action, Status};
 use crate::agv::config::OnboardMap;
-use crate::agv::deeds::{Outcome, Problem};
 use crate::agv::motion::{Motion, Pose};
-use crate::agv::seam::{Deviation, Event, Part, Permission};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
+
+use super::prelude::*;
 
 records! {
     fault "enable-unknown-disables" ["MAP-25"] "Disables its maps before it fails to enable one it does not have."
@@ -368,6 +362,7 @@ records! {
 }
 
 /// How it was before an initPosition.
+#[derive(Clone)]
 struct Before {
     motion: Motion,
     maps: Vec<OnboardMap>,
@@ -378,25 +373,21 @@ type Posing = fn(&mut Agv, &Action, Pose, Pose);
 
 /// Makes another pose of the one that was taken over; the pose before and the one after it are handed in.
 fn posed(then: Posing) -> Box<dyn Deviation> {
-    struct Posed(Posing, Option<Pose>);
-    impl Deviation for Posed {
-        fn does(&mut self, agv: &mut Agv, _: &Action) -> Option<Outcome> {
-            self.1 = Some(agv.motion.pose(agv.moment()));
+    holding((then, None::<Pose>))
+        .does(|(_, before), agv, _| {
+            *before = Some(agv.motion.pose(agv.moment()));
             None
-        }
-
-        fn ends(&mut self, agv: &mut Agv, action: &Action, outcome: Outcome) -> Outcome {
+        })
+        .ends(|(then, before), agv, action, outcome| {
             if is(action, Deed::InitPosition)
                 && matches!(outcome, Outcome::Done(_))
-                && let Some(before) = self.1.take()
+                && let Some(before) = before.take()
             {
                 let pose = agv.motion.pose(agv.moment());
-                (self.0)(agv, action, before, pose);
+                then(agv, action, before, pose);
             }
             outcome
-        }
-    }
-    Box::new(Posed(then, None))
+        })
 }
 
 /// Whether the map an action names is on board.

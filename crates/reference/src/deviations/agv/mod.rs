@@ -21,17 +21,16 @@ mod driving;
 mod errors;
 mod factsheet;
 mod header;
-mod hooks;
 mod instants;
 mod manner;
 mod maps;
-mod memory;
 mod modes;
 mod motion;
 mod nature;
 mod orders;
 mod pause;
 mod poses;
+mod prelude;
 mod reading;
 mod refusals;
 mod route;
@@ -49,7 +48,7 @@ use std::sync::LazyLock;
 
 use super::record::{Kind, Record};
 use crate::Fault;
-use crate::agv::seam::Deviation;
+use crate::agv::hooks::Deviation;
 use crate::agv::{Agv, AgvConfig};
 
 /// All records.

@@ -1,35 +1,9 @@
 //! Deviations of operating modes, and of what people do to the vehicle (section 6.10.6, MODE-01 to MODE-06).
 
-use super::hooks::MOMENT;
-use super::hooks::forbidding;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::objecting;
-use super::hooks::parked;
-use super::hooks::plain;
-use super::hooks::raising;
-use super::hooks::when;
-use crate::agv::Agv;
 use crate::agv::Mode;
-use crate::agv::actions::Action;
-use crate::agv::actions::Status;
 use crate::agv::book::Book;
-use crate::agv::errors::Life;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::json;
-use std::time::Duration;
+
+use super::prelude::*;
 
 records! {
     fault "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC."

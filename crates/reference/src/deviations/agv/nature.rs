@@ -1,53 +1,39 @@
 //! Liberties that are a matter of what the vehicle is like: how fast it is, what fits into it, how it connects (section 6.14
 //! and 6.15).
 
-use super::hooks::Object;
-use super::hooks::factsheet;
-use super::hooks::forbidding;
-use super::hooks::joining;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::AgvConfig;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::json;
-use std::time::Duration;
+use super::prelude::*;
 
 records! {
     // Whoever is slow to answer is slow in all, else an order would be done before its cancellation is read.
     liberty "answers-slowly" ["STATE-03", "ORD-FLOW-06"] "Looks at a message half a second after it came."
-        => being(|config| {
+        => plain().configures(|config| {
             config.answers_after = Duration::from_millis(500);
             slower(config, 6.0);
         });
     liberty "answers-very-slowly" ["STATE-03", "ORD-FLOW-06"] "Looks at a message four seconds after it came."
-        => being(|config| {
+        => plain().configures(|config| {
             config.answers_after = Duration::from_secs(4);
             slower(config, 40.0);
         });
     liberty "states-coalesced" ["STATE-11", "FACT-14"] "Sends no state within 0.4 s of another, so that changes share a state."
-        => being(|config| {
+        => plain().configures(|config| {
             config.min_state_interval = Duration::from_millis(400);
             slower(config, 6.0);
         });
     liberty "states-seldom" ["STATE-02"] "Sends a state only every 28 s when nothing happens."
-        => being(|config| config.state_interval = Duration::from_secs(28));
+        => plain().configures(|config| config.state_interval = Duration::from_secs(28));
     liberty "states-often" ["STATE-02"] "Sends a state ten times a second, whatever happens."
-        => being(|config| config.state_interval = Duration::from_millis(100));
+        => plain().configures(|config| config.state_interval = Duration::from_millis(100));
     liberty "state-every-second" ["STATE-02", "STATE-11"] "It sends a state every second even when nothing happens."
-        => being(|config| config.state_interval = config.state_interval.min(Duration::from_secs(1)));
+        => plain().configures(|config| config.state_interval = config.state_interval.min(Duration::from_secs(1)));
     liberty "visualization-off" ["TOPIC-12"] "Publishes no visualization."
-        => being(|config| config.visualization_interval = None);
+        => plain().configures(|config| config.visualization_interval = None);
     liberty "visualization-often" ["TOPIC-12", "VIS-02"] "Publishes the visualization twenty times a second."
-        => being(|config| config.visualization_interval = Some(Duration::from_millis(50)));
+        => plain().configures(|config| config.visualization_interval = Some(Duration::from_millis(50)));
     liberty "drives-slowly" ["ORD-06"] "Drives at a quarter of its speed."
-        => being(|config| slower(config, 4.0));
+        => plain().configures(|config| slower(config, 4.0));
     liberty "actions-at-once" ["ASTATE-02"] "Performs its actions in no time, so that they are never seen running."
-        => being(|config| {
+        => plain().configures(|config| {
             // What happens at a station takes the time it takes.
             for action in ["pick", "drop", "finePositioning", "detectObject"] {
                 config.action_durations.insert(action.to_owned(), config.action_duration);
@@ -55,23 +41,23 @@ records! {
             config.action_duration = Duration::ZERO;
         });
     liberty "reconnects-at-once" ["MQTT-10"] "It connects again after 50 milliseconds when the connection is broken."
-        => being(|config| config.reconnect_delay = Duration::from_millis(50));
+        => plain().configures(|config| config.reconnect_delay = Duration::from_millis(50));
     liberty "reconnects-late" ["MQTT-10"] "Connects again eight seconds after a broken link."
-        => being(|config| config.reconnect_delay = Duration::from_secs(8));
+        => plain().configures(|config| config.reconnect_delay = Duration::from_secs(8));
     liberty "keep-alive-ten" ["CONN-04"] "The keep-alive is 10 s."
-        => being(|config| config.keep_alive = Duration::from_secs(10));
+        => plain().configures(|config| config.keep_alive = Duration::from_secs(10));
     liberty "keep-alive-20" ["CONN-04"] "Asks for a keep-alive of 20 s."
-        => being(|config| config.keep_alive = Duration::from_secs(20));
+        => plain().configures(|config| config.keep_alive = Duration::from_secs(20));
     liberty "little-fits" ["FACT-12"] "Takes ids of 14 characters, two actions at a place and in a message, and says so in its factsheet."
-        => being(|config| {
+        => plain().configures(|config| {
             config.max_id = 14;
             config.max_actions = 2;
             config.max_instant_actions = 2;
         });
     liberty "errors-stay" ["ERR-01"] "Keeps the errors of refused instant actions for half a minute."
-        => being(|config| config.error_duration = Duration::from_secs(30));
+        => plain().configures(|config| config.error_duration = Duration::from_secs(30));
     liberty "limits-of-zero-in-factsheet" ["FACT-05", "FACT-11"] "It states 0 for all array and string limits in the factsheet because it has none."
-        => Box::new(Unlimited);
+        => unlimited();
     liberty "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5."
         => joining(|_, options| options.level = 5);
     liberty "session-kept" ["MQTT-03"] "Asks the broker to keep its session."
@@ -129,17 +115,6 @@ records! {
         })));
 }
 
-/// Is another vehicle.
-fn being(change: fn(&mut AgvConfig)) -> Box<dyn Deviation> {
-    struct Being(fn(&mut AgvConfig));
-    impl Deviation for Being {
-        fn configures(&self, config: &mut AgvConfig) {
-            (self.0)(config);
-        }
-    }
-    Box::new(Being(change))
-}
-
 /// Slows it down to this share of its usual pace. Of several reasons the slowest counts: a vehicle a hundred times slower than
 /// usual is no good vehicle.
 fn slower(config: &mut AgvConfig, times: f64) {
@@ -157,19 +132,11 @@ fn slower(config: &mut AgvConfig, times: f64) {
 }
 
 /// Takes whatever comes, and says 0 for every limit.
-struct Unlimited;
-
-impl Deviation for Unlimited {
-    fn configures(&self, config: &mut AgvConfig) {
-        config.max_nodes = config.max_nodes.max(10_000);
-        config.max_instant_actions = config.max_instant_actions.max(1_000);
-        config.max_actions = config.max_actions.max(1_000);
-    }
-
-    fn says(&self, agv: &Agv, part: Part<'_>, words: &mut Object) -> bool {
+fn unlimited() -> Box<dyn Deviation> {
+    factsheet(|agv, sheet| {
         // What else it takes in little would not be true then.
-        if matches!(part, Part::Factsheet) && !agv.config.switched_on.contains(&"little-fits") {
-            words.part("protocolLimits", |limits| {
+        if !agv.config.switched_on.contains(&"little-fits") {
+            sheet.part("protocolLimits", |limits| {
                 for list in ["maxStringLens", "maxArrayLens"] {
                     limits.part(list, |list| {
                         let limits = list.values_mut().filter(|limit| limit.is_number());
@@ -178,6 +145,10 @@ impl Deviation for Unlimited {
                 }
             });
         }
-        true
-    }
+    })
+    .configures(|config| {
+        config.max_nodes = config.max_nodes.max(10_000);
+        config.max_instant_actions = config.max_instant_actions.max(1_000);
+        config.max_actions = config.max_actions.max(1_000);
+    })
 }

@@ -1,52 +1,10 @@
 //! Deviations of which orders are taken over, and how (section 6.6 and figure 8).
 
-use super::hooks::Hooks;
-use super::hooks::allowing;
-use super::hooks::brief;
-use super::hooks::forbidding;
-use super::hooks::heedless;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::linger;
-use super::hooks::objecting;
-use super::hooks::overlooking;
-use super::hooks::parked;
-use super::hooks::plain;
-use super::hooks::refusal;
-use super::hooks::unbound;
-use super::hooks::when;
-use crate::Output;
-use crate::Publication;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Status;
-use crate::agv::book::Stop;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::ActiveError;
-use crate::agv::errors::Life;
+use crate::{Output, Publication};
 use crate::agv::motion;
-use crate::agv::order_message::Blocking;
-use crate::agv::order_message::Node;
-use crate::agv::order_message::Order;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Adoption;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Lack;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use serde_json::json;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::order_message::{Blocking, Node};
+
+use super::prelude::*;
 
 records! {
     fault "crashes-on-malformed-order" ["ORD-REJ-02", "ORD-REJ-17"] "Ends its connection over an order that it cannot read, and comes back."

@@ -1,35 +1,6 @@
 //! Deviations of what holds the vehicle: pause, buttons and the protective field (section 6.8 and ACT-11 to ACT-18).
 
-use super::hooks::Object;
-use super::hooks::drives;
-use super::hooks::forbidding;
-use super::hooks::heedless;
-use super::hooks::holding;
-use super::hooks::instead;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::lifts_pause;
-use super::hooks::plain;
-use super::hooks::unbound;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::deeds::Problem;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use super::prelude::*;
 
 records! {
     fault "pause-stuck-after-cut" ["ACT-13"] "Reports stopPause FINISHED and stays paused when the link was lost in the pause."
@@ -130,7 +101,7 @@ records! {
                 let rolls = braking.is_some() && holds.pause && !stopped;
                 usual || rolls && matches!(what, Permission::DriveAgainst(Hindrance::Hold))
             })
-            .due(|braking| *braking);
+            .due(|braking, _| *braking);
     fault "paused-flag-late" ["ACT-13"] "The flag paused becomes true only one and a half seconds after startPause is FINISHED."
         => keep::<Option<Moment>>()
             .does(|hidden, agv, action| {
@@ -148,7 +119,7 @@ records! {
                 }
                 true
             })
-            .due(|hidden| *hidden);
+            .due(|hidden, _| *hidden);
     fault "pause-forgets-queue" ["ACT-14", "ACT-18"] "Actions that wait behind another one on their node are never begun when the vehicle was paused in the meantime."
         => instead(Deed::StopPause, |agv, _| {
             if lifts_pause(agv) && agv.holds.pause {
@@ -212,7 +183,7 @@ records! {
                 _ => {}
             })
             .allows(|(places, _), _, what, usual| usual && (places.is_empty() || !matches!(what, Permission::Drive)))
-            .due(|(_, due)| *due);
+            .due(|(_, due), _| *due);
     fault "paused-actions-stay-paused" ["ACT-18"] "It leaves actions PAUSED that were held by a pause after stopPause."
         => forbidding(|_, what| matches!(what, Permission::ResumeActions(before) if before.pause));
     fault "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated." because "It breaks a recommendation only."
@@ -233,7 +204,7 @@ records! {
                 _ => {}
             })
             .allows(|_, _, what, usual| usual && !matches!(what, Permission::ResumeActions(_)))
-            .due(|due| *due);
+            .due(|due, _| *due);
     liberty "brakes-long-on-pause" ["ACT-12", "ACT-13"] "It needs two seconds to come to a stop after startPause and reports it RUNNING meanwhile."
         => keep::<bool>()
             .allows(|_, agv, what, usual| usual || matches!(what, Permission::TakeTime(action) if is(action, Deed::StartPause) && agv.motion.is_moving()))
@@ -254,7 +225,7 @@ records! {
             .plans(|braking, _, leg| if *braking {
                 leg.own /= 20.0;
             })
-            .lasts(|_, what, usual| match what {
+            .lasts(|_, _, what, usual| match what {
                 Span::Action(action) if is(action, Deed::StartPause) => Duration::from_secs(2),
                 _ => usual,
             });

@@ -1,29 +1,9 @@
 //! Deviations of downloads and of finding its position (section 6.7 and ACT-23 to ACT-25).
 
-use super::hooks::after;
-use super::hooks::forbidding;
-use super::hooks::instead;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::succeeded;
-use super::hooks::when;
 use crate::Output;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::deeds::Problem;
 use crate::agv::motion::Pose;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "manual-enable-unreported" ["MAP-26", "STATE-10"] "Does not report a map enabled on the vehicle."
@@ -123,7 +103,7 @@ records! {
                 }
                 _ => {}
             })
-            .due(|waiting| waiting.iter().map(|(due, _)| *due).min());
+            .due(|waiting, _| waiting.iter().map(|(due, _)| *due).min());
     liberty "loads-identified" ["STATE-MSG-07"] "It reads the loadId of a picked load itself where the order does not name one."
         => keep::<String>()
             .does(|site, agv, action| {

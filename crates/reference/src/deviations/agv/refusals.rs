@@ -1,18 +1,10 @@
 //! Deviations of what is reported, and what is changed, when an order is refused or nothing is there to cancel
 //! (sections 6.6.4 and 6.6.3).
 
-use super::hooks::{MOMENT, keep, nothing_to_cancel, parked, refusal, refusing};
-use crate::agv::Agv;
 use crate::agv::action_kinds;
-use crate::agv::actions::{Action, Origin, Status};
-use crate::agv::errors::{ActiveError, Life};
-use crate::agv::order_message::Order;
-use crate::agv::rejection::{Rule, message_references};
-use crate::agv::seam::{Cause, Deviation, Event};
-use crate::deviations::record::Record;
-use serde_json::Value;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::rejection::message_references;
+
+use super::prelude::*;
 
 records! {
     fault "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order."
@@ -235,40 +227,30 @@ fn take_id(agv: &mut Agv, message: &Value) {
 /// How long a wrong report stands.
 const CORRECTION: Duration = Duration::from_millis(800);
 
-/// One that reports a refusal wrongly at first.
-struct Corrected {
-    change: fn(&mut ActiveError),
-    /// When it is put right, what was said, and what is said then.
-    later: Option<(Moment, ActiveError, ActiveError)>,
-}
+/// When a wrong report is put right, what was said, and what is said then.
+type Later = Option<(Moment, ActiveError, ActiveError)>;
 
+/// Reports a refusal wrongly at first.
 fn corrected(change: fn(&mut ActiveError)) -> Box<dyn Deviation> {
-    Box::new(Corrected { change, later: None })
-}
-
-impl Deviation for Corrected {
-    fn raises(&mut self, agv: &mut Agv, cause: Cause<'_>, error: &mut ActiveError) -> bool {
-        if !matches!(cause, Cause::Failure(_)) {
-            let right = error.clone();
-            (self.change)(error);
-            error.life = Life::UntilNewOrder;
-            self.later = Some((agv.moment() + CORRECTION, error.clone(), right));
-        }
-        true
-    }
-
-    fn happens(&mut self, agv: &mut Agv, event: Event) {
-        let now = agv.moment();
-        if event == Event::Woken
-            && let Some((_, wrong, right)) = self.later.take_if(|(due, ..)| *due <= now)
-            && let Some(at) = agv.errors.active.iter().position(|error| *error == wrong)
-        {
-            agv.errors.active.remove(at);
-            agv.errors.raise(right);
-        }
-    }
-
-    fn due(&self) -> Option<Moment> {
-        self.later.as_ref().map(|(due, ..)| *due)
-    }
+    holding((change, Later::None))
+        .raises(|(change, later), agv, cause, error| {
+            if !matches!(cause, Cause::Failure(_)) {
+                let right = error.clone();
+                change(error);
+                error.life = Life::UntilNewOrder;
+                *later = Some((agv.moment() + CORRECTION, error.clone(), right));
+            }
+            true
+        })
+        .happens(|(_, later), agv, event| {
+            let now = agv.moment();
+            if event == Event::Woken
+                && let Some((_, wrong, right)) = later.take_if(|(due, ..)| *due <= now)
+                && let Some(at) = agv.errors.active.iter().position(|error| *error == wrong)
+            {
+                agv.errors.active.remove(at);
+                agv.errors.raise(right);
+            }
+        })
+        .due(|(_, later), _| later.as_ref().map(|(due, ..)| *due))
 }

@@ -1,12 +1,6 @@
 //! Deviations of the way ahead, as a state lists it: nodeStates and edgeStates (section 6.10).
 
-use super::hooks::{Hooks, Object, edge, holding, is_done, node, route, state};
-use crate::agv::Agv;
-use crate::agv::seam::{Deviation, Event, Part};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
-use std::collections::BTreeSet;
+use super::prelude::*;
 
 records! {
     fault "route-omitted-when-idle" ["STATE-13", "STATE-MSG-01"] "It leaves nodeStates and edgeStates out when nothing is to be traversed."

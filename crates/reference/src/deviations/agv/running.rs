@@ -1,37 +1,9 @@
 //! Deviations of when actions begin and end, what may run beside what, and what an action does (section 6.10.2 and 6.12).
 
-use super::hooks::Hooks;
-use super::hooks::MOMENT;
-use super::hooks::brief;
-use super::hooks::failure;
-use super::hooks::forbidding;
-use super::hooks::goes_on;
-use super::hooks::holding;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::linger;
-use super::hooks::plain;
-use super::hooks::state;
-use super::hooks::when;
-use crate::agv::Agv;
 use crate::agv::Mode;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::Life;
 use crate::agv::order_message::Blocking;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::json;
-use std::time::Duration;
+
+use super::prelude::*;
 
 records! {
     fault "actions-held-offline" ["MQTT-04"] "As long as the link is broken it drives on but begins no action of its order."
@@ -278,7 +250,7 @@ records! {
                 true
             });
     liberty "actions-last" ["ACT-01"] "Takes a second for every action."
-        => plain().lasts(|_, what, usual| match what {
+        => plain().lasts(|_, _, what, usual| match what {
             Span::Action(action) if action.number("duration").is_none() => usual.max(Duration::from_secs(1)),
             _ => usual,
         });
@@ -404,7 +376,7 @@ fn trigger_next_edge(agv: &mut Agv) {
 }
 
 /// Actions of edges last longer than any edge.
-fn on_edges_for_ever(_: &Agv, what: Span<'_>, usual: Duration) -> Duration {
+fn on_edges_for_ever<M>(_: &M, _: &Agv, what: Span<'_>, usual: Duration) -> Duration {
     match what {
         Span::Action(action) if matches!(action.origin, Origin::Edge(_)) => usual.max(Duration::from_secs(60)),
         _ => usual,
@@ -413,16 +385,10 @@ fn on_edges_for_ever(_: &Agv, what: Span<'_>, usual: Duration) -> Duration {
 
 /// Ends waitForTrigger by itself after a time.
 fn triggered(after: fn() -> Duration) -> Box<dyn Deviation> {
-    struct Triggered(fn() -> Duration);
-    impl Deviation for Triggered {
-        fn lasts(&self, _: &Agv, what: Span<'_>, usual: Duration) -> Duration {
-            match what {
-                Span::Action(action) if is(action, Deed::WaitForTrigger) => (self.0)(),
-                _ => usual,
-            }
-        }
-    }
-    Box::new(Triggered(after))
+    holding(after).lasts(|after, _, what, usual| match what {
+        Span::Action(action) if is(action, Deed::WaitForTrigger) => after(),
+        _ => usual,
+    })
 }
 
 type Queueing = fn(&Agv, &mut Vec<String>) -> Vec<Vec<String>>;

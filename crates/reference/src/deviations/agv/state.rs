@@ -1,12 +1,8 @@
 //! Deviations of what a state says about the order, the vehicle and its load (section 6.10).
 
-use super::hooks::{is_done, keep, state, text};
 use crate::agv::Mode;
-use crate::agv::actions::Origin;
-use crate::agv::seam::{Deviation, Event, Part};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
+
+use super::prelude::*;
 
 records! {
     fault "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore."

@@ -1,18 +1,10 @@
 //! Deviations of what is done at a station: picking, dropping, detecting, aligning, charging (section 6.8).
 
-use super::hooks::{after, brief, failed, fails_unseen, failure, holding, instead, is, keep, succeeded};
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
+use crate::agv::Load;
 use crate::agv::config::LOAD_POSITIONS;
-use crate::agv::deeds::{Area, Outcome, Problem};
-use crate::agv::rejection::{Refusal, Rule};
-use crate::agv::seam::{Cause, Deviation, Event, Part, Relation};
-use crate::agv::{Agv, Load};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::json;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::deeds::Area;
+
+use super::prelude::*;
 
 records! {
     fault "pick-without-load" ["ACT-28"] "Reports pick FINISHED and no load."
@@ -40,7 +32,7 @@ records! {
                 }
                 true
             })
-            .due(|hidden| *hidden);
+            .due(|hidden, _| *hidden);
     fault "drop-failure-finished" ["ACT-29"] "Reports drop FINISHED although the place was taken."
         => after(Deed::Drop, |_, _, outcome| match outcome {
             Outcome::Failed(problem) if problem.reason == "the place is taken" => Outcome::Done(None),
@@ -188,7 +180,7 @@ records! {
             .happens(|due, agv, event| if event == Event::Woken && due.take_if(|due| *due <= agv.moment()).is_some() {
                 agv.charging = false;
             })
-            .due(|due| *due);
+            .due(|due, _| *due);
 }
 
 /// Says nothing about the result.
@@ -207,6 +199,7 @@ type Lasting = fn(&Agv) -> Duration;
 
 /// Shows a load for a while that was put down.
 fn dropping_late(lasts: Lasting) -> Box<dyn Deviation> {
+    #[derive(Clone)]
     struct Late {
         lasts: Lasting,
         before: Option<Load>,
@@ -239,7 +232,7 @@ fn dropping_late(lasts: Lasting) -> Box<dyn Deviation> {
         }
         true
     })
-    .due(|late| late.shadow.as_ref().map(|(until, _)| *until))
+    .due(|late, _| late.shadow.as_ref().map(|(until, _)| *until))
 }
 
 /// Shows after a while that it charges.
@@ -263,24 +256,20 @@ fn charging_late(lasts: Lasting) -> Box<dyn Deviation> {
                 agv.charging = true;
             }
         })
-        .due(|(_, due)| *due)
+        .due(|(_, due), _| *due)
 }
 
 /// Shows what it makes of whether it charged before.
 fn succeeded_again(deed: Deed, shown: fn(bool) -> bool) -> Box<dyn Deviation> {
-    struct Again(Deed, fn(bool) -> bool, bool);
-    impl Deviation for Again {
-        fn does(&mut self, agv: &mut Agv, _: &Action) -> Option<Outcome> {
-            self.2 = agv.charging;
+    holding((deed, shown, false))
+        .does(|(.., charged), agv, _| {
+            *charged = agv.charging;
             None
-        }
-
-        fn ends(&mut self, agv: &mut Agv, action: &Action, outcome: Outcome) -> Outcome {
-            if is(action, self.0) && matches!(outcome, Outcome::Done(_)) {
-                agv.charging = (self.1)(self.2);
+        })
+        .ends(|(deed, shown, charged), agv, action, outcome| {
+            if is(action, *deed) && matches!(outcome, Outcome::Done(_)) {
+                agv.charging = shown(*charged);
             }
             outcome
-        }
-    }
-    Box::new(Again(deed, shown, false))
+        })
 }

@@ -1,28 +1,8 @@
 //! Deviations of when a state is sent: events that are not told, states that come again (section 6.10, STATE-02 to STATE-11).
 
-use super::hooks::Hooks;
-use super::hooks::Object;
-use super::hooks::holding;
-use super::hooks::keep;
-use super::hooks::number;
-use super::hooks::plain;
-use super::hooks::state;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::book::Stop;
-use crate::agv::report::Changes;
-use crate::agv::report::Telling;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use std::collections::VecDeque;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::report::{Changes, Telling};
+
+use super::prelude::*;
 
 records! {
     fault "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens."
@@ -116,7 +96,7 @@ records! {
                 Event::Woken if due.take_if(|due| *due <= agv.moment()).is_some() => agv.publish_connection("ONLINE"),
                 _ => {}
             })
-            .due(|due| *due);
+            .due(|due, _| *due);
     liberty "every-state-twice" ["STATE-02"] "Sends every state a second time."
         => again(1);
     liberty "online-again" ["CONN-05", "CONN-10"] "The vehicle publishes ONLINE again with every tenth state."
@@ -150,7 +130,7 @@ fn untold(which: Untold, telling: Telling) -> Box<Hooks<(Untold, Telling)>> {
 
 /// The longest interval the standard allows, with some room.
 fn seldom<M>(hooks: Box<Hooks<M>>) -> Box<Hooks<M>> {
-    hooks.lasts(|_, what, usual| match what {
+    hooks.lasts(|_, _, what, usual| match what {
         Span::StatedBetweenStates => Duration::from_secs(28),
         _ => usual,
     })

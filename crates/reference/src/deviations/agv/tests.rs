@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 
 use super::{FAULTS, TOLERANCES, UnknownTolerance, built, lapse};
+use tck_base::clock::{Moment, Stamp};
 use crate::Device;
 use crate::agv::AgvConfig;
-use crate::agv::seam::Outgoing;
+use crate::agv::hooks::Outgoing;
 use serde_json::{Value, json};
-use tck_base::clock::{Moment, Stamp};
 
 fn config() -> AgvConfig {
     AgvConfig {

@@ -1,36 +1,8 @@
 //! Deviations of order updates: which are refused, how they are joined, and what becomes of the horizon (section 6.6.2).
 
-use super::hooks::Hooks;
-use super::hooks::forbidding;
-use super::hooks::heedless;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::overlooking;
-use super::hooks::parked;
-use super::hooks::plain;
-use super::hooks::since_update;
-use super::hooks::unbound;
-use super::hooks::updating;
-use super::hooks::when;
 use super::orders::has_failed;
-use crate::agv::Agv;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::order_message::Edge;
-use crate::agv::order_message::Order;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
+
+use super::prelude::*;
 
 records! {
     fault "stitching-node-overwritten" ["ORD-UPD-07"] "Takes over the actions an update brings for the stitching node."
@@ -309,14 +281,10 @@ type Refused = fn(&Agv, &Order) -> bool;
 
 /// Refuses updates that should be taken over.
 fn refused(which: Refused) -> Box<dyn Deviation> {
-    struct Refusing(Refused);
-    impl Deviation for Refusing {
-        fn objects(&self, agv: &Agv, order: &Order, relation: Relation) -> Option<Refusal> {
-            let refused = relation == Relation::Update && (self.0)(agv, order);
-            refused.then(|| broken("no update is taken now"))
-        }
-    }
-    Box::new(Refusing(which))
+    holding(which).objects(|which, agv, order, relation| {
+        let refused = relation == Relation::Update && which(agv, order);
+        refused.then(|| broken("no update is taken now"))
+    })
 }
 
 /// Knows whether the order was complete before and is continued.

@@ -24,12 +24,12 @@ mod curves;
 mod dispatch;
 mod form;
 mod header;
-mod hooks;
 mod instants;
 mod limits;
 mod maps;
 mod options;
 mod orders;
+mod prelude;
 mod presence;
 mod reading;
 mod sending;
@@ -46,9 +46,8 @@ use serde_json::Value;
 use super::record::{Kind, Record};
 use crate::Fault;
 use crate::deviations::agv::Tolerance;
-use crate::master_control::seam::Deviation;
-use crate::master_control::vehicle::Vehicle;
-use crate::master_control::{MasterControl, MasterControlConfig, Site};
+use crate::master_control::hooks::Deviation;
+use crate::master_control::{MasterControl, MasterControlConfig};
 
 /// A name that is not that of a deviation.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -150,7 +149,7 @@ fn unknown(kind: &'static str, name: &str) -> Unknown {
 /// # Errors
 /// When there is none of a name.
 pub fn built(config: MasterControlConfig, liberties: &[&str], faults: &[&str]) -> Result<MasterControl, Unknown> {
-    let mut deviations: Vec<Box<dyn Deviation>> = vec![Box::new(Configurable)];
+    let mut deviations: Vec<Box<dyn Deviation>> = vec![configurable()];
     for name in faults {
         let record = find(name).filter(|record| record.is_fault());
         deviations.push((record.ok_or_else(|| unknown("fault", name))?.make)());
@@ -162,18 +161,9 @@ pub fn built(config: MasterControlConfig, liberties: &[&str], faults: &[&str]) -
     Ok(MasterControl::with(config, deviations))
 }
 
-/// Takes liberties while it runs, when somebody asks for that: `configure` with the name of one as `what`.
-struct Configurable;
-
-impl Deviation for Configurable {
-    fn asked(
-        &mut self,
-        site: &mut Site,
-        _: &mut [Vehicle],
-        _: Option<usize>,
-        command: &str,
-        arguments: &Value,
-    ) -> bool {
+/// Takes tolerances while it runs, when somebody asks for that: `configure` with the name of one as `what`.
+fn configurable() -> Box<dyn Deviation> {
+    prelude::plain().commanded(|(), site, _, command, arguments| {
         if command != "configure" {
             return true;
         }
@@ -183,5 +173,5 @@ impl Deviation for Configurable {
             site.switch_on((record.make)());
         }
         false
-    }
+    })
 }

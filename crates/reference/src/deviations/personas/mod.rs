@@ -14,13 +14,13 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
+use tck_base::clock::Moment;
 use crate::agv::action_kinds::Deed;
 use crate::agv::actions::{Action, Status};
 use crate::agv::deeds::{Outcome, Problem};
 use crate::agv::errors::{ActiveError, Life};
-use crate::agv::seam::{Deviation, Event, Head, Leg, Outgoing, Part, Permission, Span};
+use crate::agv::hooks::{Deviation, Event, Head, Leg, Outgoing, Part, Permission, Span};
 use crate::agv::{Agv, AgvConfig};
-use tck_base::clock::Moment;
 
 use orders::Rejection;
 pub use words::WORDS;
@@ -140,7 +140,7 @@ impl Deviation for Persona {
         true
     }
 
-    fn publishes(&mut self, _: &mut Agv, outgoing: &mut Outgoing) -> bool {
+    fn sends(&mut self, _: &mut Agv, outgoing: &mut Outgoing) -> bool {
         if outgoing.name == "state" && self.lost_states > 0 {
             self.lost_states -= 1;
             return false;
@@ -197,7 +197,7 @@ impl Deviation for Persona {
         Some(Outcome::Open)
     }
 
-    fn due(&self) -> Option<Moment> {
+    fn due(&self, _: &Agv) -> Option<Moment> {
         self.cancel_held_until
     }
 
