@@ -49,7 +49,7 @@ impl<D: ?Sized> SwitchedOn<D> {
     }
 }
 
-/// What a deviation remembers: one thing, or one for each vehicle of a fleet.
+/// Memory of a deviation: one, or one for each vehicle of a fleet.
 pub(crate) enum Memory<M> {
     /// One memory.
     One(M),
@@ -91,6 +91,9 @@ macro_rules! hooks {
     ) => {
         /// A deviation that can be switched on.
         pub(crate) type Hook = Box<dyn Deviation>;
+
+        /// The deviations that are switched on.
+        pub(crate) type SwitchedOn = crate::hooks::SwitchedOn<dyn Deviation>;
 
         /// A way to behave otherwise. Every default is the conformant behaviour.
         #[expect(unused_variables, reason = "the defaults leave everything as it is")]

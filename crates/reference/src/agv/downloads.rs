@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use crate::{Download, Output};
 
 use super::Agv;
+use super::action_effect::{Outcome, Problem};
 use super::actions::Status;
-use super::deeds::{Outcome, Problem};
+use super::hook_points::{Event, Permission};
 use super::maps;
-use super::points::{Event, Permission};
 
 /// Downloads under way: actionId by token.
 #[derive(Clone, Debug, Default)]

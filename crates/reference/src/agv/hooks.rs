@@ -1,6 +1,6 @@
 //! The hook points of a vehicle: what a deviation can do otherwise, and who asks it.
 //!
-//! The vehicle asks here at its points of decision and says here what happens (`points` has the words for both). With
+//! The vehicle asks here at its points of decision and says here what happens (`hook_points` has the words for both). With
 //! nothing switched on there is nobody to be asked.
 
 use std::borrow::Cow;
@@ -9,21 +9,21 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use super::action_effect::Outcome;
 use super::actions::{Action, Origin, Status};
-use super::book::Stop;
-use super::deeds::Outcome;
 use super::errors::ActiveError;
 use super::order_message::{Corridor, Edge, Order};
+use super::order_state::Stop;
 use super::rejection::{Refusal, Rule};
 use super::report::{Changes, Telling};
 use super::{Agv, AgvConfig};
-use tck_base::clock::Moment;
-use tck_base::nurbs::Path;
 use crate::ConnectOptions;
 use crate::hooks::Memory;
+use tck_base::clock::Moment;
+use tck_base::nurbs::Path;
 
+pub(crate) use super::hook_points::{Cause, Event, Head, Hindrance, Outgoing, Part, Permission, Span};
 pub(crate) use super::objections::{Adoption, Lack, Objection, Relation};
-pub(crate) use super::points::{Cause, Event, Head, Hindrance, Outgoing, Part, Permission, Span};
 pub(crate) use super::way::{Course, Leg};
 
 /// A JSON object of a message.

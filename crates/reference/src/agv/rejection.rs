@@ -9,7 +9,7 @@ use super::Agv;
 use super::errors::{ActiveError, Life};
 use super::read::Defect;
 
-/// Which rule refused an order.
+/// Rule by which an order is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rule {
     Malformed,

@@ -19,9 +19,9 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use tck_base::clock::{Moment, Stamp};
 use crate::deviations::agv as deviations;
 use crate::{ConnectOptions, Device, Download, Input, Output, Publication};
+use tck_base::clock::{Moment, Stamp};
 
 use super::{Agv, AgvConfig, ErrorNames, OnboardMap};
 

@@ -2,8 +2,8 @@
 //!
 //! The QoS of subscriptions follows the ruling of TOPIC-14. Everything is kept over a lost link (MQTT-10).
 
-use tck_base::clock::Moment;
 use crate::{ConnectOptions, Output};
+use tck_base::clock::Moment;
 
 use super::hooks::Event;
 use super::vehicle::Vehicle;
@@ -19,7 +19,7 @@ pub(crate) struct Connection {
     shut_down: bool,
     /// It has stood before.
     pub(crate) returning: bool,
-    /// How often it was lost.
+    /// Number of times it was lost.
     pub(crate) losses: u32,
 }
 

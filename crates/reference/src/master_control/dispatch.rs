@@ -5,8 +5,8 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::Site;
-use super::order::Window;
 use super::hooks::{Event, Measure, Occasion, Permission, Span};
+use super::order::Window;
 use super::vehicle::{Leg, Running, Stop, Transport, Vehicle};
 use tck_base::clock::Moment;
 

@@ -4,8 +4,8 @@
 //! takes too long is called off (ACT-39).
 
 use super::Site;
-use super::order::Window;
 use super::hooks::{Event, Fate, Measure, Occasion, Permission};
+use super::order::Window;
 use super::seen::State;
 use super::vehicle::{Running, Transport, Vehicle};
 
@@ -215,7 +215,7 @@ pub(crate) fn refusal<'a>(running: &Running, state: &'a State) -> Option<&'a str
     found.map(|error| error.error_type.as_str())
 }
 
-/// How far an accepted order is.
+/// Progress of an accepted order.
 pub(crate) fn progress(running: &Running, state: &State) -> Fate {
     let failed = has_failed(running, state);
     let reached = running.reached(Some(state)) + 1;

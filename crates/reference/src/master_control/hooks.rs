@@ -1,6 +1,6 @@
 //! The hook points of a master control: what a deviation can do otherwise, and who asks it.
 //!
-//! The master control asks here at its points of decision and says here what happens (`points` has the words for both).
+//! The master control asks here at its points of decision and says here what happens (`hook_points` has the words for both).
 //! With nothing switched on there is nobody to be asked.
 
 use std::collections::BTreeSet;
@@ -18,9 +18,7 @@ use super::ways::Pose;
 use crate::ConnectOptions;
 use crate::hooks::Memory;
 
-pub(crate) use super::points::{
-    Event, Fate, Field, Heard, Measure, Occasion, Outgoing, Permission, Span, Worded,
-};
+pub(crate) use super::hook_points::{Event, Fate, Field, Heard, Measure, Occasion, Outgoing, Permission, Span, Worded};
 
 /// A JSON object of a message.
 pub(crate) type Object = Map<String, Value>;

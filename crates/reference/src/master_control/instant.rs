@@ -22,7 +22,7 @@ impl Site {
         self.instant_all_the_same(vehicle, kind, given)
     }
 
-    /// The same without regard to the order that is driven.
+    /// Queues an instant action without regard to the order that is driven.
     pub(crate) fn instant_all_the_same(&mut self, vehicle: &mut Vehicle, kind: &str, given: &Value) -> Option<String> {
         if !self.offers(vehicle, kind, "INSTANT") {
             return None;

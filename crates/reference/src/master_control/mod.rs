@@ -18,12 +18,12 @@ mod connecting;
 pub(crate) mod dispatch;
 pub(crate) mod driving;
 mod hearing;
+mod hook_points;
 pub(crate) mod hooks;
 pub(crate) mod instant;
 pub(crate) mod layout;
 pub(crate) mod maps;
 pub(crate) mod order;
-mod points;
 mod publish;
 pub(crate) mod rerouting;
 pub(crate) mod seen;
@@ -35,25 +35,24 @@ pub(crate) mod ways;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use tck_base::clock::{Moment, Stamp};
-use crate::hooks::SwitchedOn;
 use crate::{ConnectOptions, Device, Input, Output};
+use tck_base::clock::{Moment, Stamp};
 
 pub use commands::COMMANDS;
 pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig};
 
 use connecting::Connection;
-use hooks::{Deviation, Event, Hook, Measure, Permission};
+use hooks::{Event, Hook, Measure, Permission, SwitchedOn};
 use vehicle::Vehicle;
 
 /// More messages than this do not lie about unread.
 const MAX_INBOX: usize = 10_000;
 
-/// What all vehicles share.
+/// Everything that all vehicles share.
 #[derive(Debug)]
 pub(crate) struct Site {
     pub(crate) config: MasterControlConfig,
-    hooks: SwitchedOn<dyn Deviation>,
+    hooks: SwitchedOn,
     /// The time of what is happening.
     pub(crate) now: Stamp,
     pub(crate) connection: Connection,
@@ -61,7 +60,7 @@ pub(crate) struct Site {
     pub(crate) session: u64,
     /// Counts ids.
     pub(crate) ids: u64,
-    /// What was decided and is still to be handed to the driver.
+    /// Outputs that are still to be handed to the driver.
     pub(crate) pending: Vec<Output>,
 }
 
@@ -91,7 +90,7 @@ impl Site {
         }
     }
 
-    /// How long an id may be.
+    /// Largest number of characters of an id.
     pub(crate) fn longest_id(&self, vehicle: &Vehicle) -> usize {
         let limit = vehicle.factsheet.as_ref().and_then(|sheet| sheet.id_length);
         self.measures(vehicle, Measure::IdLength, limit.unwrap_or(usize::MAX))
@@ -181,7 +180,7 @@ impl MasterControl {
         }
     }
 
-    /// What it was told.
+    /// Its configuration.
     #[cfg(test)]
     pub(crate) fn config(&self) -> &MasterControlConfig {
         &self.site.config

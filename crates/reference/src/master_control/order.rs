@@ -6,11 +6,11 @@
 use serde_json::{Value, json};
 
 use super::Site;
-use super::layout::distance;
 use super::hooks::{Field, Measure, Worded};
+use super::layout::distance;
 use super::vehicle::{Leg, Running, Stop, Vehicle};
 
-/// Which part of a way a message holds.
+/// Part of a way that a message holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
     /// Index of the first node.

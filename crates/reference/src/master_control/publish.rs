@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use tck_base::clock::Moment;
 use crate::{Output, Publication};
+use tck_base::clock::Moment;
 
 use super::Site;
 use super::hooks::{Outgoing, Span};
@@ -19,7 +19,7 @@ impl Site {
         self.send(vehicle, name, body, false);
     }
 
-    /// The same; `again` if it is an order that was lost.
+    /// Publishes a message with its header; `again` if it is an order that was lost.
     pub(crate) fn send(&mut self, vehicle: &mut Vehicle, name: &'static str, body: &Value, again: bool) {
         let Some(topic) = vehicle
             .topic(name)

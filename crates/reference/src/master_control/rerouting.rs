@@ -9,7 +9,7 @@ use super::driving::again;
 use super::hooks::Event;
 use super::vehicle::{MAX_QUEUE, Running, Stop, Transport, Vehicle};
 
-/// How a transport gets another destination.
+/// Means by which a transport gets another destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reroute {
     /// By another way behind the base.

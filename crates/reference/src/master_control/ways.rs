@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 use super::Site;
 use super::config::SiteNode;
 use super::dispatch::Way;
-use super::layout::distance;
 use super::hooks::{Measure, Permission};
+use super::layout::distance;
 use super::seen::Position;
 use super::vehicle::{Leg, Stop, Transport, Vehicle};
 
@@ -21,18 +21,18 @@ const EXACT: f64 = 0.05;
 /// A vehicle this near to an edge is on it.
 const BESIDE: f64 = 0.5;
 
-/// Where a vehicle is, as a new order sees it.
+/// Pose of a vehicle, as a new order sees it.
 #[derive(Clone, Debug)]
 pub(crate) struct Pose {
     /// The last node.
     pub(crate) node: String,
     /// The reported position, if there is one.
     pub(crate) position: Option<Position>,
-    /// How it stands there.
+    /// How the vehicle is taken to stand there.
     pub(crate) standing: Standing,
 }
 
-/// How a vehicle is taken to stand.
+/// Relation of a vehicle to the node it stands at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Standing {
     /// On the node it is near, or else between nodes.

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use tck_profile::VEHICLE_WORDS;
 use crate::agv::COMMANDS;
 use crate::deviations::personas::WORDS;
+use tck_profile::VEHICLE_WORDS;
 
 /// A version the vehicle was not made for.
 const OTHER_VERSION: &str = "7.7.7";

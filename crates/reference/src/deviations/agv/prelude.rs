@@ -5,21 +5,21 @@ pub(super) use std::time::Duration;
 
 pub(super) use serde_json::{Value, json};
 
-pub(super) use tck_base::clock::Moment;
-pub(super) use crate::agv::action_kinds::Deed;
+pub(super) use crate::agv::action_effect::{Outcome, Problem};
+pub(super) use crate::agv::action_kinds::Effect;
 pub(super) use crate::agv::actions::{Action, Origin, Status};
-pub(super) use crate::agv::book::Stop;
-pub(super) use crate::agv::deeds::{Outcome, Problem};
 pub(super) use crate::agv::errors::{ActiveError, Life};
 pub(super) use crate::agv::hooks::{
     Adoption, Cause, Course, Deviation, Event, Head, Hindrance, Hooks, Lack, Leg, Object, Objection, Outgoing, Part,
     Permission, Relation, Span,
 };
 pub(super) use crate::agv::order_message::{Edge, Order};
+pub(super) use crate::agv::order_state::Stop;
 pub(super) use crate::agv::rejection::{Refusal, Rule};
 pub(super) use crate::agv::{Agv, AgvConfig};
+pub(super) use crate::deviations::json_edit::JsonEdit;
 pub(super) use crate::deviations::record::Record;
-pub(super) use crate::deviations::words::Words;
+pub(super) use tck_base::clock::Moment;
 
 use crate::ConnectOptions;
 use crate::hooks::Memory;
@@ -198,32 +198,32 @@ pub(super) fn failure(change: Failure) -> Box<Hooks<Failure>> {
     })
 }
 
-type Instead = (Deed, fn(&mut Agv, &Action) -> Option<Outcome>);
+type Instead = (Effect, fn(&mut Agv, &Action) -> Option<Outcome>);
 
 /// Does something else than an action asks for.
-pub(super) fn instead(deed: Deed, then: fn(&mut Agv, &Action) -> Option<Outcome>) -> Box<Hooks<Instead>> {
-    holding((deed, then)).does(|(deed, then), agv, action| match is(action, *deed) {
+pub(super) fn instead(effect: Effect, then: fn(&mut Agv, &Action) -> Option<Outcome>) -> Box<Hooks<Instead>> {
+    holding((effect, then)).does(|(effect, then), agv, action| match is(action, *effect) {
         true => then(agv, action),
         false => None,
     })
 }
 
-type After = (Deed, fn(&mut Agv, &Action, Outcome) -> Outcome);
+type After = (Effect, fn(&mut Agv, &Action, Outcome) -> Outcome);
 
 /// Makes something else of what came of an action.
-pub(super) fn after(deed: Deed, then: fn(&mut Agv, &Action, Outcome) -> Outcome) -> Box<Hooks<After>> {
-    holding((deed, then)).ends(|(deed, then), agv, action, outcome| match is(action, *deed) {
+pub(super) fn after(effect: Effect, then: fn(&mut Agv, &Action, Outcome) -> Outcome) -> Box<Hooks<After>> {
+    holding((effect, then)).ends(|(effect, then), agv, action, outcome| match is(action, *effect) {
         true => then(agv, action, outcome),
         false => outcome,
     })
 }
 
-type Changing = (Deed, fn(&mut Agv, &Action));
+type Changing = (Effect, fn(&mut Agv, &Action));
 
 /// Changes something when an action has succeeded.
-pub(super) fn succeeded(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
-    holding((deed, then)).ends(|(deed, then), agv, action, outcome| {
-        if is(action, *deed) && matches!(outcome, Outcome::Done(_)) {
+pub(super) fn succeeded(effect: Effect, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
+    holding((effect, then)).ends(|(effect, then), agv, action, outcome| {
+        if is(action, *effect) && matches!(outcome, Outcome::Done(_)) {
             then(agv, action);
         }
         outcome
@@ -231,9 +231,9 @@ pub(super) fn succeeded(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Ch
 }
 
 /// Changes something when an action has failed.
-pub(super) fn failed(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
-    holding((deed, then)).ends(|(deed, then), agv, action, outcome| {
-        if is(action, *deed) && matches!(outcome, Outcome::Failed(_)) {
+pub(super) fn failed(effect: Effect, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
+    holding((effect, then)).ends(|(effect, then), agv, action, outcome| {
+        if is(action, *effect) && matches!(outcome, Outcome::Failed(_)) {
             then(agv, action);
         }
         outcome
@@ -241,16 +241,16 @@ pub(super) fn failed(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Chang
 }
 
 /// Says FINISHED of an action that has failed.
-pub(super) fn fails_unseen(deed: Deed) -> Box<Hooks<After>> {
-    after(deed, |_, _, outcome| match outcome {
+pub(super) fn fails_unseen(effect: Effect) -> Box<Hooks<After>> {
+    after(effect, |_, _, outcome| match outcome {
         Outcome::Failed(_) => Outcome::Done(None),
         other => other,
     })
 }
 
 /// Whether the action is of that kind.
-pub(super) fn is(action: &Action, deed: Deed) -> bool {
-    action.kind.is_some_and(|kind| kind.deed == deed)
+pub(super) fn is(action: &Action, effect: Effect) -> bool {
+    action.kind.is_some_and(|kind| kind.effect == effect)
 }
 
 /// Does something when something happens.
@@ -405,7 +405,7 @@ pub(super) fn linger(agv: &mut Agv, millis: u64) {
 
 /// Whether its base leads on to another node.
 pub(super) fn goes_on(agv: &Agv) -> bool {
-    agv.book.nodes.front().is_some_and(|next| next.node.released)
+    agv.order.nodes.front().is_some_and(|next| next.node.released)
 }
 
 /// Whether an action of the order is under way.
@@ -420,10 +420,12 @@ pub(super) fn lifts_pause(agv: &Agv) -> bool {
 
 /// Takes as long as no good vehicle does from one state to the next, while something is so.
 pub(super) fn silent(while_so: fn(&Agv) -> bool) -> Box<Hooks<fn(&Agv) -> bool>> {
-    holding(while_so).lasts(|while_so, agv, what, usual| match matches!(what, Span::BetweenStates) && while_so(agv) {
-        true => Duration::from_secs(45),
-        false => usual,
-    })
+    holding(while_so).lasts(
+        |while_so, agv, what, usual| match matches!(what, Span::BetweenStates) && while_so(agv) {
+            true => Duration::from_secs(45),
+            false => usual,
+        },
+    )
 }
 
 /// Changes a number that is there.
@@ -451,5 +453,5 @@ pub(super) fn replace(text: &mut Vec<u8>, from: &[u8], to: &[u8]) {
 
 /// Whether nothing of the order is left to be driven or done.
 pub(super) fn is_done(agv: &Agv) -> bool {
-    agv.book.nodes.is_empty() && !agv.actions.order_unfinished()
+    agv.order.nodes.is_empty() && !agv.actions.order_unfinished()
 }

@@ -15,12 +15,12 @@ records! {
         => action(|a| a.change("blockingType", |blocking| *blocking = json!("EXCLUSIVE")));
     fault "blocking-type-unlisted" ["FACT-15"] "Does not look for blocking types in the factsheet."
         => making(|_, _, a, _, _| a.set("blockingType", "HARD"));
-    liberty "soft-actions" ["FACT-15"] "Uses the blocking type SOFT where the vehicle allows it."
+    tolerance "soft-actions" ["FACT-15"] "Uses the blocking type SOFT where the vehicle allows it."
         => making(|_, vehicle, a, _, _| {
             let listed = vehicle.offer(a.text("actionType")).and_then(|offer| offer.blocking_types.as_deref()).unwrap_or_default();
             if listed.is_empty() || listed.iter().any(|kind| kind == "SOFT") { a.set("blockingType", "SOFT"); }
         });
-    liberty "instants-block-nothing" ["ORD-MSG-16", "FACT-15"] "Instant actions have blockingType NONE where the vehicle allows it."
+    tolerance "instants-block-nothing" ["ORD-MSG-16", "FACT-15"] "Instant actions have blockingType NONE where the vehicle allows it."
         => making(|_, vehicle, a, _, instant| {
             let listed = vehicle.offer(a.text("actionType")).and_then(|offer| offer.blocking_types.as_ref());
             if instant && listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE")) { a.set("blockingType", "NONE"); }
@@ -93,7 +93,7 @@ records! {
                 if !a.list("actionParameters").iter().any(|parameter| parameter["key"] == *key) { a.add("actionParameters", json!({ "key": key, "value": value })); }
             }
         });
-    liberty "optional-parameters-filled" ["FACT-15"] "It sends optional parameters of vendor actions too, with values of the listed types."
+    tolerance "optional-parameters-filled" ["FACT-15"] "It sends optional parameters of vendor actions too, with values of the listed types."
         => made(|site, vehicle, kind, a| {
             let listed = vehicle.offer(kind).and_then(|offer| offer.action_parameters.as_deref()).unwrap_or_default();
             for offered in listed.iter().filter(|_| !is_predefined(kind)) {
@@ -219,11 +219,11 @@ records! {
         => parameter(|_, p| p.set("value", Value::Null));
     fault "parameter-without-key" ["BP-05", "BP-04"] "Calls the key of a parameter its name."
         => parameter(|_, p| p.rename("key", "name"));
-    liberty "empty-parameter-lists" ["BP-04", "ORD-MSG-15"] "Actions without parameters carry an empty list of them."
+    tolerance "empty-parameter-lists" ["BP-04", "ORD-MSG-15"] "Actions without parameters carry an empty list of them."
         => making(|_, _, a, _, _| a.supply("actionParameters", json!([])));
-    liberty "parameters-reversed" ["BP-04"] "It lists the parameters of an action in the opposite order."
+    tolerance "parameters-reversed" ["BP-04"] "It lists the parameters of an action in the opposite order."
         => making(|_, _, a, _, _| a.list("actionParameters").reverse());
-    liberty "several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message."
+    tolerance "several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message."
         => sending(|site, vehicle, out| {
             let asks = out.name == "instantActions" && !out.tells(&["stateRequest"]) && site.offers(vehicle, "stateRequest", "INSTANT");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["instantActions", "instantActions.actions", "actions"]));
@@ -277,7 +277,10 @@ fn parameterless(kind: &'static str, key: &'static str) -> Box<dyn Deviation> {
 fn null_parameter(kind: &'static str, key: &'static str) -> Box<dyn Deviation> {
     holding((kind, key)).sends(|(kind, key), _, _, out| {
         each_action(&mut out.message, |action| {
-            let known = action.list("actionParameters").iter().any(|parameter| parameter["key"] == *key);
+            let known = action
+                .list("actionParameters")
+                .iter()
+                .any(|parameter| parameter["key"] == *key);
             if action.says("actionType", *kind) && !known {
                 action.add("actionParameters", json!({ "key": *key, "value": null }));
             }

@@ -1,6 +1,5 @@
 //! Deviations of how the base of a running order is extended, and what updates hold (section 6.6.2).
 
-
 use super::prelude::*;
 
 records! {
@@ -120,7 +119,7 @@ records! {
             let mut errors = vehicle.state.iter().flat_map(|state| &state.errors);
             !errors.any(|error| error.error_level == "WARNING")
         });
-    liberty "no-update-while-paused" ["STATE-17", "ORD-UPD-02"] "It sends no further base as long as the vehicle is paused."
+    tolerance "no-update-while-paused" ["STATE-17", "ORD-UPD-02"] "It sends no further base as long as the vehicle is paused."
         => extends(|_, vehicle, _| !vehicle.is_paused());
     fault "base-planned-every-half-minute" ["ORD-UPD-02", "STATE-17"] "It extends the base no sooner than half a minute after its last order message."
         because "ORD-UPD-02 recommends a base early enough; a planner that is slow makes the vehicle halt, and breaks nothing."
@@ -174,14 +173,14 @@ records! {
             }
             _ => {}
         });
-    liberty "base-grows-eagerly" ["ORD-UPD-02"] "It extends the base by a node as soon as the message before was accepted, long before the vehicle needs it."
+    tolerance "base-grows-eagerly" ["ORD-UPD-02"] "It extends the base by a node as soon as the message before was accepted, long before the vehicle needs it."
         => letting(|_, _, what| matches!(what, Permission::Grow(running, ..) if !running.is_whole())).measures(|_, _, _, what, usual| match what {
             Measure::Base(running, free, _) => usual.max(running.released + 1).min(free),
             _ => usual,
         });
-    liberty "updates-without-horizon" ["ORD-UPD-03", "ORD-09"] "Order updates hold the new base only and delete the horizon."
+    tolerance "updates-without-horizon" ["ORD-UPD-03", "ORD-09"] "Order updates hold the new base only and delete the horizon."
         => showing(|_, running, window, _| if running.released > 0 && window.released > running.released { window.end = window.released; });
-    liberty "horizon-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Once in an order it sends an order update that extends nothing and gives the same horizon again."
+    tolerance "horizon-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Once in an order it sends an order update that extends nothing and gives the same horizon again."
         => keep::<bool>().happens(|sent, _, _, event| match event {
             Event::Extending(running) if !*sent && !running.is_whole() => {
                 *sent = true;
@@ -190,7 +189,7 @@ records! {
             Event::Begun => *sent = false,
             _ => {}
         });
-    liberty "horizon-deleted-first" ["ORD-UPD-03", "ORD-UPD-04"]
+    tolerance "horizon-deleted-first" ["ORD-UPD-03", "ORD-UPD-04"]
         "It deletes the horizon by one update and sends the new one by a second, when the destination is changed."
         => keep::<bool>().happens(|due, _, _, event| match event {
             Event::Led(_) => *due = true,
@@ -198,7 +197,7 @@ records! {
             Event::Begun => *due = false,
             _ => {}
         }).allows(without_horizon).shows(ends_with_base);
-    liberty "horizon-deleted-on-pause" ["ORD-UPD-03", "ORD-UPD-02"]
+    tolerance "horizon-deleted-on-pause" ["ORD-UPD-03", "ORD-UPD-02"]
         "It deletes the horizon by an update when the operator pauses a vehicle and sends it again after the resume."
         => keep::<bool>().happens(|short, _, vehicle, event| match event {
             Event::Extending(running) => {
@@ -208,7 +207,7 @@ records! {
             Event::Begun => *short = false,
             _ => {}
         }).allows(without_horizon).shows(ends_with_base);
-    liberty "horizon-withdrawn-and-given-again" ["ORD-UPD-12", "ORD-UPD-03"]
+    tolerance "horizon-withdrawn-and-given-again" ["ORD-UPD-12", "ORD-UPD-03"]
         "It takes the horizon back by an update with the stitching node only and gives it again by the next update."
         => keep::<(bool, bool)>().happens(|(due, done), _, vehicle, event| match event {
             Event::Extending(running) => {

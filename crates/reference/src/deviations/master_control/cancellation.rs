@@ -162,22 +162,22 @@ records! {
     fault "trigger-timeout-only-drops-transport" ["ACT-39", "ORD-CANCEL-01"]
         "It drops the transport in its own list when waitForTrigger takes too long, but does not cancel the order."
         => judging(|_, _, _, fate| if fate == Fate::TooLate { Fate::Over } else { fate });
-    liberty "resumes-before-cancel" ["ORD-CANCEL-01"] "It sends stopPause to a paused vehicle before it calls its order off."
+    tolerance "resumes-before-cancel" ["ORD-CANCEL-01"] "It sends stopPause to a paused vehicle before it calls its order off."
         => happening(|site, vehicle, event| if let Event::CallingOff(..) = event && vehicle.is_paused() { site.instant(vehicle, "stopPause", &Value::Null); });
-    liberty "pauses-before-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends startPause before cancelOrder, and stopPause when the cancellation has ended."
+    tolerance "pauses-before-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends startPause before cancelOrder, and stopPause when the cancellation has ended."
         => keep::<bool>().happens(|resumes, site, vehicle, event| match event {
             Event::CallingOff(..) if !vehicle.is_paused() => *resumes = site.instant(vehicle, "startPause", &Value::Null).is_some(),
             Event::CancelOver if std::mem::take(resumes) => { site.instant(vehicle, "stopPause", &Value::Null); }
             _ => {}
         });
-    liberty "cancel-sent-to-idle" ["ORD-CANCEL-01"] "It passes a requested cancelOrder on to a vehicle that has nothing to do."
+    tolerance "cancel-sent-to-idle" ["ORD-CANCEL-01"] "It passes a requested cancelOrder on to a vehicle that has nothing to do."
         => plain().asked(|(), site, vehicle, command, _| {
             let idle = vehicle.running.is_none() && vehicle.queue.is_empty() && vehicle.cancel.is_none();
             let idle = idle && vehicle.state.as_ref().is_some_and(State::route_empty);
             if command == "cancel" && idle && site.connection.online && site.commandable(vehicle) { site.instant(vehicle, "cancelOrder", &Value::Null); }
             true
         });
-    liberty "cancels-after-two-seconds" ["ORD-CANCEL-01", "TOPIC-13"] "It sends cancelOrder two seconds after the operator asked for it."
+    tolerance "cancels-after-two-seconds" ["ORD-CANCEL-01", "TOPIC-13"] "It sends cancelOrder two seconds after the operator asked for it."
         => keep::<Option<(Moment, String)>>().asked(|due, site, vehicle, command, _| {
             let order = vehicle.running.as_ref().map(|running| running.id.clone());
             let Some(order) = order.filter(|_| command == "cancel") else { return true };
@@ -191,7 +191,7 @@ records! {
                 *due = Some((later, order));
             } else if vehicle.running.as_ref().is_some_and(|running| running.id == order) { site.call_off(vehicle); }
         });
-    liberty "cancels-on-fatal" ["IACT-02", "CONN-14"] "It cancels the order of a vehicle that reports a FATAL error."
+    tolerance "cancels-on-fatal" ["IACT-02", "CONN-14"] "It cancels the order of a vehicle that reports a FATAL error."
         => keep::<bool>().happens(|done, site, vehicle, event| match event {
             Event::Looked => {
                 let mut errors = vehicle.state.iter().flat_map(|state| &state.errors);
@@ -205,7 +205,7 @@ records! {
             Event::Begun => *done = false,
             _ => {}
         });
-    liberty "log-asked-after-failure" ["ACT-08", "ACT-31"] "After an action of an order has failed it asks for a log if the vehicle offers that."
+    tolerance "log-asked-after-failure" ["ACT-08", "ACT-31"] "After an action of an order has failed it asks for a log if the vehicle offers that."
         => keep::<bool>().judges(|asked, site, vehicle, running, state, fate| {
             if has_failed(running, state) && !*asked && vehicle.offer("logReport").is_some() {
                 *asked = true;

@@ -1,6 +1,5 @@
 //! Deviations of trajectories and corridors (sections 6.6.1 and 7).
 
-
 use super::prelude::*;
 
 records! {
@@ -17,9 +16,9 @@ records! {
         => curve(|c| c.set("degree", c["degree"].as_u64().unwrap_or_default() + 1));
     fault "control-points-as-pairs" ["ORD-MSG-28", "JSON-10"] "Control points of a trajectory are pairs of numbers instead of objects with x and y."
         => curve(|c| c.list("controlPoints").iter_mut().for_each(|point| *point = json!([point["x"], point["y"]])));
-    liberty "weights-left-out" ["ORD-MSG-28"] "Control points have no weight."
+    tolerance "weights-left-out" ["ORD-MSG-28"] "Control points have no weight."
         => curve(|c| c.each("controlPoints", |point| point.unset("weight")));
-    liberty "equal-weights-of-two" ["ORD-MSG-28"] "It gives all control points of a trajectory the weight 2."
+    tolerance "equal-weights-of-two" ["ORD-MSG-28"] "It gives all control points of a trajectory the weight 2."
         => curve(|c| c.each("controlPoints", |point| point.set("weight", 2.0)));
     fault "curve-beside-nodes" ["ORD-MSG-30"] "Sends trajectories that lie three metres beside their nodes."
         => curve(|c| c.each("controlPoints", |point| ["x", "y"].iter().for_each(|axis| shift(point, axis, 3.0))));
@@ -35,14 +34,14 @@ records! {
                 shift(point, "y", -start["y"].as_f64().unwrap_or_default());
             });
         });
-    liberty "cubic-straights" ["ORD-MSG-28", "ORD-MSG-29", "ORD-MSG-30"] "Straight trajectories are given as cubic curves with four control points on the line."
+    tolerance "cubic-straights" ["ORD-MSG-28", "ORD-MSG-29", "ORD-MSG-30"] "Straight trajectories are given as cubic curves with four control points on the line."
         => roomy_curve(|c| {
             let (from, to) = (c["controlPoints"][0].clone(), c["controlPoints"][1].clone());
             c.set("degree", 3);
             c.set("knotVector", json!([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]));
             c.set("controlPoints", json!([from, between(&from, &to, 0.3), between(&from, &to, 0.7), to]));
         });
-    liberty "polyline-straights" ["ORD-MSG-29", "ORD-MSG-28"] "It gives straight trajectories a third control point halfway, with degree 1."
+    tolerance "polyline-straights" ["ORD-MSG-29", "ORD-MSG-28"] "It gives straight trajectories a third control point halfway, with degree 1."
         => roomy_curve(|c| {
             let (from, to) = (c["controlPoints"][0].clone(), c["controlPoints"][1].clone());
             c.set("knotVector", json!([0.0, 0.0, 0.5, 1.0, 1.0]));
@@ -109,13 +108,13 @@ records! {
                 if let Some((left, right)) = widths.next().flatten() { node.part("nodePosition", |place| place.set("allowedDeviationXY", left + right + 0.5)); }
             });
         });
-    liberty "corridor-asymmetric" ["CORR-09", "CORR-04"] "Its corridors are wider on the left than on the right."
+    tolerance "corridor-asymmetric" ["CORR-09", "CORR-04"] "Its corridors are wider on the left than on the right."
         => corridor(|c| shift(c, "leftWidth", 0.2));
-    liberty "corridor-by-contour" ["CORR-09"] "Corridors refer to the contour of the vehicle."
+    tolerance "corridor-by-contour" ["CORR-09"] "Corridors refer to the contour of the vehicle."
         => corridor(|c| c.set("corridorRefPoint", "CONTOUR"));
-    liberty "corridor-without-ref-point" ["CORR-09"] "Corridors have no corridorRefPoint."
+    tolerance "corridor-without-ref-point" ["CORR-09"] "Corridors have no corridorRefPoint."
         => corridor(|c| c.unset("corridorRefPoint"));
-    liberty "corridor-with-one-side-zero" ["CORR-05", "CORR-09"] "It sends a corridor with width only to the left where there is no room to the right."
+    tolerance "corridor-with-one-side-zero" ["CORR-05", "CORR-09"] "It sends a corridor with width only to the left where there is no room to the right."
         => composing(|_, vehicle, worded, m| {
             // No node of the way may allow a deviation, which might lie to the right of the next corridor (CORR-04).
             let sheet = vehicle.factsheet.as_ref();
@@ -141,7 +140,8 @@ fn corridor(change: fn(&mut Object)) -> Box<dyn Deviation> {
 
 /// Changes a part of every edge that has it.
 fn part(name: &'static str, change: fn(&mut Object)) -> Box<dyn Deviation> {
-    holding((name, change)).words(|(name, change), _, _, _, message| message.each("edges", |edge| edge.part(name, &*change)))
+    holding((name, change))
+        .words(|(name, change), _, _, _, message| message.each("edges", |edge| edge.part(name, *change)))
 }
 
 /// Changes every trajectory where the vehicle takes eight knots and four control points.
@@ -155,7 +155,7 @@ fn roomy_curve(change: fn(&mut Object)) -> Box<dyn Deviation> {
             .iter()
             .all(|curve| room(&format!("{curve}.knotVector"), 8) && room(&format!("{curve}.controlPoints"), 4));
         if roomy {
-            message.each("edges", |edge| edge.part("trajectory", &*change));
+            message.each("edges", |edge| edge.part("trajectory", *change));
         }
     })
 }

@@ -47,7 +47,7 @@ records! {
             Event::Begun => *kept = None,
             _ => {}
         });
-    liberty "update-id-from-seven" ["ORD-UPD-04"] "Begins orders with orderUpdateId 7."
+    tolerance "update-id-from-seven" ["ORD-UPD-04"] "Begins orders with orderUpdateId 7."
         => planned(|_, _, running| running.update_id = 7);
     fault "action-ids-kept-after-cancel" ["ORD-MSG-17"]
         "It gives the actions of the order after a cancelled one the actionIds of the actions of the same type in the cancelled one."
@@ -69,7 +69,7 @@ records! {
             Event::Updating(running) => number_actions(vehicle, running, running.released),
             _ => {}
         });
-    liberty "horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update."
+    tolerance "horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update."
         => updating(|site, vehicle, running| {
             let first = running.released;
             for action in unreleased(running, first) { action["actionId"] = json!(site.next_id(vehicle, "action")); }
@@ -99,7 +99,7 @@ records! {
         });
     fault "hard-although-not-listed" ["FACT-15"] "It sends actions at stations with blocking type HARD, though the factsheet lists other blocking types only for them."
         => planning(|_, _, way| for action in way_actions(way) { action["blockingType"] = json!("HARD"); });
-    liberty "vendor-actions-block-nothing" ["ORD-MSG-16", "FACT-15"]
+    tolerance "vendor-actions-block-nothing" ["ORD-MSG-16", "FACT-15"]
         "It sends actions of the manufacturer on nodes with blockingType NONE where the vehicle allows it."
         => planning(|_, vehicle, way| for action in way.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
             let kind = action["actionType"].as_str().unwrap_or_default();
@@ -108,14 +108,14 @@ records! {
         });
     fault "trigger-on-edge" ["ACT-08", "FACT-15"] "It puts waitForTrigger on the edge before the node."
         => planning(|_, _, way| to_edges(way, |kind, _| kind == "waitForTrigger"));
-    liberty "actions-on-edges" ["ACT-08", "FACT-15"] "pick, drop and other actions are put on the last edge before the station where the vehicle offers that scope."
+    tolerance "actions-on-edges" ["ACT-08", "FACT-15"] "pick, drop and other actions are put on the last edge before the station where the vehicle offers that scope."
         => planning(|site, vehicle, way| to_edges(way, |kind, taken| {
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["edge.actions"]));
             site.offers(vehicle, kind, "EDGE") && taken < limit
         }));
     fault "edge-action-on-node" ["FACT-15"] "It puts an action on a node that the vehicle offers on edges only."
         => planning(|_, _, way| for (leg, stop) in way.legs.iter_mut().zip(way.stops.iter_mut().skip(1)) { stop.actions.append(&mut leg.actions); });
-    liberty "load-id-given" ["ACT-31", "FACT-15"] "It sends the optional parameter loadId with pick where the vehicle lists it."
+    tolerance "load-id-given" ["ACT-31", "FACT-15"] "It sends the optional parameter loadId with pick where the vehicle lists it."
         => planning(|site, vehicle, way| for stop in way.stops.iter_mut().filter(|_| is_roomy(vehicle)) {
             for pick in stop.actions.iter_mut().filter(|action| action["actionType"] == "pick") {
                 let listed = vehicle.offer("pick").and_then(|offer| offer.action_parameters.as_deref()).unwrap_or_default();
@@ -125,7 +125,7 @@ records! {
                 }
             }
         });
-    liberty "fine-positioning-before-pick" ["ACT-08", "FACT-15"] "It puts a finePositioning before each pick on a node where the vehicle offers it."
+    tolerance "fine-positioning-before-pick" ["ACT-08", "FACT-15"] "It puts a finePositioning before each pick on a node where the vehicle offers it."
         => planning(|site, vehicle, way| {
             let offered = vehicle.offer("finePositioning").is_some() && site.offers(vehicle, "finePositioning", "NODE");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["node.actions"]));
@@ -146,9 +146,9 @@ records! {
         => unlimited(|what| matches!(what, Measure::Actions));
     fault "parameter-limit-ignored" ["FACT-12"] "Gives an action more parameters than the vehicle takes."
         => unlimited(|what| matches!(what, Measure::Parameters));
-    liberty "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
+    tolerance "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
         => planning_new(|_, _, way| for stop in way.stops.iter_mut().filter(|stop| stop.actions.is_empty()) { stop.deviation_xy.get_or_insert(0.8); });
-    liberty "second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
+    tolerance "second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
         "It sends the way to the first station as an order without horizon and, when that is completed, the rest as an update that begins at the last node."
         => keep::<Option<usize>>().happens(|halt, _, vehicle, event| match event {
             Event::Planned(running) => *halt = first_leg(running),
@@ -176,34 +176,34 @@ records! {
         => at_any_time(|called_off, occasion| called_off && occasion == Occasion::New);
     fault "interval-in-milliseconds" ["FACT-13"] "It takes minOrderInterval for milliseconds."
         => plain().lasts(|(), _, _, what, usual| if let Span::Interval(_) = what { usual / 1000 } else { usual });
-    liberty "answers-slowly" ["ORD-UPD-02"] "Looks at a message half a second after it came."
+    tolerance "answers-slowly" ["ORD-UPD-02"] "Looks at a message half a second after it came."
         => plain().configures(|config| config.answers_after = Duration::from_millis(500));
-    liberty "no-horizon" ["ORD-09"] "Sends the base only."
+    tolerance "no-horizon" ["ORD-09"] "Sends the base only."
         => plain().configures(|config| config.horizon_length = 0);
-    liberty "long-horizon" ["ORD-09"] "Sends the whole way as horizon."
+    tolerance "long-horizon" ["ORD-09"] "Sends the whole way as horizon."
         => plain().configures(|config| config.horizon_length = usize::MAX);
-    liberty "horizon-of-one-node" ["ORD-09"] "It never shows more than one node of the horizon."
+    tolerance "horizon-of-one-node" ["ORD-09"] "It never shows more than one node of the horizon."
         => plain().configures(|config| config.horizon_length = config.horizon_length.min(1));
-    liberty "whole-base" ["ORD-UPD-02"] "Releases the whole way at once."
+    tolerance "whole-base" ["ORD-UPD-02"] "Releases the whole way at once."
         => plain().configures(|config| config.base_length = usize::MAX);
-    liberty "resends-once" ["ORD-REJ-18"] "Sends an order again, unchanged, that was not seen within a second."
+    tolerance "resends-once" ["ORD-REJ-18"] "Sends an order again, unchanged, that was not seen within a second."
         => plain().configures(|config| (config.resend_after, config.resend_limit) = (Duration::from_secs(1), 1));
-    liberty "small-steps" ["ORD-UPD-02", "ORD-UPD-04"] "Keeps a longer base and extends it at every node."
+    tolerance "small-steps" ["ORD-UPD-02", "ORD-UPD-04"] "Keeps a longer base and extends it at every node."
         => letting(|site, _, what| matches!(what, Permission::Grow(_, ahead, _) if ahead < site.config.base_length))
             .configures(|config| config.base_length = config.base_length.max(4));
-    liberty "whole-way-released" ["ORD-09", "ORD-UPD-02"] "It releases the whole way with the first message of an order."
+    tolerance "whole-way-released" ["ORD-09", "ORD-UPD-02"] "It releases the whole way with the first message of an order."
         => showing(|_, running, window, free| if running.released == 0 { (window.released, window.end) = (free, free); });
-    liberty "horizon-to-the-goal" ["ORD-09", "ORD-UPD-02"] "It shows the whole rest of the way as horizon."
+    tolerance "horizon-to-the-goal" ["ORD-09", "ORD-UPD-02"] "It shows the whole rest of the way as horizon."
         => showing(|_, _, window, free| window.end = free);
-    liberty "first-order-without-horizon" ["ORD-09", "ORD-UPD-02"] "It sends the first message of an order without horizon and extends the base by updates."
+    tolerance "first-order-without-horizon" ["ORD-09", "ORD-UPD-02"] "It sends the first message of an order without horizon and extends the base by updates."
         => showing(|_, running, window, _| if running.released == 0 { window.end = window.released; });
-    liberty "one-node-first" ["ORD-02", "ORD-MSG-06"] "It first sends an order with only the node where the vehicle stands and adds the way by an update."
+    tolerance "one-node-first" ["ORD-02", "ORD-MSG-06"] "It first sends an order with only the node where the vehicle stands and adds the way by an update."
         => showing(|_, running, window, _| if running.released == 0 { (window.released, window.end) = (1, 1); });
-    liberty "factsheet-awaited" ["OPT-03", "FACT-15"] "It begins no order before it has the factsheet of the vehicle."
+    tolerance "factsheet-awaited" ["OPT-03", "FACT-15"] "It begins no order before it has the factsheet of the vehicle."
         => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && vehicle.factsheet.is_none());
-    liberty "no-new-order-while-paused" ["TOPIC-13"] "It begins no new order while the vehicle is paused."
+    tolerance "no-new-order-while-paused" ["TOPIC-13"] "It begins no new order while the vehicle is paused."
         => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && vehicle.is_paused());
-    liberty "pause-after-cancel-before-next-order" ["TOPIC-13", "ORD-CANCEL-17"] "It waits some seconds after a finished cancelOrder before it sends the next order."
+    tolerance "pause-after-cancel-before-next-order" ["TOPIC-13", "ORD-CANCEL-17"] "It waits some seconds after a finished cancelOrder before it sends the next order."
         => keep::<Option<Moment>>().happens(|due, site, vehicle, event| match event {
             Event::Ended(_, true) => {
                 *due = Some(site.now.moment + Duration::from_secs(3));
@@ -212,19 +212,19 @@ records! {
             Event::Looked => again_at(*due, site, vehicle),
             _ => {}
         }).allows(not_before);
-    liberty "dispatches-after-two-seconds" ["TOPIC-13"] "It sends an order two seconds after the operator asked for it."
+    tolerance "dispatches-after-two-seconds" ["TOPIC-13"] "It sends an order two seconds after the operator asked for it."
         => keep::<Option<Moment>>().asked(|due, site, _vehicle, command, _| {
             if command == "dispatch" { *due = Some(site.now.moment + Duration::from_secs(2)); }
             true
         }).happens(|due, site, vehicle, event| if let Event::Looked = event { again_at(*due, site, vehicle); }).allows(not_before);
-    liberty "latest-transport-first" ["TOPIC-13", "ORD-MSG-02"] "It begins the transport asked for last before those that wait longer."
+    tolerance "latest-transport-first" ["TOPIC-13", "ORD-MSG-02"] "It begins the transport asked for last before those that wait longer."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let Some(latest) = transport(vehicle, arguments).filter(|_| command == "dispatch") else { return true };
             site.dispatch(vehicle, latest);
             if vehicle.queue.front().is_some_and(|next| !next.follows) && let Some(latest) = vehicle.queue.pop_back() { vehicle.queue.push_front(latest); }
             false
         });
-    liberty "pick-and-drop-apart" ["ORD-MSG-02", "TOPIC-13"] "A transport from one station to another is done in two orders, one for the pick and one for the drop."
+    tolerance "pick-and-drop-apart" ["ORD-MSG-02", "TOPIC-13"] "A transport from one station to another is done in two orders, one for the pick and one for the drop."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let whole = transport(vehicle, arguments).filter(|whole| command == "dispatch" && whole.action.is_none());
             let Some((whole, from)) = whole.and_then(|whole| Some((whole.clone(), whole.from?))) else { return true };
@@ -235,7 +235,7 @@ records! {
             site.dispatch(vehicle, drop);
             false
         });
-    liberty "long-ways-in-two-orders" ["ORD-MSG-02", "ORD-02"] "It drives a long way in two orders one after the other."
+    tolerance "long-ways-in-two-orders" ["ORD-MSG-02", "ORD-02"] "It drives a long way in two orders one after the other."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let plain = |whole: &Transport| whole.from.is_none() && whole.action.is_none() && whole.load_type.is_none();
             let idle = vehicle.running.is_none() && vehicle.queue.is_empty();
@@ -245,9 +245,9 @@ records! {
             site.dispatch(vehicle, Transport { follows: true, ..whole });
             false
         });
-    liberty "asks-for-states" ["ACT-08"] "Asks for a state when it has begun an order."
+    tolerance "asks-for-states" ["ACT-08"] "Asks for a state when it has begun an order."
         => begun(|site, vehicle| { site.instant(vehicle, "stateRequest", &Value::Null); });
-    liberty "asks-for-factsheet" ["ACT-08"] "Asks for the factsheet although it has one."
+    tolerance "asks-for-factsheet" ["ACT-08"] "Asks for the factsheet although it has one."
         => begun(|site, vehicle| { site.instant(vehicle, "factsheetRequest", &Value::Null); });
 }
 

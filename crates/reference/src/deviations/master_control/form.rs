@@ -1,6 +1,5 @@
 //! Deviations of the form of messages: JSON, its types, its text (sections 6.1 and 7).
 
-
 use super::prelude::*;
 
 records! {
@@ -95,24 +94,24 @@ records! {
             let mut actions = message["actions"].as_array().into_iter().flatten();
             if actions.any(|action| action["actionType"] == "cancelOrder") { *text = json!(String::from_utf8_lossy(text)).to_string().into_bytes(); }
         });
-    liberty "vendor-fields" ["JSON-10"] "Adds members of its own to every message."
+    tolerance "vendor-fields" ["JSON-10"] "Adds members of its own to every message."
         => every(|m| m.set("vendorTrace", json!({ "thread": 4, "module": "dispatcher" })));
-    liberty "keys-reordered" ["HDR-01"] "Sends the members of its messages in reverse order."
+    tolerance "keys-reordered" ["HDR-01"] "Sends the members of its messages in reverse order."
         => sending(|_, _, out| out.message = std::mem::take(&mut out.message).into_iter().rev().collect());
-    liberty "members-reversed-inside" ["HDR-01"] "It writes the members of all objects in the opposite order, the header last."
+    tolerance "members-reversed-inside" ["HDR-01"] "It writes the members of all objects in the opposite order, the header last."
         => sending(|_, _, out| {
             let message = reversed(&Value::Object(std::mem::take(&mut out.message)));
             out.message = message.as_object().cloned().unwrap_or_default();
         });
-    liberty "pretty-printed" ["MQTT-02"] "Sends its messages in many lines, indented."
+    tolerance "pretty-printed" ["MQTT-02"] "Sends its messages in many lines, indented."
         => plain().writes(|_, _, _, message, text| *text = serde_json::to_vec_pretty(message).unwrap_or_default());
-    liberty "text-escaped" ["JSON-03", "MQTT-02"] "Hyphens in JSON texts are written as escaped code points."
+    tolerance "text-escaped" ["JSON-03", "MQTT-02"] "Hyphens in JSON texts are written as escaped code points."
         => plain().writes(|_, _, _, _, text| *text = escaped(text));
-    liberty "blank-lines-around" ["MQTT-02"] "There is white space before and behind the JSON object."
+    tolerance "blank-lines-around" ["MQTT-02"] "There is white space before and behind the JSON object."
         => plain().writes(|_, _, _, _, text| *text = [b"\r\n ".as_slice(), text, b"\r\n"].concat());
-    liberty "whole-numbers-without-point" ["JSON-06", "JSON-09"] "It writes whole coordinates and speeds without a decimal point."
+    tolerance "whole-numbers-without-point" ["JSON-06", "JSON-09"] "It writes whole coordinates and speeds without a decimal point."
         => sending(|_, _, out| out.message.values_mut().for_each(without_point));
-    liberty "numbers-with-exponent" ["JSON-06", "JSON-09"] "It writes coordinates with an exponent, such as 1.05e1."
+    tolerance "numbers-with-exponent" ["JSON-06", "JSON-09"] "It writes coordinates with an exponent, such as 1.05e1."
         => plain().writes(|_, _, _, message, text| {
             let mut message = message.clone();
             mark_coordinates(&mut message);

@@ -1,6 +1,5 @@
 //! Deviations of the header: what names the vehicle, counts the messages, and tells time and version (section 6.4).
 
-
 use super::prelude::*;
 
 records! {
@@ -138,13 +137,13 @@ records! {
         => resent(|m| m.unset("serialNumber"));
     fault "manufacturer-missing-in-updates" ["HDR-01", "HDR-05", "JSON-10", "ORD-MSG-01"] "Order updates have no manufacturer in the header."
         => update(|m| m.unset("manufacturer"));
-    liberty "header-id-from-thousand" ["HDR-02"] "Begins to count its messages at 1000."
+    tolerance "header-id-from-thousand" ["HDR-02"] "Begins to count its messages at 1000."
         => every(|m| m.change("headerId", |id| *id = json!(id.as_u64().unwrap_or_default() + 1000)));
-    liberty "header-id-high" ["HDR-02", "JSON-09"] "It counts headerId from 4000000000."
+    tolerance "header-id-high" ["HDR-02", "JSON-09"] "It counts headerId from 4000000000."
         => every(|m| m.change("headerId", |id| *id = json!(id.as_u64().unwrap_or_default() + 4_000_000_000)));
-    liberty "header-id-restarts" ["HDR-02"] "Counts its messages from 0 again on every connection."
+    tolerance "header-id-restarts" ["HDR-02"] "Counts its messages from 0 again on every connection."
         => happening(|_, vehicle, event| if let Event::Connected(_) = event { vehicle.header_ids.clear(); });
-    liberty "whole-second-timestamps" ["HDR-03"] "Its clock has a resolution of a second: the two digits of the fraction are always zero."
+    tolerance "whole-second-timestamps" ["HDR-03"] "Its clock has a resolution of a second: the two digits of the fraction are always zero."
         => sending(|site, _, out| {
             let utc = site.now.utc;
             let seconds = jiff::Timestamp::from_second(utc.as_second()).unwrap_or(utc);

@@ -1,6 +1,5 @@
 //! Deviations of which instant actions are sent, and when (section 6.9).
 
-
 use super::prelude::*;
 
 records! {
@@ -41,9 +40,9 @@ records! {
         });
     fault "instant-actions-limit-ignored" ["FACT-12"] "Sends more instant actions at once than the vehicle takes."
         => unlimited(|what| matches!(what, Measure::Instants));
-    liberty "instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own."
+    tolerance "instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own."
         => measuring(|_, what, usual| if let Measure::Instants = what { 1 } else { usual });
-    liberty "pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message."
+    tolerance "pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message."
         => plain().asked(|(), site, vehicle, command, _| {
             if command == "pause" {
                 site.instant(vehicle, "startPause", &Value::Null);
@@ -51,7 +50,7 @@ records! {
             }
             command != "pause"
         });
-    liberty "pause-sent-twice" ["ORD-MSG-17", "IACT-01"] "It sends startPause a second time, with its own actionId, while the first is not reported finished."
+    tolerance "pause-sent-twice" ["ORD-MSG-17", "IACT-01"] "It sends startPause a second time, with its own actionId, while the first is not reported finished."
         => plain().asked(|(), site, vehicle, command, _| {
             if command == "pause" {
                 site.instant(vehicle, "startPause", &Value::Null);

@@ -1,6 +1,5 @@
 //! Deviations of the limits of a factsheet (section 6.15).
 
-
 use super::prelude::*;
 
 records! {

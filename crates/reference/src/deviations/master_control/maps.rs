@@ -45,7 +45,7 @@ records! {
     fault "enable-before-download" ["MAP-10"] "It sends enableMap for a map it rolls out before downloadMap."
         because "MAP-10 recommends that a map is on board before it is activated, and obliges nobody."
         => happening(|site, vehicle, event| if let Event::RollOut(map, _) = event { site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version); });
-    liberty "on-board-map-deleted-first" ["MAP-28"]
+    tolerance "on-board-map-deleted-first" ["MAP-28"]
         "It deletes a disabled map that is on board already before it has it downloaded again, without waiting for a rejection."
         => happening(|site, vehicle, event| if let Event::RollOut(map, done) = event {
             let same = |seen: &&MapSeen| seen.map_id == map.map_id && seen.map_version == map.map_version;
@@ -67,7 +67,7 @@ records! {
     fault "download-link-to-disk" ["MAP-16"] "It sends a path on its own disk as mapDownloadLink."
         because "MAP-16 asks for a link; whose disk it points to cannot be seen."
         => made_of("downloadMap", |_, a| link(a, |link| format!("file:///var/maps/{}", link.rsplit('/').next().unwrap_or_default())));
-    liberty "map-hash-left-out" ["MAP-16", "ACT-31"] "It leaves the optional mapHash out of downloadMap."
+    tolerance "map-hash-left-out" ["MAP-16", "ACT-31"] "It leaves the optional mapHash out of downloadMap."
         => made_of("downloadMap", |_, a| a.keep("actionParameters", |parameter| !parameter.says("key", "mapHash")));
     fault "download-repeated" ["MAP-28"] "Repeats a download that was refused as a duplicate without deleting the map."
         => on_duplicate(|site, vehicle, job| download_again(site, vehicle, job));
@@ -85,7 +85,7 @@ records! {
             site.map_action(vehicle, "deleteMap", &job.map.map_id, &job.map.map_version);
             next
         });
-    liberty "duplicate-left-alone" ["MAP-28"] "It gives a download up that was rejected as a duplicate."
+    tolerance "duplicate-left-alone" ["MAP-28"] "It gives a download up that was rejected as a duplicate."
         => on_duplicate(|_, _, _| None);
     fault "duplicate-other-version-deleted" ["MAP-28"]
         "After a download was rejected as a duplicate it deletes another version of that map and then repeats the download."
@@ -122,14 +122,14 @@ records! {
             let driven = vehicle.running.as_ref().is_some_and(|running| running.stops.iter().any(|stop| stop.map_id == map.map_id));
             if let Some(version) = version.filter(|_| driven) { site.map_action(vehicle, "deleteMap", &map.map_id, &version); }
         });
-    liberty "enables-after-download" ["MAP-09", "MAP-10"] "It enables a map of which no version is enabled as soon as its download has ended, while no order runs."
+    tolerance "enables-after-download" ["MAP-09", "MAP-10"] "It enables a map of which no version is enabled as soon as its download has ended, while no order runs."
         => happening(|site, vehicle, event| if let Event::RolledOut(job, true, _, _) = event && job.stage != Stage::Delete {
             let map = job.map.clone();
             let enabled = vehicle.state.as_ref().is_none_or(|state| state.map_enabled(&map.map_id));
             let free = vehicle.running.is_none() && !vehicle.enabling.contains_key(&map.map_id);
             if !enabled && free && let Some(id) = site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version) { vehicle.enabling.insert(map.map_id, id); }
         });
-    liberty "preloads-maps" ["MAP-10", "MAP-16"] "It sends downloadMap unasked for each map of the site that the vehicle does not have."
+    tolerance "preloads-maps" ["MAP-10", "MAP-16"] "It sends downloadMap unasked for each map of the site that the vehicle does not have."
         => looked(|site, vehicle| if site.commandable(vehicle) {
             for map in site.config.maps.clone() {
                 let maps = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
@@ -137,7 +137,7 @@ records! {
                 if missing && !map.link.is_empty() && vehicle.fetched.insert(map.map_id.clone()) { site.download_map(vehicle, map); }
             }
         });
-    liberty "enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
+    tolerance "enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
         => happening(|site, vehicle, event| if let Event::Begins(running) = event {
             let map_id = running.stops[0].map_id.clone();
             if let Some(version) = enabled_version(vehicle, &map_id) {

@@ -1,6 +1,5 @@
 //! Deviations of optional fields: what a vehicle supports and requires of an order (section 6.15).
 
-
 use super::prelude::*;
 
 records! {
@@ -35,7 +34,7 @@ records! {
     fault "unsupported-description" ["OPT-03"] "Sends descriptions to vehicles that do not support them."
         because "Descriptions are harmless; the ruling of OPT-03 is a warning."
         => describing();
-    liberty "descriptions-everywhere" ["OPT-03"] "Describes nodes and edges where the vehicle supports it."
+    tolerance "descriptions-everywhere" ["OPT-03"] "Describes nodes and edges where the vehicle supports it."
         => filling(|_, field, value| if field.support.is_some() || field.harmless { describe(field, value); });
     fault "orientation-unasked" ["OPT-03"] "All edges carry orientation and orientationType, whether the vehicle supports them or not."
         => edge(|e| {
@@ -54,9 +53,9 @@ records! {
         => composing(|_, vehicle, _, m| m.each("edges", |edge| if is_loaded(vehicle) { edge.set("maxHeight", 2.5); }));
     fault "orientation-type-capitalized" ["ORD-MSG-16", "JSON-02"] "It writes orientationType as Tangential."
         => edge(|e| e.change("orientationType", |word| *word = json!("Tangential")));
-    liberty "supported-speed-left-out" ["OPT-03", "OPT-05"] "It sends maxSpeed only to vehicles that REQUIRE it."
+    tolerance "supported-speed-left-out" ["OPT-03", "OPT-05"] "It sends maxSpeed only to vehicles that REQUIRE it."
         => filling(|_, field, value| if field.name == "order.edges.maxSpeed" { *value = (field.support == Some("REQUIRED")).then(|| field.default.clone()); });
-    liberty "rotation-and-length-stated" ["OPT-03"] "It sends rotationAllowed and length of every edge where the vehicle supports them."
+    tolerance "rotation-and-length-stated" ["OPT-03"] "It sends rotationAllowed and length of every edge where the vehicle supports them."
         => filling(|_, field, value| {
             if matches!(field.name, "order.edges.rotationAllowed" | "order.edges.length") && field.support.is_some() { value.get_or_insert(field.default.clone()); }
         });

@@ -2,7 +2,6 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-
 use super::prelude::*;
 
 records! {
@@ -21,16 +20,16 @@ records! {
     fault "order-ids-from-the-start-after-reconnect" ["ORD-MSG-02"]
         "It counts its order numbers from the start after its own connection to the broker was lost, so that an orderId returns for another order."
         => counting("order", |event| matches!(event, Event::Connected(true)));
-    liberty "plain-number-ids" ["ORD-MSG-02", "ORD-MSG-17", "JSON-04"] "It makes orderIds and actionIds of digits only."
+    tolerance "plain-number-ids" ["ORD-MSG-02", "ORD-MSG-17", "JSON-04"] "It makes orderIds and actionIds of digits only."
         => plain().names(|(), site, vehicle, what, id| *id = site.fitting(vehicle, what, format!("{}{:05}", site.session, site.ids), site.ids));
-    liberty "uuid-ids" ["ORD-MSG-17", "JSON-04"] "Ids of orders, actions and temporary elements look like UUIDs where the vehicle allows their length."
+    tolerance "uuid-ids" ["ORD-MSG-17", "JSON-04"] "Ids of orders, actions and temporary elements look like UUIDs where the vehicle allows their length."
         => plain().names(|(), site, vehicle, what, id| {
             let kind = ["order", "action", "place"].iter().position(|known| *known == what).map_or(4, |at| at + 1);
             let (high, low) = (site.session >> 16 & 0xffff_ffff, site.session & 0xffff);
             let full = format!("{high:08x}-{low:04x}-4a{kind:02x}-9c3e-{:012x}", site.ids);
             *id = site.fitting(vehicle, what, full, site.ids);
         });
-    liberty "ids-with-punctuation" ["JSON-04"] "Ids contain colon, underscore, dot and hyphen."
+    tolerance "ids-with-punctuation" ["JSON-04"] "Ids contain colon, underscore, dot and hyphen."
         => plain().names(|(), site, vehicle, what, id| {
             let full = format!("{what}:{}{:05}_a.-", site.session, site.ids);
             *id = site.fitting(vehicle, what, full, site.ids);
@@ -66,7 +65,7 @@ records! {
             let starts = !worded.is_update() && worded.window.end > 1;
             worded.nodes(m, |index, stop, node| if starts && index == 0 && site.config.node(&stop.id).is_some() { node.unset("nodePosition"); });
         });
-    liberty "position-where-listed" ["ORD-MSG-08", "OPT-03"] "Leaves nodePosition out for a vehicle whose factsheet lists what it supports, and not this."
+    tolerance "position-where-listed" ["ORD-MSG-08", "OPT-03"] "Leaves nodePosition out for a vehicle whose factsheet lists what it supports, and not this."
         => nodes(|vehicle, _, _, _, node| if vehicle.factsheet.as_ref().is_some_and(|sheet| !sheet.knows_positions()) { node.unset("nodePosition"); });
     fault "theta-in-degrees" ["ORD-MSG-09", "MAP-02"] "Gives orientations in degrees."
         => position(|p| p.set("theta", number(p, "theta").unwrap_or(FRAC_PI_2).to_degrees()));
@@ -77,9 +76,9 @@ records! {
                 *value = Some(json!(theta.rem_euclid(TAU)));
             }
         });
-    liberty "theta-at-the-bound" ["ORD-MSG-09", "MAP-02"] "Node orientations, where the vehicle supports them, are exactly minus pi."
+    tolerance "theta-at-the-bound" ["ORD-MSG-09", "MAP-02"] "Node orientations, where the vehicle supports them, are exactly minus pi."
         => filling(|_, field, value| if field.name.ends_with(".theta") && taken(field) { *value = Some(json!(-PI)); });
-    liberty "no-theta-on-nodes" ["ORD-MSG-09", "MAP-02"] "It sends no theta and leaves the orientation to the vehicle."
+    tolerance "no-theta-on-nodes" ["ORD-MSG-09", "MAP-02"] "It sends no theta and leaves the orientation to the vehicle."
         => filling(|_, field, value| if field.name.ends_with(".theta") && field.support != Some("REQUIRED") { *value = None; });
     fault "theta-not-normalised-on-reverse" ["ORD-MSG-09", "MAP-02"]
         "It adds pi to the theta of a node that is approached against the drawn direction and does not bring it back below pi."
@@ -103,10 +102,10 @@ records! {
         });
     fault "deviation-theta-full-circle" ["ORD-MSG-09"] "Where the orientation does not matter, allowedDeviationTheta is two pi."
         => filling(|_, field, value| if field.name.ends_with("allowedDeviationTheta") && taken(field) { *value = Some(json!(TAU)); });
-    liberty "every-direction-allowed" ["ORD-MSG-09", "OPT-03"]
+    tolerance "every-direction-allowed" ["ORD-MSG-09", "OPT-03"]
         "It sends an allowedDeviationTheta of pi for nodes where any direction will do, if the vehicle supports it."
         => filling(|_, field, value| if field.name.ends_with("allowedDeviationTheta") && taken(field) { value.get_or_insert(json!(PI)); });
-    liberty "zero-deviations" ["ORD-MSG-09", "OPT-03"]
+    tolerance "zero-deviations" ["ORD-MSG-09", "OPT-03"]
         "It sends an allowedDeviationXY of 0 for nodes behind the first that have none in the layout, if the vehicle supports it."
         => filling(|_, field, value| {
             if field.name.ends_with("allowedDeviationXY") && taken(field) && field.index > 0 && field.layout.is_none() { *value = Some(json!(0.0)); }
@@ -137,7 +136,7 @@ records! {
     fault "edge-id-with-arrow" ["JSON-04"] "Edge ids contain an arrow with a greater-than sign."
         because "JSON-04, which letters an identifier has, is a recommendation; an arrow in an edgeId is warned of."
         => edge(|e| e.set("edgeId", e.text("edgeId").replacen('-', "->", 1)));
-    liberty "edge-ids-named-otherwise" ["ORD-MSG-18", "JSON-04"] "It names edges way, start node and end node with colons instead of by the ids of the layout."
+    tolerance "edge-ids-named-otherwise" ["ORD-MSG-18", "JSON-04"] "It names edges way, start node and end node with colons instead of by the ids of the layout."
         => composing(|site, vehicle, worded, m| {
             let free = vehicle.factsheet.as_ref().is_none_or(|sheet| sheet.id_length.is_none() && !sheet.ids_numerical);
             worded.edges(m, |_, leg, edge| {
@@ -205,17 +204,17 @@ records! {
         });
     fault "edges-released-after-reroute" ["ORD-08", "ORD-09"] "After a change of destination all edges of the order updates are released, also those of the horizon."
         => keep::<bool>().happens(rerouted).words(|rerouted, _, _, _, m| m.each("edges", |edge| if *rerouted { edge.set("released", true); }));
-    liberty "slow-last-edge" ["OPT-03"] "It limits the speed on the last edge of a way more than it does on the same edge elsewhere."
+    tolerance "slow-last-edge" ["OPT-03"] "It limits the speed on the last edge of a way more than it does on the same edge elsewhere."
         => edges(|_, worded, index, _, edge| {
             if index + 2 == worded.running.stops.len() && let Some(speed) = number(edge, "maxSpeed") { edge.set("maxSpeed", speed.min(0.4)); }
         });
-    liberty "horizon-slower" ["ORD-UPD-03"] "It sends a lower maxSpeed for edges in the horizon than when they are released."
+    tolerance "horizon-slower" ["ORD-UPD-03"] "It sends a lower maxSpeed for edges in the horizon than when they are released."
         => composing(|_, _, _, m| m.each("edges", |edge| if edge.says("released", false) { scale(edge, "maxSpeed", 0.5); }));
-    liberty "slower-when-loaded" ["ORD-UPD-03", "OPT-03"] "It sends half the maxSpeed for edges while the vehicle carries a load."
+    tolerance "slower-when-loaded" ["ORD-UPD-03", "OPT-03"] "It sends half the maxSpeed for edges while the vehicle carries a load."
         => composing(|_, vehicle, _, m| m.each("edges", |edge| if is_loaded(vehicle) { scale(edge, "maxSpeed", 0.5); }));
     fault "low-score-slows-down" ["INFO-03"] "It sends a third of the maxSpeed to a vehicle with a low localizationScore."
         => composing(|_, vehicle, _, m| m.each("edges", |edge| if is_unsure(vehicle) { scale(edge, "maxSpeed", 1.0 / 3.0); }));
-    liberty "horizon-actions-open" ["ORD-UPD-03", "ORD-MSG-06"]
+    tolerance "horizon-actions-open" ["ORD-UPD-03", "ORD-MSG-06"]
         "It sends the actions of nodes and edges only when they are released; in the horizon the lists are empty."
         => composing(|_, _, _, m| {
             for list in ["nodes", "edges"] { m.each(list, |element| if element.says("released", false) { element.set("actions", json!([])); }); }
@@ -237,7 +236,11 @@ fn swap_ends(edge: &mut Object) {
 fn dangling(when: fn(&Worded<'_>) -> bool) -> Box<dyn Deviation> {
     holding(when).words(|when, _, _, worded, message| {
         let (running, end) = (worded.running, worded.window.end);
-        let ends = (running.stops.get(end - 1), running.stops.get(end), running.legs.get(end - 1));
+        let ends = (
+            running.stops.get(end - 1),
+            running.stops.get(end),
+            running.legs.get(end - 1),
+        );
         if let (Some(from), Some(to), Some(leg)) = ends
             && when(worded)
         {

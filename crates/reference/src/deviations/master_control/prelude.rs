@@ -5,9 +5,8 @@ pub(super) use std::time::Duration;
 
 pub(super) use serde_json::{Value, json};
 
-pub(super) use tck_base::clock::Moment;
+pub(super) use crate::deviations::json_edit::JsonEdit;
 pub(super) use crate::deviations::record::Record;
-pub(super) use crate::deviations::words::Words;
 pub(super) use crate::master_control::Site;
 pub(super) use crate::master_control::dispatch::Way;
 pub(super) use crate::master_control::hooks::{
@@ -17,6 +16,7 @@ pub(super) use crate::master_control::order::Window;
 pub(super) use crate::master_control::seen::{Factsheet, Position, State};
 pub(super) use crate::master_control::vehicle::{Leg, Presence, Running, Stop, Transport, Vehicle};
 pub(super) use crate::master_control::ways::{Pose, Standing};
+pub(super) use tck_base::clock::Moment;
 
 use crate::ConnectOptions;
 use crate::hooks::Memory;
@@ -429,9 +429,8 @@ type Asked = (&'static str, fn(&mut Site, &mut Vehicle, &Value) -> bool);
 
 /// Does something when a command is given for a vehicle; false when that is all.
 pub(super) fn asked(command: &'static str, then: fn(&mut Site, &mut Vehicle, &Value) -> bool) -> Box<Hooks<Asked>> {
-    holding((command, then)).asked(|(wanted, then), site, vehicle, command, arguments| {
-        command != *wanted || then(site, vehicle, arguments)
-    })
+    holding((command, then))
+        .asked(|(wanted, then), site, vehicle, command, arguments| command != *wanted || then(site, vehicle, arguments))
 }
 
 /// Hears messages otherwise; false to drop one.

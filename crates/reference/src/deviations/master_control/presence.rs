@@ -252,29 +252,29 @@ records! {
     fault "reconnects-only-once" ["MQTT-10"] "It connects again after the first lost connection, but not after the second one."
         because "MQTT-10 is a recommendation and never more than a warning."
         => plain().retries(|(), site, retry| retry.filter(|_| site.connection.losses < 2));
-    liberty "reconnects-later" ["MQTT-10"] "It waits four times as long before it connects again."
+    tolerance "reconnects-later" ["MQTT-10"] "It waits four times as long before it connects again."
         => plain().retries(|(), _, retry| retry.map(|delay| delay * 4));
-    liberty "state-asked-after-reconnect" ["MQTT-10", "ACT-08"] "After its own connection was lost and came back it sends stateRequest."
+    tolerance "state-asked-after-reconnect" ["MQTT-10", "ACT-08"] "After its own connection was lost and came back it sends stateRequest."
         => reconnected(|site, vehicle| if vehicle.state.is_some() { site.instant(vehicle, "stateRequest", &Value::Null); });
-    liberty "factsheet-asked-on-return" ["ACT-08", "TOPIC-14"] "It sends a factsheetRequest when a vehicle comes ONLINE again."
+    tolerance "factsheet-asked-on-return" ["ACT-08", "TOPIC-14"] "It sends a factsheetRequest when a vehicle comes ONLINE again."
         => happening(|site, vehicle, event| if let Event::Online(Presence::Away) = event { ask_factsheet(site, vehicle); });
-    liberty "factsheet-request-at-each-online" ["IACT-02", "ORD-MSG-17"] "It requests the factsheet each time that a vehicle comes ONLINE."
+    tolerance "factsheet-request-at-each-online" ["IACT-02", "ORD-MSG-17"] "It requests the factsheet each time that a vehicle comes ONLINE."
         => on_return(ask_factsheet);
-    liberty "state-request-after-online" ["TOPIC-13", "IACT-01"] "It asks for a state by stateRequest whenever a vehicle comes ONLINE."
+    tolerance "state-request-after-online" ["TOPIC-13", "IACT-01"] "It asks for a state by stateRequest whenever a vehicle comes ONLINE."
         => on_return(|site, vehicle| { site.instant(vehicle, "stateRequest", &Value::Null); });
-    liberty "requests-state-and-factsheet-when-online" ["IACT-01", "TOPIC-13"]
+    tolerance "requests-state-and-factsheet-when-online" ["IACT-01", "TOPIC-13"]
         "It sends stateRequest and factsheetRequest in one message each time a vehicle reports ONLINE."
         => on_return(|site, vehicle| {
             site.instant(vehicle, "stateRequest", &Value::Null);
             ask_factsheet(site, vehicle);
         });
-    liberty "fresh-state-awaited" ["CONN-12"] "It begins no order for a vehicle that came back before a new state has come from it."
+    tolerance "fresh-state-awaited" ["CONN-12"] "It begins no order for a vehicle that came back before a new state has come from it."
         => keep::<bool>().happens(|stale, _, _, event| match event {
             Event::Online(Presence::Away) => *stale = true,
             Event::State(_) => *stale = false,
             _ => {}
         }).allows(|stale, _, _, what, usual| usual && !(*stale && matches!(what, Permission::Begin)));
-    liberty "repeats-order-after-online" ["ORD-REJ-18", "ORD-UPD-04", "ORD-UPD-05"]
+    tolerance "repeats-order-after-online" ["ORD-REJ-18", "ORD-UPD-04", "ORD-UPD-05"]
         "It repeats the last order message with the same content when the vehicle comes ONLINE again."
         => keep::<bool>().happens(|due, site, vehicle, event| match event {
             Event::Online(Presence::Away) => *due = vehicle.running.is_some(),
@@ -295,7 +295,7 @@ records! {
             }
             _ => {}
         });
-    liberty "stops-pause-after-reconnect-only-by-operator" ["TOPIC-13", "IACT-02"] "It sends nothing to a vehicle that came back paused until the operator resumes it."
+    tolerance "stops-pause-after-reconnect-only-by-operator" ["TOPIC-13", "IACT-02"] "It sends nothing to a vehicle that came back paused until the operator resumes it."
         => keep::<bool>().happens(|back, _, vehicle, event| match event {
             Event::Online(Presence::Away) => *back = true,
             Event::State(_) => *back &= vehicle.is_paused(),
@@ -304,11 +304,11 @@ records! {
             let concerned = matches!(what, Permission::Begin | Permission::Extend(_) | Permission::Resend(_));
             usual && !(*back && concerned && vehicle.is_paused())
         });
-    liberty "orders-to-faulted" ["CONN-14"] "Begins what it is asked for on a vehicle with a FATAL error."
+    tolerance "orders-to-faulted" ["CONN-14"] "Begins what it is asked for on a vehicle with a FATAL error."
         => letting(|_, _, what| matches!(what, Permission::Fit));
-    liberty "no-orders-on-low-battery" ["TOPIC-13"] "It gives no new transport to a vehicle whose batteryCharge is below 30 percent and that is not charging."
+    tolerance "no-orders-on-low-battery" ["TOPIC-13"] "It gives no new transport to a vehicle whose batteryCharge is below 30 percent and that is not charging."
         => plain().configures(|config| config.low_battery = 30.0);
-    liberty "no-new-orders-in-semiautomatic" ["MODE-04"] "It begins new orders in AUTOMATIC only, and lets running ones go on in SEMIAUTOMATIC."
+    tolerance "no-new-orders-in-semiautomatic" ["MODE-04"] "It begins new orders in AUTOMATIC only, and lets running ones go on in SEMIAUTOMATIC."
         => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && mode(vehicle) == "SEMIAUTOMATIC");
 }
 
@@ -362,7 +362,10 @@ fn clear_connection(site: &mut Site, vehicle: &Vehicle) {
 
 /// Does something when a vehicle comes ONLINE.
 fn on_return(then: fn(&mut Site, &mut Vehicle)) -> Box<dyn Deviation> {
-    when(|event| matches!(event, Event::Online(before) if *before != Presence::Online), then)
+    when(
+        |event| matches!(event, Event::Online(before) if *before != Presence::Online),
+        then,
+    )
 }
 
 /// Remembers that the broker was away during the running order.

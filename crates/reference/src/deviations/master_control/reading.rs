@@ -207,7 +207,7 @@ records! {
             if heard.name == "factsheet" && !std::mem::replace(published, true) { site.push(heard.topic.to_owned(), heard.payload.to_vec(), 0, true); }
             true
         });
-    liberty "state-asked-when-quiet" ["ACT-08"] "It sends stateRequest when no state has come for six seconds."
+    tolerance "state-asked-when-quiet" ["ACT-08"] "It sends stateRequest when no state has come for six seconds."
         => keep::<Option<Moment>>().happens(|asked, site, vehicle, event| if let Event::Looked = event && vehicle.state.is_some() && site.commandable(vehicle) {
             let due = vehicle.state_at + Duration::from_secs(6);
             if due > site.now.moment {
@@ -236,7 +236,11 @@ fn shuns(odd: fn(&Past, &Site, &Heard<'_>) -> bool) -> Box<dyn Deviation> {
         .hears(|(odd, past), site, _, heard| {
             let state = heard.name == "state";
             if state {
-                past.paused = if heard.message["paused"] == true { past.paused + 1 } else { 0 };
+                past.paused = if heard.message["paused"] == true {
+                    past.paused + 1
+                } else {
+                    0
+                };
             }
             past.shunned |= odd(past, site, heard);
             if state {

@@ -78,9 +78,9 @@ records! {
         });
     fault "lost-instant-not-resent" ["MQTT-10"] "It never repeats an instant action that no state shows."
         => forbidding(|_, _, what| matches!(what, Permission::TellAgain));
-    liberty "resends-late" ["ORD-REJ-18"] "It waits three times as long before it sends again what was lost."
+    tolerance "resends-late" ["ORD-REJ-18"] "It waits three times as long before it sends again what was lost."
         => plain().lasts(|(), _, _, what, usual| if let Span::Lost = what { usual * 3 } else { usual });
-    liberty "cancel-repeated-with-new-id" ["ORD-MSG-17", "IACT-02"]
+    tolerance "cancel-repeated-with-new-id" ["ORD-MSG-17", "IACT-02"]
         "It repeats a cancelOrder that did not appear in the state within some seconds, with a new actionId."
         => happening(|site, vehicle, event| if let Event::InstantLost(id) = event {
             let fresh = site.next_id(vehicle, "action");

@@ -93,9 +93,9 @@ records! {
         "For a vehicle that stopped between nodes the next order begins at the last node without a deviation that covers the vehicle."
         because "The vehicle may be taken for standing on the node; ORD-CANCEL-17 fails only a start that cannot be reached."
         => standing(|_, _, pose| pose.standing = Standing::OnLast { covered: false });
-    liberty "stands-on-last-node" ["ORD-CANCEL-17"] "Begins at the last node with a wide deviation when a vehicle stands between nodes."
+    tolerance "stands-on-last-node" ["ORD-CANCEL-17"] "Begins at the last node with a wide deviation when a vehicle stands between nodes."
         => standing(|_, _, pose| pose.standing = Standing::OnLast { covered: true });
-    liberty "temporary-start" ["ORD-03", "ORD-CANCEL-17"] "For a vehicle a little off a node a new order begins at a temporary node at its reported position."
+    tolerance "temporary-start" ["ORD-03", "ORD-CANCEL-17"] "For a vehicle a little off a node a new order begins at a temporary node at its reported position."
         => standing(|_, _, pose| pose.standing = Standing::Exactly);
     fault "next-order-ahead" ["ORD-CANCEL-17", "ORD-03"] "Begins the order behind a cancelled one at the node the vehicle has not reached."
         => planning(|site, _, way| if temporary(site, way).is_some() && !way.legs.is_empty() {
@@ -112,9 +112,9 @@ records! {
         }).plans(|(place, called_off), site, _, way, _, _| if let Some(place) = place.as_ref().filter(|_| *called_off) && let Some(first) = temporary(site, way) {
             (first.x, first.y) = (place.x, place.y);
         });
-    liberty "temporary-node-wide" ["ORD-CANCEL-17"] "It gives temporary nodes an allowedDeviationXY of a metre."
+    tolerance "temporary-node-wide" ["ORD-CANCEL-17"] "It gives temporary nodes an allowedDeviationXY of a metre."
         => planning(|site, _, way| if let Some(first) = temporary(site, way) { first.deviation_xy = Some(1.0); });
-    liberty "temporary-node-with-theta" ["ORD-CANCEL-17"] "It gives temporary nodes the reported theta of the vehicle."
+    tolerance "temporary-node-with-theta" ["ORD-CANCEL-17"] "It gives temporary nodes the reported theta of the vehicle."
         => planning(|site, vehicle, way| {
             if let Some((_, Some(position))) = pose_of(vehicle) && let Some(first) = temporary(site, way) {
                 first.theta = Some(position.theta.sin().atan2(position.theta.cos()));
@@ -159,7 +159,7 @@ records! {
             if let (Some(from), Some(to)) = (text(arguments, "from"), text(arguments, "to")) { vehicle.blocked.remove(&(to, from)); }
             true
         });
-    liberty "blocks-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "It calls the order off and sends another when an edge of the horizon is blocked."
+    tolerance "blocks-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "It calls the order off and sends another when an edge of the horizon is blocked."
         => happening(|site, vehicle, event| if let Event::Closed(_, heeded) = event {
             **heeded = false;
             let then = vehicle.running.as_ref().map(|running| again(running, vehicle.state.as_ref()));
@@ -177,7 +177,7 @@ records! {
             Event::Begun => *called_off = false,
             _ => {}
         }).stands(|(called_off, blind), _, _, _, _| *blind = *called_off).avoids(|(_, blind), _, _, _, _, closed| if *blind { closed.clear(); }).allows(|(_, blind), _, _, what, usual| usual || (*blind && matches!(what, Permission::Drive(_))));
-    liberty "takes-the-long-way" ["ORD-12", "TOPIC-13"] "It takes the second best way where there is one."
+    tolerance "takes-the-long-way" ["ORD-12", "TOPIC-13"] "It takes the second best way where there is one."
         => plain().avoids(|(), site, _, from, to, closed| {
             let first = site.config.any_way(from, to, closed).and_then(|way| way.first().map(|edge| (edge.from.clone(), edge.to.clone())));
             if let Some(first) = first && closed.insert(first.clone()) && site.config.way(from, to, closed).is_none() { closed.remove(&first); }
@@ -191,7 +191,7 @@ records! {
         => happening(|_, vehicle, event| if let Event::Rerouting(running, _) = event && running.is_whole() {
             running.released = running.reached(vehicle.state.as_ref()) + 1;
         });
-    liberty "reroutes-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "A change of destination is always done by cancelOrder and a new order, never by another horizon."
+    tolerance "reroutes-by-cancel" ["ORD-UPD-03", "ORD-CANCEL-01"] "A change of destination is always done by cancelOrder and a new order, never by another horizon."
         => happening(|_, _, event| if let Event::Rerouting(_, how) = event { **how = Reroute::ByCancel; });
     fault "action-added-to-the-stitching-node" ["ORD-UPD-06", "ORD-UPD-03"]
         "It adds the drop to the stitching node, when the destination is changed to the node where the base ends."
@@ -219,7 +219,9 @@ fn after_order(at: AfterOrder) -> Box<dyn Deviation> {
             _ => {}
         })
         .stands(|(at, last), site, vehicle, pose, _| {
-            let stop = last.as_ref().and_then(|(order, called_off)| at(order, *called_off, vehicle));
+            let stop = last
+                .as_ref()
+                .and_then(|(order, called_off)| at(order, *called_off, vehicle));
             if let Some(node) = stop.and_then(|stop| site.config.node(&stop.id)) {
                 pose.node.clone_from(&node.id);
                 pose.position = None;
@@ -245,7 +247,13 @@ fn pose_of(vehicle: &Vehicle) -> Option<(String, Option<Position>)> {
     Some((state.last_node_id.clone(), state.agv_position.clone()))
 }
 
-fn from_before(before: &mut Option<(String, Option<Position>)>, _: &mut Site, _: &mut Vehicle, pose: &mut Pose, _: &Transport) {
+fn from_before(
+    before: &mut Option<(String, Option<Position>)>,
+    _: &mut Site,
+    _: &mut Vehicle,
+    pose: &mut Pose,
+    _: &Transport,
+) {
     if let Some((node, position)) = before {
         pose.node.clone_from(node);
         pose.position.clone_from(position);

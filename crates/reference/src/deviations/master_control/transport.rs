@@ -7,15 +7,15 @@ use super::prelude::*;
 records! {
     fault "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1."
         => connecting(|_, _, options| options.level = 3);
-    liberty "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5."
+    tolerance "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5."
         => connecting(|_, _, options| options.level = 5);
-    liberty "session-kept" ["MQTT-01"] "Asks the broker to keep its session."
+    tolerance "session-kept" ["MQTT-01"] "Asks the broker to keep its session."
         => connecting(|_, _, options| options.clean_session = false);
-    liberty "long-keep-alive" ["MQTT-01"] "It connects with a keep-alive of a minute."
+    tolerance "long-keep-alive" ["MQTT-01"] "It connects with a keep-alive of a minute."
         => connecting(|_, _, options| options.keep_alive = Duration::from_secs(60));
-    liberty "new-client-id-each-time" ["MQTT-10", "TOPIC-15"] "It connects with another client identifier each time."
+    tolerance "new-client-id-each-time" ["MQTT-10", "TOPIC-15"] "It connects with another client identifier each time."
         => connecting(|site, _, options| options.client_id = format!("{}-{}", site.config.name, site.now.utc.as_millisecond()));
-    liberty "will-of-its-own" ["TOPIC-15"] "It has a last will on a topic of its own that is none of the protocol, in plain text."
+    tolerance "will-of-its-own" ["TOPIC-15"] "It has a last will on a topic of its own that is none of the protocol, in plain text."
         => connecting(|site, _, options| {
             options.will = Some(Publication {
                 topic: format!("{}/status", site.config.name),
@@ -50,7 +50,7 @@ records! {
         => connecting(|_, _, options| without(options, "connection"));
     fault "factsheet-not-subscribed" ["TOPIC-14"] "Does not subscribe to the factsheet."
         => connecting(|_, _, options| without(options, "factsheet"));
-    liberty "visualization-not-subscribed" ["VIS-03", "TOPIC-14"] "It does not subscribe to visualization at all."
+    tolerance "visualization-not-subscribed" ["VIS-03", "TOPIC-14"] "It does not subscribe to visualization at all."
         => connecting(|_, _, options| without(options, "visualization"));
     fault "factsheet-unsubscribed-after-reconnect" ["TOPIC-14"] "It does not subscribe to the factsheet topics again after it has lost its connection."
         => connecting(|site, _, options| if site.connection.returning { without(options, "factsheet"); });
@@ -62,27 +62,27 @@ records! {
     fault "connection-with-qos-0" ["TOPIC-14"] "Subscribes to the connection topic with QoS 0."
         because "The QoS is asked of whoever publishes; the ruling of TOPIC-14 is a warning."
         => connecting(|_, _, options| options.subscriptions.iter_mut().for_each(|(_, qos)| *qos = 0));
-    liberty "subscribes-with-qos-1" ["TOPIC-14"] "Subscribes with QoS 1."
+    tolerance "subscribes-with-qos-1" ["TOPIC-14"] "Subscribes with QoS 1."
         => connecting(|_, _, options| options.subscriptions.iter_mut().for_each(|(_, qos)| *qos = 1));
-    liberty "subscribes-with-wildcards" ["TOPIC-14"] "Subscribes to everything the vehicles publish with one filter for each topic."
+    tolerance "subscribes-with-wildcards" ["TOPIC-14"] "Subscribes to everything the vehicles publish with one filter for each topic."
         => connecting(|_, _, options| {
             for (topic, _) in &mut options.subscriptions { *topic = with_wildcards(topic); }
             options.subscriptions.sort();
             options.subscriptions.dedup();
         });
-    liberty "subscribes-twice" ["TOPIC-14"] "It subscribes to each topic both exactly and with wildcards, so that messages may come to it twice."
+    tolerance "subscribes-twice" ["TOPIC-14"] "It subscribes to each topic both exactly and with wildcards, so that messages may come to it twice."
         => connecting(|_, _, options| {
             let mut wide: Vec<_> = options.subscriptions.iter().map(|(topic, qos)| (with_wildcards(topic), *qos)).collect();
             wide.sort();
             wide.dedup();
             options.subscriptions.extend(wide);
         });
-    liberty "listens-to-own-topics" ["TOPIC-14", "TOPIC-15"] "It also subscribes to order and instantActions."
+    tolerance "listens-to-own-topics" ["TOPIC-14", "TOPIC-15"] "It also subscribes to order and instantActions."
         => connecting(|_, fleet, options| {
             let own = fleet.iter().flat_map(|vehicle| ["order", "instantActions"].map(|name| vehicle.topic(name)));
             options.subscriptions.extend(own.flatten().map(|topic| (topic.to_owned(), 0)));
         });
-    liberty "subscribes-to-everything" ["TOPIC-14", "TOPIC-15"] "It subscribes to all topics of the interface with one filter."
+    tolerance "subscribes-to-everything" ["TOPIC-14", "TOPIC-15"] "It subscribes to all topics of the interface with one filter."
         => connecting(|_, fleet, options| {
             let topic = fleet.first().and_then(|vehicle| vehicle.topic("state")).unwrap_or_default();
             let levels: Vec<&str> = topic.split('/').collect();
@@ -183,14 +183,14 @@ records! {
                 site.push(topic, Value::Object(message).to_string().into_bytes(), 1, true);
             }
         });
-    liberty "clears-retained-order-topics" ["MQTT-02", "TOPIC-13"]
+    tolerance "clears-retained-order-topics" ["MQTT-02", "TOPIC-13"]
         "It publishes an empty retained message on order and instantActions when it starts, to clear leftovers."
         => happening(|site, vehicle, event| {
             if let Event::Connected(false) = event {
                 for topic in ["order", "instantActions"].map(|name| vehicle.topic(name)).into_iter().flatten() { site.push(topic.to_owned(), Vec::new(), 0, true); }
             }
         });
-    liberty "heartbeat-outside-the-protocol" ["TOPIC-01", "TOPIC-15"] "It publishes a heartbeat of its own on a topic outside the tree of the protocol."
+    tolerance "heartbeat-outside-the-protocol" ["TOPIC-01", "TOPIC-15"] "It publishes a heartbeat of its own on a topic outside the tree of the protocol."
         => fleet::<Option<Moment>>().happens(|beat, site, vehicle, event| {
             if let Event::Looked = event {
                 let now = site.now.moment;

@@ -1,6 +1,5 @@
 //! Deviations of what updates of an order say: numbers, stitching node, what was sent before (section 6.6.2).
 
-
 use super::prelude::*;
 
 records! {
@@ -101,7 +100,11 @@ fn stitching(change: fn(&mut Object, &str)) -> Box<dyn Deviation> {
 /// Numbers nodes and edges otherwise, knowing the number of the first node.
 fn numbered(number: fn(u64, u64) -> u64) -> Box<dyn Deviation> {
     holding(number).sends(|number, _, _, out| {
-        let first = out.message.list("nodes").first().and_then(|node| node["sequenceId"].as_u64());
+        let first = out
+            .message
+            .list("nodes")
+            .first()
+            .and_then(|node| node["sequenceId"].as_u64());
         each_element(&mut out.message, |element| {
             element.change("sequenceId", |id| {
                 *id = json!(number(id.as_u64().unwrap_or_default(), first.unwrap_or_default()));

@@ -11,7 +11,7 @@ use super::rerouting::Reroute;
 use super::seen::State;
 use super::vehicle::{Leg, MapJob, Presence, Running, Stop, Transport};
 
-/// What is allowed or not.
+/// Something that is allowed or not.
 #[derive(Clone, Copy)]
 pub(crate) enum Permission<'a> {
     /// Anything is sent to the vehicle (CONN-12).
@@ -60,7 +60,7 @@ pub(crate) enum Permission<'a> {
     OrderGone,
 }
 
-/// What has a length in time.
+/// Something that has a length in time.
 #[derive(Clone, Copy)]
 pub(crate) enum Span {
     /// From one order message to the next (FACT-13).
@@ -80,7 +80,7 @@ pub(crate) enum Occasion {
     Update { changed: bool, asked: bool },
 }
 
-/// What is counted.
+/// Something that is counted or limited.
 #[derive(Clone, Copy)]
 pub(crate) enum Measure<'a> {
     /// Nodes a message may have; it is an update or not (FACT-12).
@@ -163,7 +163,7 @@ pub(crate) enum Event<'a> {
     Placing(&'a mut Value, &'a mut bool),
 }
 
-/// How an order message came about.
+/// Origin of an order message: its order, and the part of the way it shows.
 pub(crate) struct Worded<'a> {
     pub(crate) running: &'a Running,
     pub(crate) window: Window,
@@ -178,7 +178,11 @@ impl Worded<'_> {
     }
 
     /// Changes each node, knowing its place in the whole way.
-    pub(crate) fn nodes(&self, message: &mut Map<String, Value>, mut change: impl FnMut(usize, &Stop, &mut Map<String, Value>)) {
+    pub(crate) fn nodes(
+        &self,
+        message: &mut Map<String, Value>,
+        mut change: impl FnMut(usize, &Stop, &mut Map<String, Value>),
+    ) {
         let known = self.running.stops.iter().enumerate().skip(self.window.first);
         for (node, (index, stop)) in entries(message, "nodes").zip(known) {
             change(index, stop, node);
@@ -186,7 +190,11 @@ impl Worded<'_> {
     }
 
     /// Changes each edge, knowing the place of the node before it in the whole way.
-    pub(crate) fn edges(&self, message: &mut Map<String, Value>, mut change: impl FnMut(usize, &Leg, &mut Map<String, Value>)) {
+    pub(crate) fn edges(
+        &self,
+        message: &mut Map<String, Value>,
+        mut change: impl FnMut(usize, &Leg, &mut Map<String, Value>),
+    ) {
         let known = self.running.legs.iter().enumerate().skip(self.window.first);
         for (edge, (index, leg)) in entries(message, "edges").zip(known) {
             change(index, leg, edge);
@@ -204,11 +212,11 @@ fn entries<'a>(message: &'a mut Map<String, Value>, list: &str) -> impl Iterator
 pub(crate) struct Field<'a> {
     /// Its name in the factsheet, such as `order.edges.maxSpeed`.
     pub(crate) name: &'a str,
-    /// What the layout says.
+    /// Value in the layout.
     pub(crate) layout: Option<Value>,
-    /// What is sent where the vehicle demands it and the layout says nothing.
+    /// Value that is sent where the vehicle demands it and the layout says nothing.
     pub(crate) default: Value,
-    /// What the vehicle says to it.
+    /// Support the factsheet states for it.
     pub(crate) support: Option<&'a str>,
     /// The vehicle has no factsheet, and the field does no harm.
     pub(crate) harmless: bool,
@@ -272,7 +280,7 @@ impl Outgoing {
     }
 }
 
-/// What has become of the running order.
+/// Fate of the running order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
     /// It goes on.
@@ -283,6 +291,6 @@ pub(crate) enum Fate {
     Again,
     /// The rest has to be called off.
     CalledOff,
-    /// The same, because a trigger did not come in time.
+    /// The rest has to be called off because a trigger did not come in time.
     TooLate,
 }
