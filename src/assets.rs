@@ -26,7 +26,7 @@ pub fn embedded() -> Assets {
     let mut files = Vec::new();
     embedded_files("suites", &SUITES, &mut files);
     embedded_files("schemas", &SCHEMAS, &mut files);
-    Assets::of_files(files)
+    Assets::built_in(files)
 }
 
 /// The suites the program was built with and those of a folder, ready to judge by.
@@ -52,7 +52,28 @@ pub fn library(own: Option<Own<'_>>) -> Result<Library, Vec<Diagnostic>> {
             .with_suites(folder)
             .map_err(|error| unreadable(folder, error))?,
     };
+    if let Some(Own::Added(folder) | Own::Alone(folder)) = own {
+        holds_suites(&assets, folder)?;
+    }
     Library::load(assets, tck_checks::REGISTRY)
+}
+
+/// Folders below `suites/` whose files test or judge something, and are not only used by others.
+const DECIDING: [&str; 4] = ["agv/", "master-control/", "monitors/", "explore/"];
+
+/// A folder of suites that holds none was not checked out, or is another one.
+fn holds_suites(assets: &Assets, folder: &Path) -> Result<(), Vec<Diagnostic>> {
+    let mut inside = assets.own().iter().filter_map(|path| path.strip_prefix("suites/"));
+    if inside.any(|path| DECIDING.iter().any(|folder| path.starts_with(folder))) {
+        return Ok(());
+    }
+    let title = format!(
+        "{} holds no test, monitor or stimulus: they stand in {}",
+        folder.display(),
+        DECIDING.join(", ")
+    );
+    let hint = "is everything checked out? `vda5050-tck init --suites DIR` writes a folder that is laid out right";
+    Err(vec![Diagnostic::whole("no-suites", title).hint(hint)])
 }
 
 fn embedded_files(root: &str, dir: &Dir<'static>, files: &mut Vec<AssetFile>) {
@@ -75,5 +96,8 @@ mod tests {
     fn the_program_carries_the_files_of_its_source_tree() {
         let own = Assets::of_folder(Path::new(env!("CARGO_MANIFEST_DIR"))).expect("suites and schemas");
         assert_eq!(embedded().sha256(), own.sha256());
+        // The program does not lint what it carries; as files of a folder they are.
+        let linted = Library::load(own, crate::checks::REGISTRY);
+        assert!(linted.is_ok_and(|library| !library.rules.suites.tests.is_empty()));
     }
 }

@@ -14,7 +14,7 @@
 //! use vda5050_tck::run::{Place, RunError, SocketRun};
 //!
 //! # fn main() -> Result<(), RunError> {
-//! let library = crate::assets::library(None)?;
+//! let library = vda5050_tck::library(None)?;
 //! let pack = library.rules.packs.latest();
 //! let surroundings = Surroundings::of_process();
 //! let profile = profile::load(Some(Path::new("device.toml")), &[], &surroundings)?;
@@ -32,7 +32,7 @@
 //! use vda5050_tck::verdict::Verdict;
 //!
 //! # fn main() -> Result<(), RunError> {
-//! let library = crate::assets::library(None)?;
+//! let library = vda5050_tck::library(None)?;
 //! let pack = library.rules.packs.latest();
 //! let mut run = VirtualRun::of(&library, pack);
 //! run.tests.retain(|test| test.id == "order-rejection/lower-update-id");
@@ -75,5 +75,6 @@ pub use tck_result as result;
 pub use tck_run as run;
 pub use tck_simulate as simulate;
 pub use tck_suite as suite;
+pub use tck_view as view;
 pub use tck_watch as watch;
 pub use tck_wire as wire;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 37] = [
+const LAYERS: [(&str, u8); 40] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -37,6 +37,7 @@ const LAYERS: [(&str, u8); 37] = [
     ("suite", 2),
     ("checks", 2),
     ("check", 2),
+    ("world", 2),
     ("journal", 1),
     ("pack", 1),
     ("profile", 1),
@@ -48,11 +49,13 @@ const LAYERS: [(&str, u8); 37] = [
     ("nurbs", 0),
     ("pattern", 0),
     ("secrets", 0),
+    ("view", 0),
+    ("time", 0),
     ("lib", 7),
 ];
 
 /// The rooms that share a crate with others: of the crates of several rooms and of the program.
-const HELD_TOGETHER: [&str; 17] = [
+const HELD_TOGETHER: [&str; 18] = [
     "main",
     "cli",
     "ui",
@@ -68,6 +71,7 @@ const HELD_TOGETHER: [&str; 17] = [
     "nurbs",
     "pattern",
     "secrets",
+    "time",
     "verdict",
     "yaml",
 ];
@@ -439,7 +443,11 @@ fn the_judging_side_knows_no_clock_and_no_runtime() {
         "Timestamp::now",
         "std::thread::sleep",
     ];
-    refuse(&["judge", "pattern", "checks", "report", "reference"], &forbidden, &[]);
+    refuse(
+        &["judge", "pattern", "check", "checks", "world", "report", "reference"],
+        &forbidden,
+        &[],
+    );
 }
 
 #[test]

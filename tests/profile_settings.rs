@@ -68,7 +68,21 @@ fn is_read(path: &str, code: &str, suites: &str) -> bool {
             let (head, tail) = word.split_at(1);
             all + &head.to_uppercase() + tail
         });
-        let in_code = [format!("\"time.{name}\""), format!("time(\"{name}\")")];
+        let field: String = name
+            .chars()
+            .flat_map(|c| {
+                if c.is_uppercase() {
+                    vec!['_', c.to_ascii_lowercase()]
+                } else {
+                    vec![c]
+                }
+            })
+            .collect();
+        let in_code = [
+            format!("\"time.{name}\""),
+            format!("time(\"{name}\")"),
+            format!("setting.time.{field}"),
+        ];
         return suites.contains(&format!("time.{name}")) || in_code.iter().any(|text| code.contains(text));
     }
     code.contains(&format!("{section}.{}", name.replace('-', "_")))

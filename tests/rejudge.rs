@@ -98,3 +98,52 @@ fn seeds_jitter_and_coalescing_do_not_change_a_verdict() {
         assert_eq!(first, verdicts(seed), "seed {seed}");
     }
 }
+
+#[test]
+fn nothing_that_comes_after_an_interruption_accuses_anybody() {
+    use vda5050_tck::journal::{Event, Journal};
+    use vda5050_tck::result::RunResult;
+    use vda5050_tck::verdict::Verdict;
+
+    let library = library();
+    let pack = library.rules.packs.latest();
+    let mut request = VirtualRun::of(&library, pack);
+    // A test, a monitor and a connection find these.
+    request.faults = ["outdated-update-taken-over", "factsheet-without-header", "will-qos-0"]
+        .map(str::to_owned)
+        .to_vec();
+    let live = run_silently(&library, pack, request).expect("a run");
+    let interrupted_at = |place: usize| {
+        let mut journal = Journal::new();
+        let mut opened = 0;
+        for entry in live.recorder.journal().entries() {
+            let mut record = entry.record.clone();
+            if matches!(record.event, Event::Opened { .. }) {
+                opened += 1;
+                if opened == place {
+                    // Nothing is judged by it, and so no number changes.
+                    record.event = Event::Interrupted;
+                }
+            }
+            journal.restore(record);
+        }
+        judge(&library.rules, journal.entries()).expect("judged")
+    };
+    let given = |result: &RunResult, wanted: Verdict| -> Vec<String> {
+        let tests = result.tests.iter().map(|test| (&test.id, test.verdict));
+        let monitors = result.monitors.iter().map(|monitor| (&monitor.id, monitor.verdict));
+        let all = tests.chain(monitors).filter(|(_, verdict)| *verdict == Some(wanted));
+        all.map(|(id, _)| id.clone()).collect()
+    };
+    let never = interrupted_at(0);
+    assert_eq!(
+        json::to_string(&never).expect("json"),
+        json::to_string(&live.result).expect("json")
+    );
+    let at_once = interrupted_at(1);
+    assert_eq!(given(&at_once, Verdict::Fail), Vec::<String>::new());
+    assert_eq!(given(&at_once, Verdict::Warning), Vec::<String>::new());
+    // What was found before stands.
+    let (all, before) = (given(&never, Verdict::Fail), given(&interrupted_at(3), Verdict::Fail));
+    assert!(!before.is_empty() && before.len() < all.len(), "{before:?} of {all:?}");
+}

@@ -2,6 +2,7 @@
 
 use super::args;
 use super::exit::Exit;
+use super::outputs::Outputs;
 use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_pack::Role;
@@ -12,7 +13,7 @@ use tck_report::certificate::OWED;
 const OWN_SUITES: &str = "VDA5050_TCK_SUITES";
 
 /// `certify`.
-pub fn certify(arguments: &args::Certify) -> Result<Exit, Problem> {
+pub fn certify(arguments: &args::Certify, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
     let said = arguments.certificate.settings();
     let effective = profile::load(arguments.profile.as_deref(), &said, &surroundings)?;
@@ -20,7 +21,7 @@ pub fn certify(arguments: &args::Certify) -> Result<Exit, Problem> {
     if !missing.is_empty() {
         return Err(Problem::Usage(missing));
     }
-    super::run::run_command(&args::Run {
+    let run = args::Run {
         certifies: true,
         said,
         device: args::DeviceArgs {
@@ -28,10 +29,12 @@ pub fn certify(arguments: &args::Certify) -> Result<Exit, Problem> {
             ..args::DeviceArgs::default()
         },
         output: arguments.output.clone(),
+        pipeline: arguments.pipeline.clone(),
         thorough: arguments.thorough,
         certificate: true,
         ..args::Run::default()
-    })
+    };
+    super::run::run_command(&run, outputs)
 }
 
 /// What stands in the way of a certificate, and can be seen in the profile alone.

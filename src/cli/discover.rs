@@ -149,7 +149,7 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
         arguments.at.broker, arguments.seconds
     );
     let heard = runtime.block_on(async {
-        let interrupt = super::run::interrupts()?;
+        let interrupt = super::ending::interrupts()?;
         let time = Duration::from_secs(arguments.seconds);
         Ok::<_, Problem>(listen(endpoint, &filters, time, &library.rules.packs, interrupt).await)
     });

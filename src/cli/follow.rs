@@ -73,7 +73,7 @@ fn stopped() -> Result<Arc<AtomicBool>, Problem> {
         .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let mut interrupt = {
         let _inside = runtime.enter();
-        super::run::interrupts()?
+        super::ending::interrupts()?
     };
     let told = Arc::clone(&stop);
     std::thread::spawn(move || {

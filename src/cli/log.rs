@@ -12,7 +12,7 @@ use super::problem::Problem;
 use tck_profile::Secrets;
 
 /// What is logged unless said: everything of this program, and what goes wrong elsewhere.
-const USUAL: &str = "warn,vda5050_tck=debug";
+const USUAL: &str = "warn,vda5050_tck=debug,tck_=debug";
 
 /// The environment variable that says what is logged, as `tracing` has it.
 const FILTER: &str = "VDA5050_TCK_LOG";

@@ -6,16 +6,19 @@ mod browser;
 mod certify;
 mod device;
 mod discover;
+mod ending;
 mod events;
 pub mod exit;
 mod explained;
 mod explore;
 mod expression;
 mod follow;
+mod gate;
 mod language;
 mod list;
 mod log;
 mod messages;
+mod outputs;
 mod papers;
 mod pieces;
 mod pipeline;
@@ -23,6 +26,7 @@ mod plan;
 mod problem;
 mod qualify;
 mod recordings;
+mod reference;
 mod report;
 mod run;
 mod screen;
@@ -35,12 +39,14 @@ mod slice;
 mod validate;
 mod watch;
 
+use std::io::Write as _;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser as _;
 
 use args::{Cli, Command, Format};
+use exit::Exit;
 use list::print;
 use problem::Problem;
 use tck_base::diagnostic::Diagnostic;
@@ -51,6 +57,10 @@ use tck_report::text::Color;
 /// The program.
 #[must_use]
 pub fn main() -> ExitCode {
+    // A run calls this program in this way to keep hold of the device that it starts.
+    if let Some(code) = tck_run::supervisor::called(std::env::args_os()) {
+        return code;
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -60,27 +70,14 @@ pub fn main() -> ExitCode {
             } else {
                 let _ = error.print();
             }
+            if error.use_stderr() {
+                let words: Vec<String> = std::env::args().collect();
+                outputs::Owed::by_words(&words).settle(&mistyped(&error));
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let logs = log::begin(cli.log_file.as_deref(), cli.command.verbose());
-    let outcome = logs.and_then(|()| match &cli.command {
-        Command::Run(arguments) => run::run_command(arguments),
-        Command::Certify(arguments) => certify::certify(arguments),
-        Command::List(arguments) => list::list(arguments),
-        Command::Explain(arguments) => list::explain(arguments),
-        Command::Audit(arguments) => audit::audit(arguments),
-        Command::Watch(arguments) => watch::watch(arguments),
-        Command::Explore(arguments) => explore::explore(arguments),
-        Command::Validate(arguments) => validate::validate(arguments),
-        Command::Simulate(arguments) => simulate::simulate(arguments),
-        Command::Report(arguments) => report::report(arguments),
-        Command::Qualify(arguments) => qualify::qualify(arguments),
-        Command::Discover(arguments) => discover::discover(arguments),
-        Command::Init(arguments) => discover::init(arguments),
-        Command::Completions(arguments) => shell::completions(arguments),
-        Command::Man(arguments) => shell::man(arguments),
-    });
+    let outcome = outputs::Owed::by(&cli.command).around(|outputs| dispatch(&cli, outputs));
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();
         match cli.command.format() {
@@ -90,6 +87,33 @@ pub fn main() -> ExitCode {
         problem.exit()
     });
     ExitCode::from(exit.code())
+}
+
+/// Calls the command.
+fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> {
+    log::begin(cli.log_file.as_deref(), cli.command.verbose())?;
+    match &cli.command {
+        Command::Run(arguments) => run::run_command(arguments, outputs),
+        Command::Certify(arguments) => certify::certify(arguments, outputs),
+        Command::List(arguments) => list::list(arguments),
+        Command::Explain(arguments) => list::explain(arguments),
+        Command::Audit(arguments) => audit::audit(arguments),
+        Command::Watch(arguments) => watch::watch(arguments),
+        Command::Explore(arguments) => explore::explore(arguments),
+        Command::Validate(arguments) => validate::validate(arguments),
+        Command::Simulate(arguments) => simulate::simulate(arguments),
+        Command::Report(arguments) => report::report(arguments, outputs),
+        Command::Qualify(arguments) => qualify::qualify(arguments),
+        Command::Discover(arguments) => discover::discover(arguments),
+        Command::Init(arguments) => discover::init(arguments),
+        Command::Completions(arguments) => shell::completions(arguments),
+        Command::Man(arguments) => shell::man(arguments),
+    }
+}
+
+/// Says something on standard error. That nobody reads there is no failure.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Whether a command line that cannot be read asks for JSON.

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::args::{InconclusiveArg, Rendering};
+use super::args::Report;
 use super::exit::Exit;
+use super::outputs::{Outputs, Shown};
 use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::file::{self, Recording};
@@ -11,8 +12,7 @@ use tck_judge as judge;
 use tck_judge::Library;
 use tck_report::attestation::Attestation;
 use tck_report::certificate::{self, CertificateError};
-use tck_report::junit::{self, Flavour};
-use tck_report::{issues, json, manifest, markdown};
+use tck_report::{json, manifest};
 use tck_result::RunResult;
 use tck_run::sources;
 
@@ -34,9 +34,8 @@ pub fn certificate(folder: &Path) -> Result<Exit, Problem> {
 }
 
 /// Prints an in-toto statement about the bundle of a run.
-pub fn attestation(folder: &Path) -> Result<Exit, Problem> {
-    let library = crate::assets::library(None)?;
-    let (result, root) = intact(folder, &library)?;
+pub fn attestation(folder: &Path, library: &Library) -> Result<Exit, Problem> {
+    let (result, root) = intact(folder, library)?;
     let path = folder.join(manifest::NAME);
     let bytes = std::fs::read(&path)
         .map_err(|error| Problem::Environment(format!("cannot read {}: {error}", path.display())))?;
@@ -44,24 +43,23 @@ pub fn attestation(folder: &Path) -> Result<Exit, Problem> {
     super::print(&text.map_err(|error| Problem::Environment(error.to_string()))?)
 }
 
-/// Prints a run for a pipeline.
-pub fn rendered(folder: &Path, rendering: Rendering, inconclusive: InconclusiveArg) -> Result<Exit, Problem> {
-    let library = crate::assets::library(None)?;
-    let (result, root) = intact(folder, &library)?;
-    let pack = super::pack(&library, Some(&result.protocol))?;
-    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
-    let flavour = Flavour {
-        inconclusive: inconclusive.into(),
+/// Prints a run for a pipeline, or writes it into files.
+pub fn rendered(folder: &Path, library: &Library, arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
+    let (result, root) = intact(folder, library)?;
+    let pack = super::pack(library, Some(&result.protocol))?;
+    let shown = Shown {
+        result: &result,
+        sources: &sources(&library.rules.catalogue, &library.rules.suites, &pack),
+        inconclusive: arguments.inconclusive,
         root: Some(&root),
+        folder,
     };
-    let text = match rendering {
-        Rendering::Junit => junit::render(&result, flavour),
-        Rendering::JunitRequirements => junit::by_requirement(&result, &quoted, flavour),
-        Rendering::Markdown => Ok(markdown::summary(&result, &quoted, folder.to_str())),
-        Rendering::CodeQuality => Ok(issues::code_quality(&result)),
-        Rendering::Sarif => Ok(issues::sarif(&result, &quoted)),
-    };
-    super::print(&text.map_err(|error| Problem::Environment(error.to_string()))?)
+    outputs.write(&shown).map_err(Problem::Environment)?;
+    for wanted in arguments.renderings.iter().filter(|wanted| wanted.file.is_none()) {
+        let text = shown.as_text(wanted.rendering);
+        super::print(&text.map_err(|error| Problem::Environment(error.to_string()))?)?;
+    }
+    Ok(Exit::Conforms)
 }
 
 /// The result of a bundle and its root hash, when every file is what the manifest says and the journal gives this result.

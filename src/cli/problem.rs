@@ -5,6 +5,8 @@ use serde_json::{Value, json};
 use tck_base::diagnostic::{Diagnostic, Span};
 
 use super::exit::Exit;
+use tck_journal::tool;
+use tck_report::no_result::{NoResult, Obstacle};
 
 /// What went wrong, by who can put it right.
 #[derive(Debug)]
@@ -15,6 +17,8 @@ pub enum Problem {
     NothingToDo(String),
     /// The world: ports, broker, disk, device.
     Environment(String),
+    /// The world, as a setting of the profile describes it: the port, the broker, the program of the device.
+    Bench(Box<Diagnostic>),
 }
 
 impl Problem {
@@ -24,7 +28,7 @@ impl Problem {
         match self {
             Self::Usage(_) => Exit::Usage,
             Self::NothingToDo(_) => Exit::NothingToDo,
-            Self::Environment(_) => Exit::Broken,
+            Self::Environment(_) | Self::Bench(_) => Exit::Broken,
         }
     }
 
@@ -32,18 +36,39 @@ impl Problem {
     #[must_use]
     pub fn to_json(&self) -> String {
         let (kind, problems) = match self {
-            Self::Usage(all) => {
-                let all = all.iter().map(|one| {
-                    json!({ "code": one.code, "title": one.title, "label": one.label, "hint": one.hint,
-                        "place": one.span.as_ref().map(Span::place) })
-                });
-                ("usage", all.collect())
-            }
+            Self::Usage(all) => ("usage", all.iter().map(shown).collect()),
             Self::NothingToDo(why) => ("nothing-to-do", vec![json!({ "title": why })]),
             Self::Environment(why) => ("environment", vec![json!({ "title": why })]),
+            Self::Bench(one) => ("environment", vec![shown(one)]),
         };
         let problems: Vec<Value> = problems;
         json!({ "error": { "kind": kind, "exit": self.exit().code(), "problems": problems } }).to_string()
+    }
+
+    /// What a pipeline is told, when nothing came of the command.
+    #[must_use]
+    pub fn no_result(&self, profile: Option<String>) -> NoResult {
+        let of = |one: &Diagnostic| Obstacle {
+            title: one.title.clone(),
+            text: one.render(false),
+            place: one.span.as_ref().map(|span| (span.source.name.clone(), span.line())),
+        };
+        let said = |why: &str| Obstacle {
+            title: why.to_owned(),
+            text: why.to_owned(),
+            place: None,
+        };
+        NoResult {
+            tool: tool(),
+            exit: self.exit().code(),
+            meaning: self.exit().meaning().to_owned(),
+            profile,
+            problems: match self {
+                Self::Usage(all) => all.iter().map(of).collect(),
+                Self::NothingToDo(why) | Self::Environment(why) => vec![said(why)],
+                Self::Bench(one) => vec![of(one)],
+            },
+        }
     }
 
     /// The message for standard error.
@@ -58,9 +83,16 @@ impl Problem {
                 }
                 text
             }
+            Self::Bench(one) => one.render(color),
             Self::NothingToDo(text) | Self::Environment(text) => format!("error: {}", crate::ui::escaped(text)),
         }
     }
+}
+
+/// A diagnostic for programs.
+fn shown(one: &Diagnostic) -> Value {
+    json!({ "code": one.code, "title": one.title, "label": one.label, "hint": one.hint,
+        "place": one.span.as_ref().map(Span::place) })
 }
 
 impl From<Vec<Diagnostic>> for Problem {

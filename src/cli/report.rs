@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::args::{Format, Report};
 use super::exit::Exit;
+use super::outputs::Outputs;
 use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::file::{self, NAME, PACKED, Recording};
@@ -15,7 +16,7 @@ use tck_result::RunResult;
 use tck_run::{Bundle, sources, write_all};
 
 /// `report`.
-pub fn report(arguments: &Report) -> Result<Exit, Problem> {
+pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     if let Some(folders) = &arguments.compare {
         return compare_runs(arguments, folders);
     }
@@ -25,17 +26,17 @@ pub fn report(arguments: &Report) -> Result<Exit, Problem> {
     if arguments.verify {
         return verify(folder, arguments);
     }
-    if let Some(rendering) = arguments.rendering {
-        return super::papers::rendered(folder, rendering, arguments.inconclusive);
-    }
     if arguments.certificate {
         return super::papers::certificate(folder);
     }
-    if arguments.attestation {
-        return super::papers::attestation(folder);
-    }
     let mut library = crate::assets::library(arguments.suites.own())?;
     library.add(&own_tests(folder)?)?;
+    if !arguments.renderings.is_empty() {
+        return super::papers::rendered(folder, &library, arguments, outputs);
+    }
+    if arguments.attestation {
+        return super::papers::attestation(folder, &library);
+    }
     let path = file::find(folder);
     let Recording { journal, torn } = file::read(&path).map_err(|error| {
         Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
@@ -220,9 +221,15 @@ fn compare_runs(arguments: &Report, folders: &[PathBuf]) -> Result<Exit, Problem
             super::print(&step.text())?;
         }
     }
-    let mut changes = steps
-        .iter()
-        .flat_map(|step| step.requirements.iter().chain(&step.tests));
-    let worse = changes.any(|change| change.trend() == compare::Trend::Worse);
-    Ok(if worse { Exit::DoesNotConform } else { Exit::Conforms })
+    Ok(match compare::outcome(&runs) {
+        compare::Outcome::Holds => Exit::Conforms,
+        compare::Outcome::Worse => Exit::DoesNotConform,
+        compare::Outcome::Undecided => {
+            super::tell(
+                "nothing became worse, but a run is partial or undecided, or a failure cannot be seen any more: nobody can \
+                 say that nothing did",
+            );
+            Exit::Undecided
+        }
+    })
 }

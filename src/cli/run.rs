@@ -3,6 +3,7 @@
 mod conclude;
 mod resume;
 
+use std::collections::BTreeMap;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,29 +11,34 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use resume::Earlier;
+use resume::{AboutRun, Earlier};
 
-use super::args;
+use super::args::{self, Shard};
 use super::device::{check_faults, pack_of, tolerate};
+use super::ending::Ending;
 use super::events::{About, Followed};
 use super::exit::Exit;
+use super::outputs::Outputs;
 use super::problem::Problem;
+use super::reference::{self, Asked};
 use super::screen::{Screen, Show};
-use super::signals::Signals;
-use crate::ui::{Desk, put_terminal_back};
+use crate::ui::Desk;
 use tck_base::clock::WallClock;
-use tck_base::diagnostic::Diagnostic;
+use tck_base::diagnostic::{Diagnostic, Source, Span};
+use tck_base::secrets::Secrets;
 use tck_journal::Vantage;
 use tck_journal::file::JournalWriter;
 use tck_judge::Library;
 use tck_judge::RunJudge;
+use tck_net::bench::LinkError;
 use tck_net::link::mqtt::BrokerChoice;
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};
 use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
-    Bundle, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually, write_result,
+    Bundle, Hold, LATEST, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
+    write_result,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
@@ -50,17 +56,23 @@ struct Job {
     earlier: Option<Earlier>,
     /// How many mock AGVs are asked for when a master control is tested.
     vehicles: Option<usize>,
+    /// Turns true when nobody waits any more for the run to end in good order.
+    quit: Option<watch::Receiver<bool>>,
 }
 
 /// `run`.
-pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
+pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
     let effective = profile::load(
         arguments.device.profile.as_deref(),
         &[arguments.device.settings(), arguments.said.clone()].concat(),
         &surroundings,
     )?;
+    let built_in = reference::is_tested(&Asked::of_run(arguments), &effective, &surroundings)?;
     let library = crate::assets::library(arguments.suites.own())?;
+    if let Some(own) = library.own() {
+        super::tell(&own);
+    }
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     let all = library.tests(role, &pack.id);
@@ -102,17 +114,6 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         None if arguments.shard.is_some() || arguments.certificate => Some(1),
         None => Some(u64::from(random.as_fields().0)),
     };
-    let device = &effective.profile.device;
-    let built_in =
-        arguments.device.profile.is_none() && device.manufacturer.is_none() && device.serial_number.is_none();
-    let altered = !arguments.fault.is_empty()
-        || !arguments.tolerance.is_empty()
-        || arguments.vehicle.0 != tck_simulate::Vehicle::default();
-    if !built_in && altered {
-        let title = "`--fault`, `--tolerance` and `--vehicle` are for the built-in device, and another device is tested \
-                     here";
-        return Err(Diagnostic::whole("usage", title).into());
-    }
     if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
@@ -135,8 +136,15 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
             run,
             command: std::env::args().collect(),
             fail_fast: arguments.selection.fail_fast,
-            repeat: arguments.selection.repeat,
+            repeat: match &earlier {
+                Some(earlier) => earlier.repeat.max(arguments.selection.repeat),
+                None => arguments.selection.repeat,
+            },
             certifies: arguments.certifies,
+            limits: Vec::from_iter(arguments.shard.map(|shard| {
+                let Shard { index, of } = shard;
+                format!("Only part {index} of {of} of the tests was run (--shard): what the other parts found is not in here.")
+            })),
         },
         library,
         pack,
@@ -146,8 +154,15 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
         certifies: arguments.certifies,
         vehicles: arguments.vehicles.map(|count| count as usize),
         earlier,
+        quit: None,
     };
     if arguments.selection.plan {
+        if !arguments.pipeline.renderings.is_empty() {
+            let title = "a plan runs nothing, so there is nothing that `--as` could write";
+            return Err(Diagnostic::whole("usage", title)
+                .hint("leave one of the two out")
+                .into());
+        }
         return job.plan(arguments, built_in, &surroundings);
     }
     if job.certifies && !built_in {
@@ -161,16 +176,17 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let mut desk = job.desk.clone();
     let outcome = runtime.block_on(async {
-        let stop = stop()?;
-        let interrupt = stop.subscribe();
-        job.desk = Desk::new(stop);
+        let ending = Ending::listen()?;
+        let interrupt = ending.interrupt.clone();
+        job.desk = ending.desk.clone();
+        job.quit = Some(ending.quit);
         desk = job.desk.clone();
         if arguments.in_virtual_time {
-            job.virtually(arguments, interrupt).await
+            job.virtually(arguments, interrupt, outputs).await
         } else if built_in {
-            job.built_in(arguments, interrupt).await
+            job.built_in(arguments, interrupt, outputs).await
         } else {
-            job.device(arguments, interrupt, &surroundings).await
+            job.device(arguments, interrupt, &surroundings, outputs).await
         }
     });
     // Sockets of a silent peer must not keep the process from ending.
@@ -179,27 +195,14 @@ pub fn run_command(arguments: &args::Run) -> Result<Exit, Problem> {
     outcome
 }
 
-/// A signal once ends the run in good order, twice at once.
-pub(super) fn interrupts() -> Result<watch::Receiver<bool>, Problem> {
-    Ok(stop()?.subscribe())
-}
-
-/// The same, and what else ends the run in good order.
-pub(super) fn stop() -> Result<watch::Sender<bool>, Problem> {
-    let (sender, mut stopped) = watch::channel(false);
-    let mut signals = Signals::listen()?;
-    let stop = sender.clone();
-    tokio::spawn(async move {
-        tokio::select! {
-            () = signals.next() => {}
-            _ = stopped.wait_for(|stopped| *stopped) => {}
-        }
-        stop.send_replace(true);
-        signals.next().await;
-        put_terminal_back();
-        std::process::exit(i32::from(Exit::Interrupted.code()));
-    });
-    Ok(sender)
+/// Who keeps hold of a device that a run starts, and where it is said at once what becomes of it.
+pub(super) fn hold(desk: &Desk) -> Hold {
+    let desk = desk.clone();
+    Hold {
+        // Where this program cannot be found, the process group of the device has to do.
+        supervisor: std::env::current_exe().ok(),
+        tell: Some(Arc::new(move |text| desk.say(text))),
+    }
 }
 
 /// The desk, where somebody sits there who can be asked.
@@ -217,7 +220,15 @@ impl Job {
             utc,
             &self.request.run,
         );
-        bundle.map_err(environment)
+        let bundle = bundle.map_err(environment)?;
+        if bundle.is_one_of_several() {
+            super::tell(&format!(
+                "another run is going on below {}, so `{LATEST}` leads to neither of them; give each a folder of its own with \
+                 --out",
+                self.output.out.display()
+            ));
+        }
+        Ok(bundle)
     }
 
     /// Shows what would be run.
@@ -241,6 +252,7 @@ impl Job {
     fn of_profile(&self, arguments: &args::Run, surroundings: &Surroundings) -> Result<SocketRun, Problem> {
         let profile = arguments.device.profile.as_deref();
         let place = Place {
+            profile: profile.map(Path::to_owned),
             folder: profile
                 .and_then(Path::parent)
                 .map_or_else(PathBuf::new, Path::to_path_buf),
@@ -252,10 +264,21 @@ impl Job {
         Ok(run)
     }
 
-    async fn virtually(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
+    async fn virtually(
+        self,
+        arguments: &args::Run,
+        interrupt: watch::Receiver<bool>,
+        outputs: &Outputs<'_>,
+    ) -> Result<Exit, Problem> {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
-        self.is_resumable(device.subject(), Vantage::Tap)?;
+        let settings = reference::settings(&Asked::of_run(arguments));
+        self.is_resumable(&AboutRun {
+            subject: device.subject(),
+            vantage: Vantage::Tap.word(),
+            settings: &settings,
+            files: &BTreeMap::new(),
+        })?;
         let bundle = self.bundle(device.subject(), utc)?;
         let writer = self.journal(&bundle)?;
         let mut terminal = self.screen(device.subject(), &bundle)?;
@@ -271,6 +294,8 @@ impl Job {
         run.command.clone_from(&self.request.command);
         run.fail_fast = self.request.fail_fast;
         run.repeat = self.request.repeat;
+        run.limits.clone_from(&self.request.limits);
+        run.settings = settings;
         run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
         if self.no_motion {
             run.motion = Err(NO_MOTION.to_owned());
@@ -286,7 +311,7 @@ impl Job {
             &mut saved,
         )
         .await;
-        self.conclude(&bundle, finished.map_err(environment)?, terminal)
+        self.conclude(&bundle, finished.map_err(environment)?, terminal, outputs)
     }
 
     fn built_in_device(&self, arguments: &args::Run) -> Result<BuiltIn, Problem> {
@@ -301,7 +326,12 @@ impl Job {
         Ok(device)
     }
 
-    async fn built_in(self, arguments: &args::Run, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
+    async fn built_in(
+        self,
+        arguments: &args::Run,
+        interrupt: watch::Receiver<bool>,
+        outputs: &Outputs<'_>,
+    ) -> Result<Exit, Problem> {
         let device = self.built_in_device(arguments)?;
         let mut run = SocketRun::built_in(device, &arguments.fault, &self.library, &self.pack);
         let bench = &self.effective.profile.bench;
@@ -316,7 +346,10 @@ impl Job {
             };
         }
         run.device.settings.clone_from(&self.effective.settings);
-        self.over_sockets(run, interrupt).await
+        run.device
+            .settings
+            .extend(reference::settings(&Asked::of_run(arguments)));
+        self.over_sockets(run, interrupt, outputs).await
     }
 
     async fn device(
@@ -324,12 +357,18 @@ impl Job {
         arguments: &args::Run,
         interrupt: watch::Receiver<bool>,
         surroundings: &Surroundings,
+        outputs: &Outputs<'_>,
     ) -> Result<Exit, Problem> {
         let run = self.of_profile(arguments, surroundings)?;
-        self.over_sockets(run, interrupt).await
+        self.over_sockets(run, interrupt, outputs).await
     }
 
-    async fn over_sockets(self, mut run: SocketRun, interrupt: watch::Receiver<bool>) -> Result<Exit, Problem> {
+    async fn over_sockets(
+        self,
+        mut run: SocketRun,
+        interrupt: watch::Receiver<bool>,
+        outputs: &Outputs<'_>,
+    ) -> Result<Exit, Problem> {
         if self.no_motion {
             run.device.stand_still(NO_MOTION);
         }
@@ -340,13 +379,22 @@ impl Job {
             } else {
                 Vantage::Subscriber
             };
-            self.is_resumable(&run.device.subject, vantage)?;
+            let about = AboutRun {
+                subject: &run.device.subject,
+                vantage: vantage.word(),
+                settings: &run.device.settings,
+                files: &run.device.files,
+            };
+            self.is_resumable(&about)?;
+            run.request.limits.extend(Earlier::limit(&about));
             run.options.clock = WallClock::going_on(going_on_at(Some(&earlier.journal)));
             run.earlier = Some(earlier.journal.clone());
         }
         let bundle = self.bundle(&run.device.subject, run.options.clock.origin_stamp().utc)?;
         let writer = self.journal(&bundle)?;
         run.device_log = Some(bundle.folder().join("device.log"));
+        run.hold = hold(&self.desk);
+        run.quit.clone_from(&self.quit);
         let mut terminal = self.screen(&run.device.subject, &bundle)?;
         let mut saved = saving(&bundle);
         let finished = run.carry_out(
@@ -357,12 +405,35 @@ impl Job {
             &mut terminal,
             &mut saved,
         );
-        let finished = finished.await.map_err(|error| match error {
-            RunError::Profile(all) => Problem::Usage(all),
-            RunError::Unknown(unknown) => Diagnostic::whole("fault", unknown.to_string()).into(),
-            other => environment(other),
-        })?;
-        self.conclude(&bundle, finished, terminal)
+        let finished = match finished.await {
+            Ok(finished) => finished,
+            Err(error) => {
+                drop(saved);
+                bundle.abandon();
+                return Err(self.could_not_begin(error));
+            }
+        };
+        self.conclude(&bundle, finished, terminal, outputs)
+    }
+
+    /// Why a run could not begin, at the place of the profile that it comes from.
+    fn could_not_begin(&self, error: RunError) -> Problem {
+        let setting = match &error {
+            RunError::Device(_) => Some("device.command"),
+            RunError::Bench(LinkError::Listen { .. }) => Some("bench.listen"),
+            RunError::Bench(_) => Some("bench.broker"),
+            RunError::Profile(_) | RunError::Unknown(_) | RunError::Record(_) | RunError::Engine(_) => None,
+        };
+        match (error, setting) {
+            (RunError::Profile(all), _) => Problem::Usage(all),
+            (RunError::Unknown(unknown), _) => Diagnostic::whole("fault", unknown.to_string()).into(),
+            (error, Some(setting)) => {
+                let text = crate::ui::escaped(&error.to_string());
+                let complaint = self.effective.complain(setting, "bench", text, "this one");
+                Problem::Bench(Box::new(without_secrets(complaint)))
+            }
+            (error, None) => environment(error),
+        }
     }
 
     /// The journal of the bundle. That of a run that is resumed begins with what is there already.
@@ -375,9 +446,9 @@ impl Job {
     }
 
     /// Whether the run before this one, if there is one, was about the same.
-    fn is_resumable(&self, subject: &Participant, vantage: Vantage) -> Result<(), Problem> {
+    fn is_resumable(&self, about: &AboutRun<'_>) -> Result<(), Problem> {
         let Some(earlier) = &self.earlier else { return Ok(()) };
-        earlier.is_about(subject, &self.pack, &self.library, vantage.word())?;
+        earlier.is_about(about, &self.pack, &self.library)?;
         let (kept, left) = (earlier.kept, self.request.tests.len());
         let verb = |count| if count == 1 { "is" } else { "are" };
         eprintln!(
@@ -420,6 +491,18 @@ impl Job {
         });
         Ok(followed)
     }
+}
+
+/// A complaint with the line of the profile as it may be read by anybody: an address may hold a token.
+fn without_secrets(mut complaint: Diagnostic) -> Diagnostic {
+    if let Some(span) = &complaint.span {
+        let shown = Secrets::default().out_of(span.text());
+        let text = &span.source.text;
+        let hidden = format!("{}{shown}{}", &text[..span.start], &text[span.end..]);
+        let source = Source::new(span.source.name.as_str(), hidden);
+        complaint.span = Some(Span::new(&source, span.start, span.start + shown.len()));
+    }
+    complaint
 }
 
 fn environment(error: impl std::fmt::Display) -> Problem {

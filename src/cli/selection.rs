@@ -13,7 +13,7 @@ use tck_judge::Library;
 use tck_pack::Pack;
 use tck_report::json;
 use tck_report::sources::Sources;
-use tck_run::{LATEST, sources};
+use tck_run::{newest, sources};
 use tck_suite::model::Test;
 
 /// The tests that patterns and flags select of all, in their order.
@@ -50,7 +50,7 @@ pub(super) fn selected(
         }
     }
     if wanted.last_failed {
-        let failed = failed_before(&reports.join(LATEST))?;
+        let failed = failed_before(&newest(reports))?;
         tests.retain(|test| failed.contains(test.id.as_str()));
         if tests.is_empty() {
             let title =

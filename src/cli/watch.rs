@@ -52,7 +52,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
         let mut screen = FullScreen::open(arguments.at.broker.clone())
             .map_err(|error| Problem::Environment(format!("cannot use the whole terminal: {error}; try --plain")))?;
         runtime.block_on(async {
-            let interrupt = super::run::interrupts()?;
+            let interrupt = super::ending::interrupts()?;
             Ok::<_, Problem>(run(&library.rules, settings, &mut screen, interrupt).await)
         })
     } else {
@@ -63,7 +63,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
             color: super::color() == tck_report::text::Color::Always,
         });
         runtime.block_on(async {
-            let interrupt = super::run::interrupts()?;
+            let interrupt = super::ending::interrupts()?;
             Ok::<_, Problem>(run(&library.rules, settings, &mut lines, interrupt).await)
         })
     };

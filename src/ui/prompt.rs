@@ -79,6 +79,26 @@ impl Desk {
         held(&self.shared.about).step = step.map(str::to_owned);
     }
 
+    /// Says something at once, whatever is drawn or asked.
+    pub fn say(&self, text: &str) {
+        let bar = held(&self.shared.about).bar.clone();
+        let mut terminal = io::stderr();
+        // While a person is asked, the terminal does nothing of itself at the end of a line.
+        let is_asked = self.shared.terminal.try_lock().is_err();
+        let lines = text.lines().map(escaped);
+        if is_asked {
+            for line in lines {
+                let _ = write!(terminal, "\r\n{line}\r\n");
+            }
+        } else {
+            bar.suspend(|| {
+                for line in lines {
+                    let _ = writeln!(terminal, "{line}");
+                }
+            });
+        }
+    }
+
     /// Waits until nobody is being asked, so that the terminal is as it was.
     pub fn at_rest(&self) {
         drop(held(&self.shared.terminal));

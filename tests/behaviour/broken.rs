@@ -74,7 +74,7 @@ fn a_device_killed_in_the_middle_of_a_test_leaves_the_rest_undecided() {
 }
 
 /// A reference AGV that the harness starts itself.
-fn started_by_the_harness() -> String {
+pub fn started_by_the_harness() -> String {
     let tool = env!("CARGO_BIN_EXE_vda5050-tck");
     format!(
         "command = [{tool:?}, \"simulate\", \"agv\", \"--broker\", \"mqtt://{{broker-host}}:{{broker-port}}\", \

@@ -4,6 +4,7 @@
 //! may panic. Few tests of the suite are used per run; whether the suite is right is proved elsewhere.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
+mod asked;
 mod auditing;
 mod bench;
 mod broken;
@@ -23,6 +24,7 @@ mod mosquitto;
 mod output;
 mod overhearing;
 mod papers;
+mod pipelines;
 mod planning;
 mod prompting;
 mod rejudging;
@@ -31,6 +33,7 @@ mod resuming;
 mod scripted;
 mod selecting;
 mod simulating;
+mod started;
 mod tool;
 mod transcripts;
 mod validating;

@@ -120,5 +120,5 @@ fn nothing_that_runs_is_4() {
     std::fs::write(folder.path().join("device.toml"), Profile::default().text()).unwrap();
     let moving = "order-acceptance/node-by-node";
     run_in(folder.path(), &["run", "--profile", "device.toml", moving, "--plan"]).code(4);
-    run_in(folder.path(), &["run", QUICK, REFUSAL, "--plan"]).code(0);
+    run_in(folder.path(), &["run", "--reference", QUICK, REFUSAL, "--plan"]).code(0);
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::bench::{Bench, Profile, QUICK, REFUSAL};
+use crate::bench::{Bench, Profile, REFUSAL};
 use crate::broken::{WATCHING, step_begun};
 
 /// A finished run in virtual time that fails one requirement.
@@ -174,10 +174,14 @@ fn what_is_no_run_is_2() {
 
 #[test]
 fn two_runs_are_compared_and_a_worse_one_is_1() {
-    let (bad, bad_folder) = failed_run();
+    // A fault that does not make the run longer: in a longer one monitors decide more.
+    let bad = Bench::new();
+    let refusal = ["run", "--virtual", "order-rejection/unreadable"];
+    bad.run(&[&refusal[..], &["--fault", "validation-error-fatal"]].concat())
+        .code(1);
+    let bad_folder = bad.bundle().display().to_string();
     let good = Bench::new();
-    good.run(&["run", "--virtual", "order-rejection/unreadable", QUICK])
-        .code(0);
+    good.run(&refusal).code(0);
     let good_folder = good.bundle().display().to_string();
     bad.run(&["report", "--compare", &good_folder, &bad_folder])
         .code(1)

@@ -122,7 +122,7 @@ fn a_failure_from_before_the_interruption_stays() {
     fs::create_dir(bench.path().join("killed")).unwrap();
     fs::write(bench.path().join("killed/journal.jsonl"), &text[..end]).unwrap();
     bench
-        .run(&["run", "--virtual", "--resume", "killed"])
+        .run(&[&["run", "--virtual", "--resume", "killed"], &fault[..]].concat())
         .code(1)
         .prints("Findings:");
     bench.is_whole();
@@ -131,7 +131,7 @@ fn a_failure_from_before_the_interruption_stays() {
 #[test]
 fn an_interrupted_run_is_gone_on_with_against_the_same_device_and_no_other() {
     let bench = Bench::new();
-    let mut profile = Profile::default().with(&[("quiet", "40 s"), ("connect", "50 s")]);
+    let mut profile = Profile::default().with(&[("quiet", "8 s"), ("connect", "50 s")]);
     profile.motion = true;
     let (mut run, port) = bench.start(&profile, &[QUICK, WAITING]);
     let agv = bench.agv(port, &[]);
@@ -154,14 +154,7 @@ fn an_interrupted_run_is_gone_on_with_against_the_same_device_and_no_other() {
         bundles(&bench.path().join("reports")).is_empty(),
         "a refusal leaves a bundle"
     );
-    let profile = Profile::default().with(&[("connect", "50 s")]);
-    let (run, port) = bench.start(
-        &Profile {
-            motion: true,
-            ..profile
-        },
-        &["--resume", "interrupted"],
-    );
+    let (run, port) = bench.start(&profile, &["--resume", "interrupted"]);
     let _agv = bench.agv(port, &[]);
     run.end().code(0).prints("Joined from 2 runs");
     let result = bench.result();

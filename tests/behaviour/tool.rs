@@ -13,9 +13,9 @@ const LIMIT: Duration = Duration::from_secs(60);
 /// The program with these arguments, in `folder`.
 pub fn tool(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vda5050-tck"));
-    for (name, _) in std::env::vars()
-        .filter(|(name, _)| name.starts_with("VDA5050_TCK_") || name.starts_with("GITHUB_") || name == "NO_COLOR")
-    {
+    for (name, _) in std::env::vars().filter(|(name, _)| {
+        name.starts_with("VDA5050_TCK_") || name.starts_with("GITHUB_") || ["CI", "NO_COLOR"].contains(&name.as_str())
+    }) {
         command.env_remove(name);
     }
     command
@@ -174,6 +174,11 @@ impl Running {
             .status()
             .unwrap();
         assert!(sent.success());
+    }
+
+    /// The number of the process.
+    pub fn id(&self) -> u32 {
+        self.child.id()
     }
 
     /// Ends it without a warning, as when the power is cut.

@@ -1,7 +1,8 @@
 //! Our own reference devices: without a fault everything passes, and the faults of this share are found.
 //!
 //! The whole proof, every fault and every clause in every version, is `vda5050-tck qualify`, which CI runs. Here a share
-//! of the faults is tried: those that the last change is about, and a part that is drawn by the commit.
+//! of the faults is tried: those that the change is about, and one part of eight. CI leaves the newest version out here
+//! (`QUALIFY_VERSIONS=older`), since it tries all of that one.
 
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::{Pack, Role};
@@ -39,7 +40,10 @@ fn prove(role: Role) {
     let library = library();
     let faults = share::faults(&library, role);
     assert!(!faults.is_empty(), "no fault is drawn");
-    for pack in library.rules.packs.all() {
+    let newest = &library.rules.packs.latest().id;
+    let older_only = std::env::var("QUALIFY_VERSIONS").is_ok_and(|said| said == "older");
+    let packs = library.rules.packs.all();
+    for pack in packs.iter().filter(|pack| !older_only || pack.id != *newest) {
         let outcome = tried(&library, pack, role, &faults);
         println!("{role}, VDA 5050 {}: {}", pack.version, outcome.summary());
         assert!(outcome.deciders.len() > 100, "only {} deciders", outcome.deciders.len());

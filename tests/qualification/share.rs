@@ -1,44 +1,62 @@
-//! The faults that `cargo test` tries: one in eight, drawn by the commit, and all that the last change is about.
+//! The faults that `cargo test` tries: one share of eight, and all that the change is about.
 //!
-//! `QUALIFY_SHARE` is the seed (the commit unless set), `QUALIFY_BASE` what the change is held against (the commit
-//! before the last one unless set).
+//! `QUALIFY_SHARE` is the number of the share (0 unless set), `QUALIFY_BASE` what
+//! the change is held against (unless set, where the branch leaves `main`).
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::process::Command;
 
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Role;
 use vda5050_tck::reference::Fault;
 use vda5050_tck::simulate::BuiltIn;
 
-use crate::seed::{drawn_by, git};
+use crate::seed::share;
 
 /// One in so many is tried.
 const SHARE: u64 = 8;
 
 /// The share of a side.
 pub fn faults(library: &Library, role: Role) -> Vec<Fault> {
-    let seed = drawn_by();
-    let base = std::env::var("QUALIFY_BASE").unwrap_or_else(|_| "HEAD~1".to_owned());
-    let change = git(&["diff", "--unified=0", &base, "--", "src", "crates", "suites"]).unwrap_or_default();
+    let number = share() % SHARE;
+    let base = std::env::var("QUALIFY_BASE")
+        .ok()
+        .or_else(|| git(&["merge-base", "main", "HEAD"]));
+    let change = base.and_then(|base| git(&["diff", "--unified=0", base.trim(), "--", "src", "crates", "suites"]));
+    let change = change.unwrap_or_default();
     let touched = touched(library, role, &change);
     let is_drawn = |fault: &Fault| {
         let mut hasher = DefaultHasher::new();
-        (seed.as_str(), fault.name).hash(&mut hasher);
-        hasher.finish().is_multiple_of(SHARE)
+        fault.name.hash(&mut hasher);
+        hasher.finish() % SHARE == number
     };
     let all = BuiltIn::faults(role).iter();
-    let share: Vec<Fault> = all
+    let tried: Vec<Fault> = all
         .filter(|fault| is_drawn(fault) || touched.contains(fault.name))
         .copied()
         .collect();
     println!(
-        "{role}: {} faults, seed {}, {} for the change",
-        share.len(),
-        seed,
+        "{role}: {} faults, share {number} of {SHARE}, {} for the change",
+        tried.len(),
         touched.len()
     );
-    share
+    tried
+}
+
+/// What git answers in this folder; `None` where there is no git, or where git refuses.
+fn git(arguments: &[&str]) -> Option<String> {
+    let folder = env!("CARGO_MANIFEST_DIR");
+    let output = Command::new("git")
+        .arg("-C")
+        .arg(folder)
+        .args(arguments)
+        .output()
+        .ok()?;
+    output
+        .status
+        .success()
+        .then(|| String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
 /// The faults that a change names, and those that are about a requirement of a test or monitor whose file is in it.

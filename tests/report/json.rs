@@ -133,7 +133,7 @@ fn a_comparison_says_what_got_worse_and_what_got_better() {
     assert!(
         back.requirements
             .iter()
-            .all(|change| change.trend() != compare::Trend::Worse)
+            .all(|change| change.trend != compare::Trend::Worse)
     );
     assert!(compare::compare(&after, &after).is_empty());
     assert_eq!(compare::compare(&after, &after).text(), "no verdict changed\n");
@@ -146,7 +146,7 @@ fn a_fail_that_was_not_there_before_is_worse() {
     after.requirements[2].verdict = Some(Verdict::Fail);
     let changes = compare::compare(&before, &after).requirements;
     assert_eq!(changes.len(), 1);
-    assert_eq!(changes[0].trend(), compare::Trend::Worse);
+    assert_eq!(changes[0].trend, compare::Trend::Worse);
 }
 
 proptest! {

@@ -3,8 +3,9 @@
 
 use std::process::{Command, Stdio};
 
+use proptest::prelude::*;
 use vda5050_tck::report::junit::{self, Flavour, Inconclusive};
-use vda5050_tck::result::{Repetition, RunResult};
+use vda5050_tck::result::{Repetition, RunResult, TestResult};
 use vda5050_tck::verdict::Verdict;
 
 use crate::samples;
@@ -42,7 +43,7 @@ fn flaky() -> RunResult {
         verdict: Some(verdict),
         seconds: 1.0,
         reason: None,
-        journal: None,
+        journal: Some((1, 2)),
     });
     let failed = result.tests.iter_mut().find(|test| test.verdict == Some(Verdict::Fail));
     failed.expect("a test that failed").repetitions = repetitions.collect();
@@ -52,7 +53,11 @@ fn flaky() -> RunResult {
 #[test]
 fn every_run_keeps_to_the_schema_of_the_xunit_plugin() {
     let flaky = flaky();
+    let mut long = samples::pass().0;
+    long.tests[0].seconds = 1.997;
+    long.tests[1].seconds = 1e9;
     for (name, result) in [
+        ("times", &long),
         ("pass", &samples::pass().0),
         ("fail", &samples::fail().0),
         ("hostile", &samples::hostile().0),
@@ -73,6 +78,50 @@ fn every_run_keeps_to_the_schema_of_the_xunit_plugin() {
     }
     let wrong = objections("<testsuites><testsuite name='a'/></testsuites>").expect("xmllint");
     assert!(wrong.contains("The attribute 'tests' is required"), "{wrong}");
+}
+
+/// What the schema says of a time (`SUREFIRE_TIME`), with at least one digit.
+fn is_time(text: &str) -> bool {
+    let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
+    let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    digits(whole) && digits(decimals) && decimals.len() <= 3 && !whole.is_empty()
+}
+
+proptest! {
+    #[test]
+    fn every_time_in_every_suite_keeps_to_the_schema(
+        seconds in prop::collection::vec(
+            prop_oneof![0.0..5.0_f64, (0_u32..200_000).prop_map(|millis| f64::from(millis) / 1000.0), any::<f64>()], 1..40),
+        groups in 1_usize..6,
+    ) {
+        let mut result = samples::pass().0;
+        let like = result.tests[0].clone();
+        result.tests = seconds.iter().enumerate().map(|(at, seconds)| TestResult {
+            id: format!("group-{}/test-{at} time=\"1.23456\"", at % groups),
+            seconds: *seconds,
+            reason: Some("]]> <testcase time=\"1.23456\"".to_owned()),
+            verdict: Some(Verdict::Fail),
+            ..like.clone()
+        }).collect();
+        let xml = junit::render(&result, Flavour::default()).expect("junit");
+        let document = roxmltree::Document::parse(&xml).expect("well-formed");
+        let timed = document.descendants().filter_map(|node| Some((node, node.attribute("time")?)));
+        let (mut all, mut sum) = (0, 0.0);
+        for (node, time) in timed {
+            prop_assert!(is_time(time), "{} in {:?}", time, node.tag_name());
+            all += 1;
+            if node.has_tag_name("testcase") {
+                sum += time.parse::<f64>().expect("number");
+            }
+        }
+        prop_assert!(all > seconds.len());
+        let suites = document.descendants().filter(|node| node.has_tag_name("testsuite"));
+        let suites: f64 = suites.map(|suite| suite.attribute("time").expect("time").parse::<f64>().expect("number")).sum();
+        prop_assert!((suites - sum).abs() <= 0.001 + sum * 1e-9, "{} {}", suites, sum);
+        // Names and texts are not touched.
+        let names = document.descendants().filter_map(|node| node.attribute("name"));
+        prop_assert!(names.filter(|name| name.contains("time=\"1.23456\"")).count() == seconds.len());
+    }
 }
 
 #[test]

@@ -186,13 +186,7 @@ mod tests {
     fn many_threads_find_what_one_finds() {
         let library = tck_testing::library();
         let pack = library.rules.packs.latest();
-        let one = traffic(
-            &library,
-            pack,
-            Role::Agv,
-            "order-acceptance/",
-            &["horizon-not-reported"],
-        );
+        let one = traffic(library, pack, Role::Agv, "order-acceptance/", &["horizon-not-reported"]);
         let mut all = Vec::new();
         for (number, message) in one.iter().enumerate() {
             for vehicle in 0..7 {

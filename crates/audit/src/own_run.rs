@@ -38,7 +38,7 @@ pub fn own_run(
         Event::RunBegun { header } => (**header).clone(),
         _ => return Err(JudgeError::NoHeader.into()),
     };
-    let mut judge = SideJudge::begin(rules, &header, &|monitor| options.wants_monitor(monitor))?.among_others();
+    let mut judge = SideJudge::begin(rules, &header, &|monitor| options.wants_monitor(monitor))?.among_others(&header);
     let mut found: BTreeMap<(String, String, Verdict), FindingResult> = BTreeMap::new();
     let mut messages = BTreeMap::new();
     let mut keep = |all: Vec<Observed>, at: jiff::Timestamp| {

@@ -45,7 +45,7 @@ fn proven(site: Site) -> BTreeSet<&'static str> {
         let injected = told.injected.clone();
         key.extend(injected.map(|injected| (injected.message, injected)));
     });
-    let found = found(&library, told.map(message));
+    let found = found(library, told.map(message));
     assert!(key.len() as u64 > site.faults * 99 / 100, "{}", key.len());
     let mut seen: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
     let mut wrong = Vec::new();
@@ -107,7 +107,7 @@ fn accuses_nobody_however_bad_the_recording(seed: u64, vehicles: usize, messages
     let whole: Vec<Message> = site.messages().map(message).collect();
     let bad = spoiled(&whole, seed);
     for recording in [whole, bad] {
-        let found = found(&library, recording.into_iter());
+        let found = found(library, recording.into_iter());
         assert!(found.is_empty(), "{:#?}", &found[..found.len().min(20)]);
     }
 }

@@ -219,7 +219,7 @@ mod tests {
             ),
             (Role::MasterControl, "dispatch/", "other-serial-number", "HDR-05"),
         ] {
-            let messages = traffic(&library, pack, role, tests, &[fault]);
+            let messages = traffic(library, pack, role, tests, &[fault]);
             let mut audit = Audit::new(&library.rules, Options::default()).expect("options");
             for message in &messages {
                 audit.observe(message.clone());

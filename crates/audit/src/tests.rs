@@ -110,8 +110,8 @@ fn who_did_nothing_wrong_is_accused_of_nothing_however_bad_the_recording() {
     let mut wrong = BTreeSet::new();
     for pack in library.rules.packs.all() {
         for (role, tests) in QUIET {
-            let whole = traffic(&library, pack, role, tests, &[]);
-            let judged = audited(&library, whole.clone());
+            let whole = traffic(library, pack, role, tests, &[]);
+            let judged = audited(library, whole.clone());
             wrong.extend(found(&judged, role));
             let sides = judged.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
             let mut sides = sides.filter(|side| side.role == role.word());
@@ -120,7 +120,7 @@ fn who_did_nothing_wrong_is_accused_of_nothing_however_bad_the_recording() {
                 "{role} {tests}: hardly anything was judged"
             );
             for seed in 0..12 {
-                wrong.extend(found(&audited(&library, spoiled(&whole, seed)), role));
+                wrong.extend(found(&audited(library, spoiled(&whole, seed)), role));
             }
         }
     }
@@ -142,8 +142,8 @@ fn what_is_wrong_is_found_with_its_place() {
         ),
         (Role::MasterControl, "dispatch/", "other-serial-number", "HDR-05"),
     ] {
-        let messages = traffic(&library, pack, role, tests, &[fault]);
-        let result = audited(&library, messages);
+        let messages = traffic(library, pack, role, tests, &[fault]);
+        let result = audited(library, messages);
         let found = found(&result, role);
         assert!(
             found.iter().any(|finding| finding.starts_with(requirement)),
@@ -157,11 +157,11 @@ fn what_is_wrong_is_found_with_its_place() {
 fn a_recording_without_times_is_judged_but_for_what_needs_them() {
     let library = tck_testing::library();
     let pack = library.rules.packs.latest();
-    let mut messages = traffic(&library, pack, Role::MasterControl, "dispatch/", &[]);
+    let mut messages = traffic(library, pack, Role::MasterControl, "dispatch/", &[]);
     for message in &mut messages {
         (message.at, message.retain) = (None, None);
     }
-    let result = audited(&library, messages);
+    let result = audited(library, messages);
     assert_eq!(found(&result, Role::MasterControl), BTreeSet::new());
     let sides = result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
     let mut commanded = sides.filter(|side| side.role == "master-control");
@@ -188,7 +188,7 @@ fn a_version_without_rules_is_named_and_not_judged() {
         after_gap: false,
         carried: None,
     };
-    let foreign = audited(&library, vec![message(r#"{"version":"9.1.0"}"#)]);
+    let foreign = audited(library, vec![message(r#"{"version":"9.1.0"}"#)]);
     assert_eq!((foreign.verdict, foreign.vehicles[0].sides.len()), (None, 0));
     assert!(
         foreign.vehicles[0]
@@ -196,7 +196,7 @@ fn a_version_without_rules_is_named_and_not_judged() {
             .as_deref()
             .is_some_and(|why| why.contains("9.1.0"))
     );
-    let silent = audited(&library, vec![message("nonsense"), message("")]);
+    let silent = audited(library, vec![message("nonsense"), message("")]);
     assert!(silent.vehicles[0].not_judged.is_some());
 }
 
@@ -208,7 +208,7 @@ fn a_vehicle_with_other_software_is_judged_by_each_of_its_versions() {
     let mut protocols = Vec::new();
     for pack in library.rules.packs.all() {
         let begun = day.last().and_then(|message: &Message| message.at);
-        let mut part = traffic(&library, pack, Role::Agv, tests, &[]);
+        let mut part = traffic(library, pack, Role::Agv, tests, &[]);
         let first = part[0].at.expect("a time").as_microsecond();
         for message in &mut part {
             let since = message.at.expect("a time").as_microsecond() - first;
@@ -218,7 +218,7 @@ fn a_vehicle_with_other_software_is_judged_by_each_of_its_versions() {
         protocols.push(pack.version.to_string());
         day.extend(part);
     }
-    let result = audited(&library, day);
+    let result = audited(library, day);
     let versions: Vec<&str> = result
         .vehicles
         .iter()

@@ -133,10 +133,10 @@ fn tests(role: Role) -> &'static [&'static str] {
 fn a_capture_of_a_run_gives_what_its_tap_gave() {
     let library = tck_testing::library();
     for (role, fault) in FAULTS {
-        let (records, wanted) = run(&library, role, tests(role), fault);
+        let (records, wanted) = run(library, role, tests(role), fault);
         assert_eq!(wanted.is_empty(), fault.is_none(), "{fault:?}: {wanted:?}");
         let frames = frames(&records);
-        let result = audited(&library, pcap(Link::Ethernet, &frames, 65_535));
+        let result = audited(library, pcap(Link::Ethernet, &frames, 65_535));
         assert_eq!(found(&result, role), wanted, "{role} {fault:?}");
         assert!(result.vehicles.iter().any(|vehicle| vehicle.vantage == "tap"));
         // From the middle on, and with losses, nobody is accused of anything else.
@@ -146,7 +146,7 @@ fn a_capture_of_a_run_gives_what_its_tap_gave() {
             number += 1;
             number % 50 != 0
         });
-        let found = found(&audited(&library, pcap(Link::Ethernet, &worse, 65_535)), role);
+        let found = found(&audited(library, pcap(Link::Ethernet, &worse, 65_535)), role);
         assert!(found.is_subset(&wanted), "{role} {fault:?}: {found:?}");
     }
 }
@@ -154,7 +154,7 @@ fn a_capture_of_a_run_gives_what_its_tap_gave() {
 #[test]
 fn a_bridge_is_not_held_against_the_vehicles_behind_it() {
     let library = tck_testing::library();
-    let (records, _) = run(&library, Role::Agv, tests(Role::Agv), Some("no-will"));
+    let (records, _) = run(library, Role::Agv, tests(Role::Agv), Some("no-will"));
     // The bridge speaks for another vehicle as well.
     let mut both = Vec::new();
     for record in records {
@@ -172,7 +172,7 @@ fn a_bridge_is_not_held_against_the_vehicles_behind_it() {
         }
         both.push(record);
     }
-    let result = audited(&library, pcap(Link::Ethernet, &frames(&both), 65_535));
+    let result = audited(library, pcap(Link::Ethernet, &frames(&both), 65_535));
     assert_eq!(result.vehicles.len(), 2);
     assert_eq!(found(&result, Role::Agv), BTreeSet::new());
 }

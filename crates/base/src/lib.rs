@@ -1,4 +1,4 @@
-//! What everything stands on: time, verdicts, diagnostics, YAML, patterns, curves and secrets.
+//! What everything stands on: time and its limits, verdicts, diagnostics, YAML, patterns, curves and secrets.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -7,5 +7,6 @@ pub mod diagnostic;
 pub mod nurbs;
 pub mod pattern;
 pub mod secrets;
+pub mod time;
 pub mod verdict;
 pub mod yaml;

@@ -6,11 +6,10 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::orders::{Blocking, Placed};
-use super::state::route::Shown;
-use super::traffic::{broken, elements, quote, remark, text};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Blocking, Fact, Listen, Observation, OrdersSent, Placed, SentOrder, Topic};
 
 /// How many actions of one state are looked at, and how many findings are remembered.
 const ACTIONS: usize = 256;
@@ -27,12 +26,13 @@ pub(super) const BLOCKING: Check = Check {
           vehicle themselves, are not held to this; another action than the one named `still` may move it, too, which \
           makes it a warning. Not judged after a cancelOrder, a change of mode, a fatal error or a failed action.",
     arguments: &["still"],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Shown, Fact::Orders],
     start: |_| Box::new(BlockingTypes::default()),
 };
 
 #[derive(Default)]
 struct BlockingTypes {
-    shown: Shown,
     /// What was found already: requirement and actionIds.
     known: BTreeSet<(&'static str, String, String)>,
 }
@@ -69,15 +69,20 @@ impl Listed<'_> {
 }
 
 impl Running for BlockingTypes {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(state) = self.shown.state(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(state) = context.world.shown().state(record) else {
             return false;
         };
-        let listed = self.listed(state);
+        let listed = Self::listed(state, context.world.orders());
         if listed.is_empty() {
             return false;
         }
-        let seq = entry.seq();
+        let seq = record.seq();
         let mut found = Vec::new();
         let of_nodes: Vec<&Listed<'_>> = listed.iter().filter(|action| !action.on_edge).collect();
         for (at, one) in of_nodes.iter().enumerate() {
@@ -103,28 +108,26 @@ impl Running for BlockingTypes {
 
 impl BlockingTypes {
     /// The actions of nodes whose list is known.
-    fn listed<'s>(&self, state: &'s Value) -> Vec<Listed<'s>> {
+    fn listed<'s>(state: &'s Value, orders: &OrdersSent) -> Vec<Listed<'s>> {
         let order = text(state, "orderId");
-        if self.shown.orders.of(order).any(|sent| !sent.sound) {
+        if orders.of(order).any(|sent| !sent.sound) {
             return Vec::new();
         }
         let all = elements(state, "actionStates").take(ACTIONS);
         all.filter_map(|action| {
             let id = text(action, "actionId");
-            let mut places = self.shown.orders.of(order).filter_map(|sent| {
+            let mut places = orders.of(order).filter_map(|sent| {
                 let here = sent.actions.iter().find(|placed| placed.action == id);
                 here.map(|placed| (placed, sent))
             });
             let (placed, sent) = places.next()?;
             // An update that says something else about the node leaves open what the vehicle goes by.
-            let list = |sent: &super::orders::SentOrder| -> Vec<Placed> {
+            let list = |sent: &SentOrder| -> Vec<Placed> {
                 let of_node = |other: &&Placed| other.sequence == placed.sequence;
                 sent.actions.iter().filter(of_node).cloned().collect()
             };
             let own = list(sent);
-            let clear = self
-                .shown
-                .orders
+            let clear = orders
                 .of(order)
                 .filter(|other| {
                     let mut all = other.nodes.iter().chain(&other.edges);

@@ -3,18 +3,14 @@
 //! What the state with the end of a cancellation has to show is left to `action/linked-state`.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::orders::{number, read_elements};
-use super::traffic::{
-    Traffic, actions, broken, elements, is_to_vehicle, outside_influence, quote, state, text, to_vehicle,
-};
+use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, number, text};
+use tck_world::{Fact, Listen, Observation, Topic, read_elements};
 
 /// How many cancellations and actions are looked at.
 const MANY: usize = 256;
@@ -27,6 +23,16 @@ pub(super) const COURSE: Check = Check {
           other order is sent. A cancelOrder is not WAITING in two states more than time.notice apart while an action \
           of the order is under way, nor in one that shows a later instant action FINISHED. Not judged over a restart, nor after what a person or a hook did.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Course::default()),
 };
 
@@ -42,20 +48,18 @@ struct Begun {
 
 #[derive(Default)]
 struct Course {
-    traffic: Traffic,
-    life: Continuity,
     /// Instant actions that were sent, whether they are a cancelOrder, and with which entry.
     sent: BTreeMap<String, (bool, u64)>,
     begun: BTreeMap<String, Begun>,
 }
 
 impl Course {
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        if is_to_vehicle("order", entry, context) {
+    fn learn(&mut self, record: &Observation<'_>) {
+        if record.is_to_vehicle(Topic::Order) {
             self.begun.clear();
             self.sent.retain(|_, (cancels, _)| !*cancels);
         }
-        let Some(message) = to_vehicle("instantActions", entry, context) else {
+        let Some(message) = record.to_vehicle(Topic::InstantActions) else {
             return;
         };
         for action in actions(message).take(MANY) {
@@ -64,7 +68,7 @@ impl Course {
             }
             let id = text(action, "actionId").chars().take(512).collect();
             self.sent
-                .insert(id, (text(action, "actionType") == "cancelOrder", entry.seq()));
+                .insert(id, (text(action, "actionType") == "cancelOrder", record.seq()));
         }
     }
 
@@ -76,17 +80,21 @@ impl Course {
 }
 
 impl Running for Course {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.learn(entry, context);
-        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.learn(record);
+        if context.world.restarts().now(record) || record.outside_influence() {
             self.begun.clear();
             self.sent.clear();
         }
         if !self.sent.values().any(|(cancels, _)| *cancels) {
             return false;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let Some(last) = number(state, "lastNodeSequenceId") else {
@@ -94,8 +102,8 @@ impl Running for Course {
         };
         let order = text(state, "orderId");
         let works = self.works(state);
-        let now = entry.at().moment;
-        let patience = context.time("notice").unwrap_or(Duration::from_secs(1));
+        let now = record.at().moment;
+        let patience = context.time.notice;
         let mut judged = false;
         for action in elements(state, "actionStates").take(MANY) {
             let id = text(action, "actionId");
@@ -125,7 +133,7 @@ impl Running for Course {
                     begun.farthest,
                     quote(id)
                 );
-                findings.push(broken("ORD-CANCEL-02", entry.seq(), text));
+                findings.push(broken("ORD-CANCEL-02", record.seq(), text));
                 continue;
             }
             if status != "WAITING" || !works {
@@ -144,7 +152,7 @@ impl Running for Course {
                     "cancelOrder {} is WAITING, not RUNNING, while an action of the order runs",
                     quote(id)
                 );
-                findings.push(broken("ORD-CANCEL-06", entry.seq(), text));
+                findings.push(broken("ORD-CANCEL-06", record.seq(), text));
             }
         }
         judged

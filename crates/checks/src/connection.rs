@@ -5,12 +5,12 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::traffic::{Traffic, broken, lag, outside_influence, remark, says_broken, text};
+use crate::finding::{broken, remark, says_broken};
 use tck_base::clock::Moment;
-use tck_check::device_publish;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
+use tck_world::members::text;
+use tck_world::{End, Listen, Observation, Topic};
 
 const CONNECTIONS: usize = 32;
 
@@ -23,6 +23,8 @@ pub(super) const ONLINE_AFTER_CONNECT: Check = Check {
           While states arrive, CONNECTIONBROKEN or OFFLINE does not stay the last word for longer than time.react: of \
           a state and an ONLINE sent before it, either may arrive first, so the time counts from the first state.",
     arguments: &[],
+    listens: &[Listen::Everything],
+    reads: &[],
     start: |_| Box::new(OnlineAfterConnect::default()),
 };
 
@@ -32,12 +34,13 @@ pub(super) const VALUES: Check = Check {
     decides: &["CONN-10"],
     doc: "The device does not publish CONNECTIONBROKEN itself: that is the broker's to say, as its last will.",
     arguments: &[],
-    start: |_| Box::new(Values::default()),
+    listens: &[Listen::Published(Topic::Connection)],
+    reads: &[],
+    start: |_| Box::new(Values),
 };
 
 #[derive(Default)]
 struct OnlineAfterConnect {
-    traffic: Traffic,
     open: VecDeque<Session>,
     /// Connections accepted so far, for telling the first from a return.
     online_before: bool,
@@ -63,7 +66,7 @@ struct Stale {
 
 impl OnlineAfterConnect {
     fn limit(context: &CheckContext<'_>) -> Duration {
-        context.time("react").unwrap_or(Duration::from_secs(31))
+        context.time.react
     }
 
     /// The session of a connection, begun if it is new.
@@ -85,8 +88,8 @@ impl OnlineAfterConnect {
         &mut self.open[at]
     }
 
-    fn packets(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        match entry.event() {
+    fn packets(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        match record.event() {
             Event::Packet {
                 connection,
                 packet: Packet::Connect { .. },
@@ -108,31 +111,34 @@ impl OnlineAfterConnect {
             } => self.open.retain(|session| session.connection != *connection),
             _ => {}
         }
-        let (Some(message), Some((connection, ..))) = (self.traffic.published(entry, context), device_publish(entry))
-        else {
+        let (Some(message), Some(publish)) = (record.published(), record.device_publish()) else {
             return false;
         };
         // A device may keep one client for its connection topic and another one for its states.
         let announced = self.open.iter().any(|session| session.online);
-        let Some(session) = self.open.iter_mut().find(|session| session.connection == connection) else {
+        let Some(session) = self
+            .open
+            .iter_mut()
+            .find(|session| session.connection == publish.connection)
+        else {
             return false;
         };
         match message.name {
             "connection"
-                if entry
+                if record
                     .json()
                     .is_some_and(|value| text(value, "connectionState") == "ONLINE") =>
             {
                 if session.first_state.is_some() && !session.online && !session.late {
                     let words = "ONLINE is published after the first state of the connection";
-                    findings.push(remark("CONN-05", entry.seq(), words));
+                    findings.push(remark("CONN-05", record.seq(), words));
                 }
                 session.online = true;
                 self.online_before = true;
                 true
             }
             "state" if !session.online && !announced => {
-                session.first_state.get_or_insert((entry.at().moment, entry.seq()));
+                session.first_state.get_or_insert((record.at().moment, record.seq()));
                 false
             }
             _ => false,
@@ -140,15 +146,15 @@ impl OnlineAfterConnect {
     }
 
     /// Connections whose time to say ONLINE is up.
-    fn overdue(&mut self, now: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        if self.traffic.disturbed || self.open.iter().any(|session| session.online) {
+    fn overdue(&mut self, now: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        if now.link.disturbed || self.open.iter().any(|session| session.online) {
             return;
         }
         for session in &mut self.open {
             let Some((since, seq)) = session.first_state else {
                 continue;
             };
-            if session.accepted && !session.late && now.since(since) > Self::limit(context) {
+            if session.accepted && !session.late && now.moment.since(since) > Self::limit(context) {
                 session.late = true;
                 let id = if self.online_before { "CONN-11" } else { "CONN-05" };
                 findings.push(broken(
@@ -160,19 +166,19 @@ impl OnlineAfterConnect {
         }
     }
 
-    fn delivered(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        if self.traffic.disturbed || matches!(entry.event(), Event::Fault { .. }) {
+    fn delivered(&mut self, record: &Observation<'_>, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        if record.link.disturbed || matches!(record.event(), Event::Fault { .. }) {
             // What the harness did to the link is not the device's fault; its time counts from the repair.
             if let Some(stale) = &mut self.stale {
                 stale.since = None;
             }
         }
-        let Some(message) = self.traffic.delivered(entry, context) else {
+        let Some(message) = record.delivered() else {
             return;
         };
         match message.name {
             "connection" => {
-                let Some(value) = entry.json() else { return };
+                let Some(value) = record.json() else { return };
                 let said = match text(value, "connectionState") {
                     "OFFLINE" => Some("OFFLINE"),
                     _ if says_broken(value) => Some("CONNECTIONBROKEN"),
@@ -184,16 +190,16 @@ impl OnlineAfterConnect {
                     reported: false,
                 });
             }
-            "state" if !self.traffic.disturbed => {
+            "state" if !record.link.disturbed => {
                 let limit = Self::limit(context);
                 let Some(stale) = self.stale.as_mut().filter(|stale| !stale.reported) else {
                     return;
                 };
-                let now = entry.at().moment;
+                let now = record.at().moment;
                 if now.since(*stale.since.get_or_insert(now)) > limit {
                     stale.reported = true;
                     let words = format!("states arrive, but the last word on connection is still {}", stale.said);
-                    findings.push(broken("CONN-11", entry.seq(), words));
+                    findings.push(broken("CONN-11", record.seq(), words));
                 }
             }
             _ => {}
@@ -202,9 +208,13 @@ impl OnlineAfterConnect {
 }
 
 impl Running for OnlineAfterConnect {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Some(late) = lag(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if let Some(late) = record.lag() {
             // What the harness had no time for is not held against the device.
             let sessions = self.open.iter_mut().filter_map(|session| session.first_state.as_mut());
             let stale = self.stale.iter_mut().filter_map(|stale| stale.since.as_mut());
@@ -212,42 +222,34 @@ impl Running for OnlineAfterConnect {
                 *since = *since + late;
             }
         }
-        if outside_influence(entry) || matches!(entry.event(), Event::Fault { .. }) {
+        if record.outside_influence() || matches!(record.event(), Event::Fault { .. }) {
             for session in &mut self.open {
                 session.first_state = None;
             }
         }
-        let judged = self.packets(entry, context, findings);
-        self.overdue(entry.at().moment, context, findings);
-        self.delivered(entry, context, findings);
-        judged
-            || self
-                .traffic
-                .delivered(entry, context)
-                .is_some_and(|message| message.name == "connection")
+        let judged = self.packets(record, context, findings);
+        self.overdue(&record.now(), context, findings);
+        self.delivered(record, context, findings);
+        judged || record.delivered().is_some_and(|message| message.name == "connection")
     }
 
-    fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+    fn finish(&mut self, end: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         self.overdue(end, context, findings);
     }
 }
 
-#[derive(Default)]
-struct Values {
-    traffic: Traffic,
-}
+struct Values;
 
 impl Running for Values {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let published = self.traffic.published(entry, context);
-        if !self.traffic.tap || published.is_none_or(|message| message.name != "connection") {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let published = record.published();
+        if !record.link.tap || published.is_none_or(|message| message.name != "connection") {
             return false;
         }
-        if entry.json().is_some_and(says_broken) {
+        if record.json().is_some_and(says_broken) {
             findings.push(remark(
                 "CONN-10",
-                entry.seq(),
+                record.seq(),
                 "the device itself publishes that its connection is broken",
             ));
         }

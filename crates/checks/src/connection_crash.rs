@@ -5,12 +5,12 @@
 
 use std::time::Duration;
 
-use super::orders::Malformed;
-use super::traffic::{Traffic, broken, elements, is_to_vehicle, outside_influence, remark, state, text, to_vehicle};
+use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Close, Event, Packet};
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// A connection that ends within this time of a message ends right behind it.
 const BEHIND: Duration = Duration::from_secs(2);
@@ -27,12 +27,25 @@ pub(super) const STAYS: Check = Check {
           instant action. What the harness cuts and what hooks do is left out, and a vehicle whose link also breaks while \
           nothing is sent is not failed.",
     arguments: &[],
+    listens: &[
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::Connect,
+        Listen::Disconnect,
+        Listen::Closed,
+        Listen::Sent(Topic::Order),
+        Listen::Sent(Topic::InstantActions),
+        Listen::Published(Topic::State),
+        Listen::Received(Topic::State),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Malformed],
     start: |_| Box::new(Stays::default()),
 };
 
 #[derive(Default)]
 struct Stays {
-    traffic: Traffic,
     /// The message sent last, if no state has come since that answers it.
     sent: Option<Sent>,
     influenced: Option<Moment>,
@@ -53,44 +66,44 @@ struct Sent {
 }
 
 impl Stays {
-    fn note_sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let is_sent = matches!(entry.event(), Event::Sent { .. });
+    fn note_sent(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
+        let is_sent = matches!(record.event(), Event::Sent { .. });
         if !is_sent {
             return;
         }
-        let (what, requirement) = if is_to_vehicle("order", entry, context) {
-            let bad = Malformed::is_malformed(entry, context);
-            if bad {
+        let (what, requirement) = if record.is_to_vehicle(Topic::Order) {
+            if context.world.malformed().is_malformed(record) {
                 ("a malformed order", "ORD-REJ-02")
             } else {
                 ("an order", "ORD-FLOW-06")
             }
-        } else if is_to_vehicle("instantActions", entry, context) {
+        } else if record.is_to_vehicle(Topic::InstantActions) {
             ("instantActions", "IACT-03")
         } else {
             return;
         };
-        let ids = to_vehicle("order", entry, context)
+        let ids = record
+            .to_vehicle(Topic::Order)
             .map(|order| vec![text(order, "orderId").to_owned()])
             .unwrap_or_default();
-        let actions = to_vehicle("instantActions", entry, context).into_iter();
+        let actions = record.to_vehicle(Topic::InstantActions).into_iter();
         let actions = actions.flat_map(|message| elements(message, "actions").take(50));
         let ids = ids
             .into_iter()
             .chain(actions.map(|action| text(action, "actionId").to_owned()));
         self.sent = Some(Sent {
-            seq: entry.seq(),
-            at: entry.at().moment,
+            seq: record.seq(),
+            at: record.at().moment,
             what,
             requirement,
             ids: ids.collect(),
         });
     }
 
-    fn closed(&mut self, entry: &Entry, findings: &mut Vec<CheckFinding>) {
-        let now = entry.at().moment;
+    fn closed(&mut self, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
+        let now = record.at().moment;
         let influenced = self.influenced.is_some_and(|at| now.since(at) < INFLUENCE);
-        if self.traffic.disturbed || self.announced || influenced {
+        if record.link.disturbed || self.announced || influenced {
             return;
         }
         let behind = self.sent.take().filter(|sent| now.since(sent.at) <= BEHIND);
@@ -112,9 +125,9 @@ impl Stays {
             }
         );
         findings.push(if times > 1 && !self.unrelated {
-            broken(sent.requirement, entry.seq(), text)
+            broken(sent.requirement, record.seq(), text)
         } else {
-            remark(sent.requirement, entry.seq(), text)
+            remark(sent.requirement, record.seq(), text)
         });
         if times > 64 {
             self.crashes.truncate(2);
@@ -123,13 +136,17 @@ impl Stays {
 }
 
 impl Running for Stays {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if outside_influence(entry) || matches!(entry.event(), Event::Fault { .. }) {
-            self.influenced = Some(entry.at().moment);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if record.outside_influence() || matches!(record.event(), Event::Fault { .. }) {
+            self.influenced = Some(record.at().moment);
         }
-        self.note_sent(entry, context);
-        match entry.event() {
+        self.note_sent(record, context);
+        match record.event() {
             Event::Packet {
                 packet: Packet::Connect { .. },
                 ..
@@ -140,8 +157,8 @@ impl Running for Stays {
             } => self.announced = true,
             Event::Packet {
                 connection,
-                packet: Packet::Publish { topic, .. },
-            } if context.topic_name(topic) == Some("state") => {
+                packet: Packet::Publish { .. },
+            } if record.topic() == Some(Topic::State) => {
                 self.speaks_on = Some(*connection);
             }
             Event::Closed {
@@ -149,11 +166,11 @@ impl Running for Stays {
                 how: Close::DeviceFin | Close::DeviceReset,
                 ..
             } if self.speaks_on == Some(*connection) => {
-                self.closed(entry, findings);
+                self.closed(record, findings);
             }
             _ => {}
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let named = |id: &str| {

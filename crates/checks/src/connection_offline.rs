@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::traffic::{Traffic, broken, text};
+use crate::finding::broken;
 use tck_base::clock::Moment;
-use tck_check::device_publish;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, Packet};
+use tck_world::members::text;
+use tck_world::{Listen, Observation, Topic};
 
 /// How many connections are kept in mind.
 const CONNECTIONS: usize = 32;
@@ -25,12 +25,17 @@ pub(super) const SAYS_OFFLINE: Check = Check {
           does not go on: found when states and then ONLINE follow on the same connection, or states for more than \
           five seconds.",
     arguments: &[],
+    listens: &[
+        Listen::Disconnect,
+        Listen::Published(Topic::State),
+        Listen::Published(Topic::Connection),
+    ],
+    reads: &[],
     start: |_| Box::new(SaysOffline::default()),
 };
 
 #[derive(Default)]
 struct SaysOffline {
-    traffic: Traffic,
     /// What was said last on the connection topic, by connection: whether it was ONLINE.
     online: BTreeMap<u64, bool>,
     /// The connections on which OFFLINE was said last.
@@ -47,13 +52,14 @@ struct Gone {
 
 impl SaysOffline {
     /// Whether the vehicle goes on with a connection on which it has said OFFLINE.
-    fn goes_on(&mut self, connection: u64, name: Option<&str>, entry: &Entry) -> bool {
-        let now = entry.at().moment;
-        let said = |what: &str| name == Some("connection") && says(entry, what);
+    fn goes_on(&mut self, connection: u64, record: &Observation<'_>) -> bool {
+        let now = record.at().moment;
+        let is_state = record.topic() == Some(Topic::State);
+        let said = |what: &str| record.topic() == Some(Topic::Connection) && says(record, what);
         let mut found = false;
         if let Some(gone) = self.gone.get_mut(&connection) {
-            gone.goes_on |= name == Some("state");
-            let long = name == Some("state") && now.since(gone.since) > LAST_WORDS;
+            gone.goes_on |= is_state;
+            let long = is_state && now.since(gone.since) > LAST_WORDS;
             found = (long || said("ONLINE") && gone.goes_on) && !gone.told;
             gone.told |= found;
         }
@@ -69,51 +75,49 @@ impl SaysOffline {
         } else if said("ONLINE") {
             self.gone.remove(&connection);
         }
-        found && !self.traffic.disturbed
+        found && !record.link.disturbed
     }
 }
 
-fn says(entry: &Entry, what: &str) -> bool {
-    entry
+fn says(record: &Observation<'_>, what: &str) -> bool {
+    record
         .json()
         .is_some_and(|message| text(message, "connectionState") == what)
 }
 
 impl Running for SaysOffline {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Some((connection, topic, ..)) = device_publish(entry)
-            && self.goes_on(connection, context.topic_name(topic), entry)
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let publish = record.device_publish();
+        if let Some(publish) = &publish
+            && self.goes_on(publish.connection, record)
         {
             let text = "the vehicle has said OFFLINE, and goes on sending states on the same connection";
-            findings.push(broken("CONN-08", entry.seq(), text));
+            findings.push(broken("CONN-08", record.seq(), text));
         }
-        if let Some((connection, topic, ..)) = device_publish(entry)
-            && context.topic_name(topic) == Some("connection")
-        {
-            let said = says(entry, "ONLINE");
+        if let Some(publish) = publish.filter(|_| record.topic() == Some(Topic::Connection)) {
+            let said = says(record, "ONLINE");
             if self.online.len() >= CONNECTIONS {
                 self.online.pop_first();
             }
-            self.online.insert(connection, said);
-            return says(entry, "OFFLINE");
+            self.online.insert(publish.connection, said);
+            return says(record, "OFFLINE");
         }
-        if entry.record.direction == Some(Direction::ToDevice) {
+        if record.entry.record.direction == Some(Direction::ToDevice) {
             return false;
         }
         let Event::Packet {
             connection,
             packet: Packet::Disconnect { code: 0 },
-        } = entry.event()
+        } = record.event()
         else {
             return false;
         };
-        let Some(online) = self.online.remove(connection).filter(|_| !self.traffic.disturbed) else {
+        let Some(online) = self.online.remove(connection).filter(|_| !record.link.disturbed) else {
             return false;
         };
         if online {
             let text = "the vehicle disconnects in good order, and has not said OFFLINE before";
-            findings.push(broken("CONN-07", entry.seq(), text));
+            findings.push(broken("CONN-07", record.seq(), text));
         }
         true
     }

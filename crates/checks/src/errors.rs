@@ -6,11 +6,10 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::orders::number;
-use super::traffic::{Traffic, actions, broken, elements, is_to_vehicle, outside_influence, state, text, to_vehicle};
+use crate::finding::broken;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, number, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actionIds of instant actions are kept in mind.
 const ACTIONS: usize = 256;
@@ -24,13 +23,21 @@ pub(super) const PERSIST: Check = Check {
           restart or a change of operating mode ends the watch; a cut of the link by the harness does not, as long as the \
           vehicle counts its headerId on.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Persist::default()),
 };
 
 #[derive(Default)]
 struct Persist {
-    traffic: Traffic,
-    life: Continuity,
     /// Whether the last thing sent to the vehicle was an order.
     after_order: bool,
     /// Whether no state has come since the last instant action.
@@ -55,14 +62,18 @@ fn requirement(error_type: &str) -> Option<(&'static str, &'static str)> {
 }
 
 impl Running for Persist {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sent(entry, context);
-        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.sent(record);
+        if context.world.restarts().now(record) || record.outside_influence() {
             self.watched.clear();
             self.shown = None;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         if !state.get("errors").is_some_and(Value::is_array) {
@@ -101,14 +112,14 @@ impl Running for Persist {
                 ("validationError", "ORD-REJ-03")
             };
             let text = format!("the {name} of message #{since} is gone, although no new order was accepted");
-            findings.push(broken(id, entry.seq(), text));
+            findings.push(broken(id, record.seq(), text));
         }
         // The first state of a run tells nothing about what an error answers.
         if before.is_some() && self.after_order {
             for (listed, instant) in &now {
                 let new = !self.listed.contains(listed);
                 if let Some((kind, _)) = requirement(listed).filter(|_| new && !instant) {
-                    self.watched.insert(kind, entry.seq());
+                    self.watched.insert(kind, record.seq());
                 }
             }
         }
@@ -118,15 +129,15 @@ impl Running for Persist {
 }
 
 impl Persist {
-    fn sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        if is_to_vehicle("order", entry, context) {
+    fn sent(&mut self, record: &Observation<'_>) {
+        if record.is_to_vehicle(Topic::Order) {
             // Right after an instant action nobody knows which of the two an error answers.
             self.after_order = !self.instant_pending;
-        } else if is_to_vehicle("instantActions", entry, context) {
+        } else if record.is_to_vehicle(Topic::InstantActions) {
             self.after_order = false;
             self.instant_pending = true;
         }
-        if let Some(message) = to_vehicle("instantActions", entry, context) {
+        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
             let ids = actions(message).map(|action| text(action, "actionId").to_owned());
             self.instant.extend(ids);
             let excess = self.instant.len().saturating_sub(ACTIONS);

@@ -6,9 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, is_to_vehicle, quote, state, text};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// How many actions, errors and references are looked at.
 const MANY: usize = 256;
@@ -20,12 +21,17 @@ pub(super) const BLAME: Check = Check {
     doc: "An error that is new in the state that first shows an action FAILED, and references a listed action, references \
           one that has FAILED, unless another new error names the failed one. Not judged when something was sent since the state before, which the error may answer.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(Blame::default()),
 };
 
 #[derive(Default)]
 struct Blame {
-    traffic: Traffic,
     /// Whether an order was sent since the last state.
     sent: bool,
     /// Errors of the last state.
@@ -35,10 +41,9 @@ struct Blame {
 }
 
 impl Running for Blame {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sent |= is_to_vehicle("order", entry, context) || is_to_vehicle("instantActions", entry, context);
-        let Some(state) = state(self.traffic, entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.sent |= record.is_to_vehicle(Topic::Order) || record.is_to_vehicle(Topic::InstantActions);
+        let Some(state) = record.state() else {
             return false;
         };
         let statuses: BTreeMap<&str, &str> = elements(state, "actionStates")
@@ -92,7 +97,7 @@ impl Running for Blame {
                     quote(one),
                     quote(other)
                 );
-                findings.push(broken("BP-03", entry.seq(), text));
+                findings.push(broken("BP-03", record.seq(), text));
                 judged = true;
             }
         }

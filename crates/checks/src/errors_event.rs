@@ -3,15 +3,14 @@
 //! Whether something had to be an error is left to the tests: a vehicle that takes over what it should refuse has none.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, remark, state, text};
+use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
-use tck_journal::event::Event;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Seen, Topic};
 
 /// How many errors of a state, and texts of what was sent, are looked at.
 const MANY: usize = 256;
@@ -23,12 +22,13 @@ pub(super) const ON_EVENT: Check = Check {
     doc: "The first new error that answers what was sent, by its type or by naming it, is in a state within time.event; \
           up to time.eventWarning is a warning. Without such an error nothing is judged.",
     arguments: &[],
+    listens: &[Listen::AnySent, Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(OnEvent::default()),
 };
 
 #[derive(Default)]
 struct OnEvent {
-    traffic: Traffic,
     /// When the last message was sent, and the texts in it.
     stimulus: Option<(Moment, BTreeSet<String>)>,
     /// Errors of the last state before it, and of the last state: type, level, references.
@@ -68,20 +68,22 @@ fn is_refusal(kind: &str, context: &CheckContext<'_>) -> bool {
 }
 
 impl Running for OnEvent {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Event::Sent { topic, .. } = entry.event()
-            && context.topic_name(topic).is_some()
-        {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if record.seen == Some(Seen::Sent) && record.topic().is_some() {
             let mut sent = BTreeSet::new();
-            if let Some(message) = entry.json() {
+            if let Some(message) = record.json() {
                 texts(message, &mut sent);
             }
-            self.stimulus = Some((entry.at().moment, sent));
+            self.stimulus = Some((record.at().moment, sent));
             self.before.clone_from(&self.latest);
             self.judged = false;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let errors: Vec<&Value> = elements(state, "errors").take(MANY).collect();
@@ -98,17 +100,17 @@ impl Running for OnEvent {
             return false;
         }
         self.judged = true;
-        let took = entry.at().moment.since(*since);
-        let soft = context.time("event").unwrap_or(Duration::from_secs(1));
-        let hard = context.time("eventWarning").map_or(soft, |hard| hard.max(soft));
+        let took = record.at().moment.since(*since);
+        let soft = context.time.event;
+        let hard = context.time.event_warning.max(soft);
         let text = format!(
             "the error is published {:.1} s after what caused it",
             took.as_secs_f64()
         );
         if took > hard {
-            findings.push(broken("STATE-05", entry.seq(), text));
+            findings.push(broken("STATE-05", record.seq(), text));
         } else if took > soft {
-            findings.push(remark("STATE-05", entry.seq(), text));
+            findings.push(remark("STATE-05", record.seq(), text));
         }
         true
     }

@@ -2,11 +2,10 @@
 
 use serde_json::Value;
 
-use super::orders::last_node;
-use super::traffic::{Traffic, elements, remark, state, text, to_vehicle};
-use tck_base::clock::Moment;
+use crate::finding::remark;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{End, Listen, Observation, Topic, last_node};
 
 /// See the module.
 pub(super) const READY: Check = Check {
@@ -16,12 +15,13 @@ pub(super) const READY: Check = Check {
           an order. One that stands until the end of the window is remarked on, by the ruling of the catalogue: if it \
           has taken the order over, and the order named `order` also if it has not.",
     arguments: &["order"],
+    listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(Ready::default()),
 };
 
 #[derive(Default)]
 struct Ready {
-    traffic: Traffic,
     /// orderId of the last order sent.
     order: Option<String>,
     /// The last state, if the vehicle could have set out and had not.
@@ -43,15 +43,19 @@ fn only_warns(state: &Value) -> bool {
 }
 
 impl Running for Ready {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, _findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Some(order) = to_vehicle("order", entry, context) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        _findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if let Some(order) = record.to_vehicle(Topic::Order) {
             self.order = Some(text(order, "orderId").chars().take(512).collect());
             self.waits = None;
             self.started_at = None;
             self.set_out = false;
         }
-        let Some(state) = state(self.traffic, entry, context).filter(|_| self.order.is_some()) else {
+        let Some(state) = record.state().filter(|_| self.order.is_some()) else {
             return false;
         };
         let here = last_node(state);
@@ -65,11 +69,11 @@ impl Running for Ready {
         let ahead = elements(state, "nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
         let asked = context.with.get("order").and_then(Value::as_str) == order;
         let taken = Some(text(state, "orderId")) == order && ahead;
-        self.waits = (warns && !self.set_out && (asked || taken)).then_some(entry.seq());
+        self.waits = (warns && !self.set_out && (asked || taken)).then_some(record.seq());
         warns && self.set_out
     }
 
-    fn finish(&mut self, _end: Moment, _context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+    fn finish(&mut self, _: &End, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         if let Some(seq) = self.waits.filter(|_| !self.set_out) {
             let text = "the vehicle reports warnings only, and does not set out";
             findings.push(remark("ERR-03", seq, text));

@@ -7,9 +7,10 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, quote, remark, show, text};
+use crate::finding::{broken, quote, remark, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// `factsheet/limits`.
 pub(super) const LIMITS: Check = Check {
@@ -18,7 +19,9 @@ pub(super) const LIMITS: Check = Check {
     doc: "Each member of maxStringLens and maxArrayLens is a number under its literal name, which for arrays has a dot: what \
           comes before the dot is no object that holds the numbers. Members of other names are not judged.",
     arguments: &[],
-    start: |_| Box::new(Limits::default()),
+    listens: &[Listen::Delivered(Topic::Factsheet)],
+    reads: &[],
+    start: |_| Box::new(Limits),
 };
 
 /// How many elements of a list are looked at.
@@ -31,25 +34,23 @@ pub(super) const CONSISTENCY: Check = Check {
     doc: "Load sets have different names, the polygons of the 2D envelopes do not cross themselves, and no minimum of \
           the physical parameters is above its maximum, which is a warning.",
     arguments: &[],
-    start: |_| Box::new(Consistency::default()),
+    listens: &[Listen::Delivered(Topic::Factsheet)],
+    reads: &[],
+    start: |_| Box::new(Consistency),
 };
 
-#[derive(Default)]
-struct Consistency {
-    traffic: Traffic,
-}
+struct Consistency;
 
 impl Running for Consistency {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let message = self.traffic.delivered(entry, context);
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let message = record.delivered();
         if message.is_none_or(|message| message.name != "factsheet") {
             return false;
         }
-        let Some(factsheet) = entry.json().filter(|value| value.is_object()) else {
+        let Some(factsheet) = record.json().filter(|value| value.is_object()) else {
             return false;
         };
-        let seq = entry.seq();
+        let seq = record.seq();
         let mut names = BTreeSet::new();
         for set in factsheet
             .get("loadSpecification")
@@ -115,19 +116,15 @@ const FIRST_PARTS: [&str; 13] = [
     "id",
 ];
 
-#[derive(Default)]
-struct Limits {
-    traffic: Traffic,
-}
+struct Limits;
 
 impl Running for Limits {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let message = self.traffic.delivered(entry, context);
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let message = record.delivered();
         if message.is_none_or(|message| message.name != "factsheet") {
             return false;
         }
-        let limits = entry.json().and_then(|sheet| sheet.get("protocolLimits"));
+        let limits = record.json().and_then(|sheet| sheet.get("protocolLimits"));
         let mut judged = false;
         for name in ["maxStringLens", "maxArrayLens"] {
             let members = limits.and_then(|limits| limits.get(name)?.as_object());
@@ -136,7 +133,7 @@ impl Running for Limits {
                 // A manufacturer may add members of any kind.
                 if (value.is_object() || value.is_array()) && FIRST_PARTS.contains(&key.as_str()) {
                     let text = format!("{name}.{} holds {}, which is no number", quote(key), show(value));
-                    findings.push(broken("FACT-05", entry.seq(), text));
+                    findings.push(broken("FACT-05", record.seq(), text));
                 }
             }
         }

@@ -5,9 +5,10 @@
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, elements, quote, remark, text};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// How many elements of a list are looked at.
 const ELEMENTS: usize = 512;
@@ -19,22 +20,25 @@ pub(super) const PREDEFINED: Check = Check {
     doc: "No action and no parameter in the factsheet is a predefined one in another spelling. One that contains the \
           words of a predefined one is a warning.",
     arguments: &[],
-    start: |_| Box::new(Predefined::default()),
+    listens: &[Listen::Delivered(Topic::Factsheet)],
+    reads: &[],
+    start: |_| Box::new(Predefined),
 };
 
-#[derive(Default)]
-struct Predefined {
-    traffic: Traffic,
-}
+struct Predefined;
 
 impl Running for Predefined {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let message = self.traffic.delivered(entry, context);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let message = record.delivered();
         if message.is_none_or(|message| message.name != "factsheet") {
             return false;
         }
-        let features = entry.json().and_then(|factsheet| factsheet.get("protocolFeatures"));
+        let features = record.json().and_then(|factsheet| factsheet.get("protocolFeatures"));
         let predefined = context.pack.vocabulary().get("action").and_then(Value::as_object);
         let (Some(features), Some(predefined)) = (features, predefined) else {
             return false;
@@ -47,12 +51,12 @@ impl Running for Predefined {
             findings.push(match odd.how {
                 How::Respelled => broken(
                     requirement,
-                    entry.seq(),
+                    record.seq(),
                     format!("{name}{whose} is {} in another spelling", odd.like),
                 ),
                 How::Alike => remark(
                     requirement,
-                    entry.seq(),
+                    record.seq(),
                     format!("{name}{whose} looks like {}", odd.like),
                 ),
             });

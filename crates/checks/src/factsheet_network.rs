@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, maybe_restarted, outside_influence, show};
+use crate::finding::{broken, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
+use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
 pub(super) const NETWORK: Check = Check {
@@ -14,40 +14,47 @@ pub(super) const NETWORK: Check = Check {
     doc: "vehicleConfig.network says the same in every factsheet of one connection. Without a tap a connection lasts from one \
           connection message to the next.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Published(Topic::Factsheet),
+    ],
+    reads: &[],
     start: |_| Box::new(Network::default()),
 };
 
 #[derive(Default)]
 struct Network {
-    traffic: Traffic,
     said: Option<Value>,
 }
 
 impl Running for Network {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let connects = matches!(
-            entry.event(),
+            record.event(),
             Event::Packet {
                 packet: Packet::Connect { .. },
                 ..
             }
         );
-        let anew = connects || !self.traffic.tap && maybe_restarted(self.traffic, entry, context);
-        if anew || outside_influence(entry) {
+        let anew = connects || !record.link.tap && record.may_be_a_restart();
+        if anew || record.outside_influence() {
             self.said = None;
         }
-        let message = self.traffic.published(entry, context);
+        let message = record.published();
         if message.is_none_or(|message| message.name != "factsheet") {
             return false;
         }
-        let Some(network) = entry.json().and_then(|sheet| sheet.pointer("/vehicleConfig/network")) else {
+        let Some(network) = record.json().and_then(|sheet| sheet.pointer("/vehicleConfig/network")) else {
             return false;
         };
         let before = self.said.replace(network.clone());
         if let Some(before) = before.as_ref().filter(|before| *before != network) {
             let text = format!("the network data were {}, and are {} now", show(before), show(network));
-            findings.push(broken("FACT-10", entry.seq(), text));
+            findings.push(broken("FACT-10", record.seq(), text));
         }
         before.is_some()
     }

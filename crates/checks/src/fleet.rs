@@ -1,10 +1,10 @@
 //! `fleet/commanded`: whether every vehicle of a fleet gets its order.
 
-use super::traffic::{Traffic, remark};
+use crate::finding::remark;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::Event;
+use tck_world::{End, Listen, Observation};
 
 /// `fleet/commanded`.
 pub(super) const COMMANDED: Check = Check {
@@ -14,12 +14,13 @@ pub(super) const COMMANDED: Check = Check {
           within `time.react`. A vehicle that gets none is a warning: how many vehicles one product controls is its \
           own matter, and the count is there to be read.",
     arguments: &[],
+    listens: &[Listen::Everything],
+    reads: &[],
     start: |_| Box::new(Commanded::default()),
 };
 
 #[derive(Default)]
 struct Commanded {
-    traffic: Traffic,
     /// Until when an order has to come, and the entry that asked for it.
     asked: Option<(Moment, u64)>,
     /// Whether an order has come since the hook was begun: a hook is recorded when it has answered, and a master
@@ -40,31 +41,31 @@ impl Commanded {
 }
 
 impl Running for Commanded {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let now = entry.at().moment;
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let now = record.at().moment;
         let mut judged = self.overdue(now, findings, context.identity.1);
-        if matches!(entry.event(), Event::Mark { .. } | Event::Bound { .. }) {
+        if matches!(record.event(), Event::Mark { .. } | Event::Bound { .. }) {
             self.came = false;
         }
         if let Event::Hook {
             ok: true,
             vehicle: Some(vehicle),
             ..
-        } = entry.event()
+        } = record.event()
             && vehicle == context.identity.1
-            && let Some(react) = context.time("react")
         {
             if self.came {
                 judged = true;
             } else {
-                self.asked = Some((now + react, entry.seq()));
+                self.asked = Some((now + context.time.react, record.seq()));
             }
         }
-        let ordered = self
-            .traffic
-            .delivered(entry, context)
-            .is_some_and(|message| message.name == "order");
+        let ordered = record.delivered().is_some_and(|message| message.name == "order");
         if ordered {
             self.came = true;
             judged |= self.asked.take().is_some();
@@ -72,8 +73,8 @@ impl Running for Commanded {
         judged
     }
 
-    fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        self.overdue(end, findings, context.identity.1);
+    fn finish(&mut self, end: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        self.overdue(end.moment, findings, context.identity.1);
     }
 }
 

@@ -1,12 +1,9 @@
 //! `fleet/each-heard`: of each vehicle all topics are heard, and not some of them only.
 
-use std::time::Duration;
-
-use super::traffic::{Traffic, broken, quote};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
-use tck_journal::event::Event;
 use tck_pack::Role;
+use tck_world::{Listen, Observation, Seen, Topic};
 
 /// See the module.
 pub(super) const EACH_HEARD: Check = Check {
@@ -16,12 +13,13 @@ pub(super) const EACH_HEARD: Check = Check {
           subscribed to the others as well, `time.react` after it has subscribed to anything last. Seen by the tap; a kept \
           session, of which the broker remembers more, is not judged.",
     arguments: &[],
+    listens: &[Listen::Sent(Topic::State)],
+    reads: &[],
     start: |_| Box::new(EachHeard::default()),
 };
 
 #[derive(Default)]
 struct EachHeard {
-    traffic: Traffic,
     told: bool,
 }
 
@@ -29,20 +27,21 @@ struct EachHeard {
 const TOPICS: [&str; 3] = ["state", "connection", "factsheet"];
 
 impl Running for EachHeard {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Event::Sent { topic, .. } = entry.event() else {
-            return false;
-        };
-        let own = context.topic_name(topic) == Some("state") && context.role == Role::MasterControl;
-        if !own || !self.traffic.tap || self.traffic.disturbed {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let own = record.is(Seen::Sent, Topic::State) && context.role == Role::MasterControl;
+        if !own || !record.link.tap || record.link.disturbed {
             return false;
         }
-        let settled = context.time("react").unwrap_or(Duration::from_secs(31));
-        let fleet = context.shared.fleet.borrow();
+        let settled = context.time.react;
+        let fleet = context.world.fleet().borrow();
         let hears = |name: &&str| {
             let topic = context.topics.get(*name)?;
-            fleet.hears(topic, entry.at().moment, settled)
+            fleet.hears(topic, record.at().moment, settled)
         };
         let all: Option<Vec<bool>> = TOPICS.iter().map(hears).collect();
         let Some(all) = all.filter(|all| all.contains(&true)) else {
@@ -52,7 +51,7 @@ impl Running for EachHeard {
             self.told = true;
             let (name, vehicle) = (TOPICS[at], quote(context.identity.1));
             let text = format!("topic {name} of vehicle {vehicle} is not subscribed, though another one of it is");
-            findings.push(broken("TOPIC-14", entry.seq(), text));
+            findings.push(broken("TOPIC-14", record.seq(), text));
         }
         true
     }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::orders::number;
-use super::traffic::{Traffic, broken, elements, quote, text};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::Event;
+use tck_world::members::{elements, number, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
 pub(super) const OWN_ORDERS: Check = Check {
@@ -15,6 +15,8 @@ pub(super) const OWN_ORDERS: Check = Check {
     doc: "An update that goes on behind the first node of its order comes to the vehicle that was given the order. Not \
           judged for an order both vehicles were given, and not where the order may have been lost on the way.",
     arguments: &[],
+    listens: &[Listen::Begin, Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Box::new(OwnOrders::default()),
 };
 
@@ -23,23 +25,26 @@ const ORDERS: usize = 4096;
 
 #[derive(Default)]
 struct OwnOrders {
-    traffic: Traffic,
     /// Where the vehicle stands in the fleet.
     place: Option<usize>,
     own: BTreeSet<String>,
 }
 
 impl Running for OwnOrders {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Event::RunBegun { header } = entry.event() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if let Event::RunBegun { header } = record.event() {
             let mut all = header.vehicles.iter();
             self.place =
                 all.position(|one| (one.manufacturer.as_str(), one.serial_number.as_str()) == context.identity);
         }
-        let message = self.traffic.delivered(entry, context);
-        let order = message.filter(|message| message.name == "order").and(entry.json());
-        let Some((order, place)) = order.filter(|_| !self.traffic.disturbed).zip(self.place) else {
+        let message = record.delivered();
+        let order = message.filter(|message| message.name == "order").and(record.json());
+        let Some((order, place)) = order.filter(|_| !record.link.disturbed).zip(self.place) else {
             return false;
         };
         let id = text(order, "orderId");
@@ -48,13 +53,13 @@ impl Running for OwnOrders {
             .min();
         let goes_on = number(order, "orderUpdateId") > Some(0) && first > Some(0);
         let known = self.own.contains(id);
-        let owner = context.shared.fleet.borrow().owner(id);
+        let owner = context.world.fleet().borrow().owner(id);
         if goes_on && !known && owner.is_some_and(|owner| owner != place) {
             let text = format!(
                 "an update of order {} comes, which another vehicle was given",
                 quote(id)
             );
-            findings.push(broken("TOPIC-13", entry.seq(), text));
+            findings.push(broken("TOPIC-13", record.seq(), text));
         }
         if self.own.len() < ORDERS && !goes_on {
             self.own.insert(id.to_owned());

@@ -8,12 +8,12 @@ use std::time::Duration;
 
 use regex::Regex;
 
-use super::traffic::{Traffic, broken, quote, remark, says_broken, show};
+use crate::finding::{broken, quote, remark, says_broken, show};
 use tck_base::clock::Moment;
 use tck_base::pattern::whole;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_pack::Role;
+use tck_world::{Listen, Observation};
 
 /// How far the clock of a device may be off before it is remarked on.
 const CLOCK_TOLERANCE: Duration = Duration::from_secs(300);
@@ -33,6 +33,8 @@ pub(super) const TIMESTAMP: Check = Check {
           Message after message at whole half hours from the clock of the harness is local time, and a time that does \
           not change from message to message of a topic is none.",
     arguments: &[],
+    listens: &[Listen::AnyDelivered],
+    reads: &[],
     start: |_| Box::new(Timestamp::default()),
 };
 
@@ -44,6 +46,8 @@ pub(super) const IDENTITY: Check = Check {
           topic, is a warning; a master control that names anybody else than the vehicle it sends to breaks HDR-05. The \
           serial number keeps to its characters, and neither holds a slash.",
     arguments: &[],
+    listens: &[Listen::AnyDelivered],
+    reads: &[],
     start: |_| Box::new(Identity::default()),
 };
 
@@ -54,7 +58,9 @@ pub(super) const VERSION: Check = Check {
     doc: "version is three numbers with dots, and its first two are those of the protocol version the device is \
           judged by.",
     arguments: &[],
-    start: |_| Box::new(Version::default()),
+    listens: &[Listen::AnyDelivered],
+    reads: &[],
+    start: |_| Box::new(Version),
 };
 
 static TIMESTAMP_FORM: LazyLock<Option<Regex>> =
@@ -62,7 +68,6 @@ static TIMESTAMP_FORM: LazyLock<Option<Regex>> =
 
 #[derive(Default)]
 struct Timestamp {
-    traffic: Traffic,
     /// By topic: the last time written, since when, in how many messages, and the last headerId.
     written: BTreeMap<String, Stood>,
     /// How many messages in a row were whole half hours off.
@@ -113,55 +118,54 @@ impl Timestamp {
 }
 
 impl Running for Timestamp {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(message) = self.traffic.delivered(entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(message) = record.delivered() else {
             return false;
         };
-        let Some(value) = entry.json() else { return false };
+        let Some(value) = record.json() else { return false };
         let Some(written) = value.get("timestamp") else {
             return false;
         };
         let Some(written) = written.as_str() else {
             let text = format!("timestamp {} on {} is no time in UTC", show(written), message.name);
-            findings.push(broken("HDR-03", entry.seq(), text));
+            findings.push(broken("HDR-03", record.seq(), text));
             return true;
         };
         let form = TIMESTAMP_FORM.as_ref().and_then(|form| form.captures(written));
         let (Some(form), Ok(time)) = (form, written.parse::<jiff::Timestamp>()) else {
             let text = format!("timestamp {} on {} is no time in UTC", quote(written), message.name);
-            findings.push(broken("HDR-03", entry.seq(), text));
+            findings.push(broken("HDR-03", record.seq(), text));
             return true;
         };
         let digits = form.get(1).map_or(0, |digits| digits.len());
         if digits != 2 {
             let text = format!("timestamp {} has {digits} fraction digits instead of 2", quote(written));
-            findings.push(remark("HDR-03", entry.seq(), text));
+            findings.push(remark("HDR-03", record.seq(), text));
         }
-        let apart = time.duration_since(entry.at().utc).unsigned_abs();
+        let apart = time.duration_since(record.at().utc).unsigned_abs();
         // The broker sends the will long after it was written.
         let will = message.name == "connection" && says_broken(value);
         if will {
             return true;
         }
         let id = value.get("headerId").and_then(whole);
-        if self.stands_still(message.name, written, id, entry.at().moment) {
+        if self.stands_still(message.name, written, id, record.at().moment) {
             let text = format!("timestamp {} stands still on {}", quote(written), message.name);
-            findings.push(broken("HDR-03", entry.seq(), text));
+            findings.push(broken("HDR-03", record.seq(), text));
         }
         if self.is_local(apart) {
             let text = format!(
                 "timestamp {} and those before it are whole half hours away from UTC: local time with a Z",
                 quote(written)
             );
-            findings.push(broken("HDR-03", entry.seq(), text));
+            findings.push(broken("HDR-03", record.seq(), text));
         } else if apart > CLOCK_TOLERANCE {
             let text = format!(
                 "timestamp {} is {} s away from the clock of the harness",
                 quote(written),
                 apart.as_secs()
             );
-            findings.push(remark("HDR-03", entry.seq(), text));
+            findings.push(remark("HDR-03", record.seq(), text));
         }
         true
     }
@@ -169,21 +173,24 @@ impl Running for Timestamp {
 
 #[derive(Default)]
 struct Identity {
-    traffic: Traffic,
     seen: Option<(String, String)>,
 }
 
 impl Running for Identity {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(message) = self.traffic.delivered(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(message) = record.delivered() else {
             return false;
         };
-        let field = |name| entry.json()?.get(name)?.as_str();
+        let field = |name| record.json()?.get(name)?.as_str();
         let (Some(manufacturer), Some(serial)) = (field("manufacturer"), field("serialNumber")) else {
             return false;
         };
-        let seq = entry.seq();
+        let seq = record.seq();
         for (name, value, own) in [
             ("manufacturer", manufacturer, context.identity.0),
             ("serialNumber", serial, context.identity.1),
@@ -245,18 +252,19 @@ fn bounded(text: &str) -> String {
     text.chars().take(256).collect()
 }
 
-#[derive(Default)]
-struct Version {
-    traffic: Traffic,
-}
+struct Version;
 
 impl Running for Version {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(message) = self.traffic.delivered(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(message) = record.delivered() else {
             return false;
         };
-        let Some(written) = entry.json().and_then(|value| value.get("version")?.as_str()) else {
+        let Some(written) = record.json().and_then(|value| value.get("version")?.as_str()) else {
             return false;
         };
         let parts: Vec<Option<u64>> = written
@@ -273,7 +281,7 @@ impl Running for Version {
                 quote(written),
                 message.name
             );
-            findings.push(broken("HDR-04", entry.seq(), text));
+            findings.push(broken("HDR-04", record.seq(), text));
             return true;
         };
         let expected = context.pack.version;
@@ -285,7 +293,7 @@ impl Running for Version {
                 expected.major,
                 expected.minor
             );
-            findings.push(broken("HDR-04", entry.seq(), text));
+            findings.push(broken("HDR-04", record.seq(), text));
         }
         true
     }

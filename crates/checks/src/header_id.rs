@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, broken, remark, says_broken, show, unclear};
+use crate::finding::{broken, remark, says_broken, show, unclear};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
 use tck_pack::Role;
+use tck_world::{Listen, Observation};
 
 /// See the module.
 pub(super) const ID_RISES: Check = Check {
@@ -21,6 +21,16 @@ pub(super) const ID_RISES: Check = Check {
           harness has broken is a warning, and so is one count for the topics of all vehicles; the last will is exempt. At the tap \
           the PUBLISH packets count; a subscriber cannot tell a gap from a lost message, which is inconclusive.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Fault,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Undecodable,
+        Listen::AnyDelivered,
+        Listen::AnyPublished,
+    ],
+    reads: &[],
     start: |_| Box::new(IdRises::default()),
 };
 
@@ -29,7 +39,6 @@ const RESTARTS: [&str; 3] = ["start", "shutdown", "configure"];
 
 #[derive(Default)]
 struct IdRises {
-    traffic: Traffic,
     /// The last id per topic name; there are only a handful of names.
     last: BTreeMap<String, u32>,
     /// The last ids before a link that only the harness has broken.
@@ -37,9 +46,13 @@ struct IdRises {
 }
 
 impl Running for IdRises {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        match entry.event() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        match record.event() {
             // A device may count anew after a restart, and nobody can tell a restart from a new connection.
             Event::Packet {
                 packet: Packet::Connect { .. },
@@ -50,7 +63,7 @@ impl Running for IdRises {
             // What makes a master control act does not restart it.
             Event::Hook { hook, .. } if context.role == Role::MasterControl && !RESTARTS.contains(&hook.as_str()) => {}
             // Its farewell belongs to the count, and at the tap nothing is lost on the way.
-            Event::Hook { hook, .. } if self.traffic.tap && hook == "shutdown" => {}
+            Event::Hook { hook, .. } if record.link.tap && hook == "shutdown" => {}
             // Messages may be lost on the way while the harness plays with the link or somebody with the device.
             Event::Hook { .. } | Event::Answer { .. } | Event::Undecodable { .. } => {
                 self.last.clear();
@@ -59,25 +72,25 @@ impl Running for IdRises {
             _ => {}
         }
         // The id before this one on the topics of that name, whatever vehicle they are for.
-        let shared = context.shared.fleet.borrow().before(entry.seq());
-        let Some(message) = self.traffic.published(entry, context) else {
+        let shared = context.world.fleet().borrow().before(record.seq());
+        let Some(message) = record.published() else {
             return false;
         };
-        if self.traffic.disturbed {
+        if record.link.disturbed {
             return false;
         }
-        let Some(value) = entry.json().filter(|value| value.is_object()) else {
+        let Some(value) = record.json().filter(|value| value.is_object()) else {
             self.last.remove(message.name);
             return false;
         };
-        if !self.traffic.tap && message.name == "connection" {
+        if !record.link.tap && message.name == "connection" {
             // Either the will, or the sign of a new connection: the count may begin anew on every topic.
             if says_broken(value) {
                 return false;
             }
             self.last.clear();
         }
-        let Some(id) = Self::read(value.get("headerId"), message.name, entry, findings) else {
+        let Some(id) = Self::read(value.get("headerId"), message.name, record, findings) else {
             self.last.remove(message.name);
             return true;
         };
@@ -86,7 +99,7 @@ impl Running for IdRises {
                 "headerId {id} on {} follows {before}: a link that was only broken lets the count begin anew",
                 message.name
             );
-            findings.push(remark("HDR-02", entry.seq(), text));
+            findings.push(remark("HDR-02", record.seq(), text));
         }
         let before = self.last.insert(message.name.to_owned(), id);
         let Some(before) = before else { return true };
@@ -98,19 +111,19 @@ impl Running for IdRises {
         let text = format!("headerId {id} follows {before} on {}", message.name);
         if shared.is_some_and(|last| last != before && id == last.wrapping_add(1)) {
             let text = format!("{text}: the topics of all vehicles are counted together");
-            findings.push(remark("HDR-02", entry.seq(), text));
-        } else if self.traffic.tap || (again && id > 1) {
-            findings.push(broken("HDR-02", entry.seq(), text));
+            findings.push(remark("HDR-02", record.seq(), text));
+        } else if record.link.tap || (again && id > 1) {
+            findings.push(broken("HDR-02", record.seq(), text));
         } else if again || id < before {
             findings.push(unclear(
                 "HDR-02",
-                entry.seq(),
+                record.seq(),
                 format!("{text}; whether the device was restarted cannot be seen without the tap"),
             ));
         } else {
             findings.push(unclear(
                 "HDR-02",
-                entry.seq(),
+                record.seq(),
                 format!("{text}; whether messages were lost cannot be seen without the tap"),
             ));
         }
@@ -119,7 +132,12 @@ impl Running for IdRises {
 }
 
 impl IdRises {
-    fn read(id: Option<&Value>, topic: &str, entry: &Entry, findings: &mut Vec<CheckFinding>) -> Option<u32> {
+    fn read(
+        id: Option<&Value>,
+        topic: &str,
+        record: &Observation<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> Option<u32> {
         // A missing headerId is another requirement's business.
         let id = id?;
         if let Some(id) = id.as_u64().and_then(|id| u32::try_from(id).ok()) {
@@ -130,7 +148,7 @@ impl IdRises {
             .filter(|number| number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(number));
         if let Some(whole) = whole {
             let text = format!("headerId {} on {topic} is written as a fraction", show(id));
-            findings.push(remark("HDR-02", entry.seq(), text));
+            findings.push(remark("HDR-02", record.seq(), text));
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
             return Some(whole as u32);
         }
@@ -138,7 +156,7 @@ impl IdRises {
             "headerId {} on {topic} is no whole number from 0 to 4294967295",
             show(id)
         );
-        findings.push(broken("HDR-02", entry.seq(), text));
+        findings.push(broken("HDR-02", record.seq(), text));
         None
     }
 }

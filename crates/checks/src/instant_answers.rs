@@ -7,13 +7,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::traffic::{
-    Delivered, Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle,
-};
+use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, number, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind, and how many one message may have to be judged.
 const ACTIONS: usize = 256;
@@ -27,6 +25,17 @@ pub(super) const ANSWERED: Check = Check {
           no new order is accepted. Not judged while the harness disturbs the link, nor over a restart, nor with more than \
           eight actions in one message.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Answered::looking_for("IACT-03")),
 };
 
@@ -37,6 +46,17 @@ pub(super) const TOGETHER: Check = Check {
     doc: "When one action of an instantActions message is in actionStates, so are the others: a warning from time.slow after \
           it was sent, and found after time.react. Otherwise as instant/answered.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Answered::looking_for("IACT-07")),
 };
 
@@ -48,6 +68,17 @@ pub(super) const BEGINS: Check = Check {
           stands and no other action is under way. cancelOrder and downloadMap may wait for something outside. Otherwise \
           as instant/answered.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Answered::looking_for("IACT-05")),
 };
 
@@ -58,6 +89,17 @@ pub(super) const SCOPE: Check = Check {
     doc: "A predefined action that is none for instantActions, and that the factsheet does not offer there, is not performed \
           as one. finePositioning, of which the text says two things, is not judged. Otherwise as instant/answered.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Answered::looking_for("ACT-10")),
 };
 
@@ -78,8 +120,6 @@ struct Asked {
 struct Answered {
     /// What this one looks for.
     requirement: &'static str,
-    traffic: Traffic,
-    life: Continuity,
     /// By actionId.
     asked: BTreeMap<String, Asked>,
     order: Option<(String, u64)>,
@@ -118,9 +158,9 @@ impl Answered {
         }
     }
 
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        if let Some(Delivered { name: "factsheet", .. }) = self.traffic.delivered(entry, context) {
-            let listed = entry
+    fn learn(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
+        if record.is_delivered(Topic::Factsheet) {
+            let listed = record
                 .json()
                 .and_then(|sheet| sheet.pointer("/protocolFeatures/agvActions")?.as_array());
             let instant = listed
@@ -130,7 +170,7 @@ impl Answered {
                 .filter(|action| elements(action, "actionScopes").any(|scope| scope.as_str() == Some("INSTANT")));
             self.offered = instant.map(|action| text(action, "actionType").to_owned()).collect();
         }
-        let Some(message) = to_vehicle("instantActions", entry, context) else {
+        let Some(message) = record.to_vehicle(Topic::InstantActions) else {
             return;
         };
         let schema = context.pack.schema("instantActions");
@@ -141,7 +181,7 @@ impl Answered {
             let own = id(all[at]);
             !own.is_empty() && !self.asked.contains_key(&own) && all[..at].iter().all(|other| id(other) != own)
         };
-        if !obeys || self.traffic.disturbed || all.len() > IN_ONE || !(0..all.len()).all(fresh) {
+        if !obeys || record.link.disturbed || all.len() > IN_ONE || !(0..all.len()).all(fresh) {
             return;
         }
         if self.asked.len() > ACTIONS {
@@ -149,8 +189,8 @@ impl Answered {
         }
         for action in &all {
             let asked = Asked {
-                message: entry.seq(),
-                at: entry.at().moment,
+                message: record.seq(),
+                at: record.at().moment,
                 kind: text(action, "actionType").to_owned(),
                 states: 0,
                 listed: false,
@@ -273,32 +313,36 @@ fn is_misplaced(kind: &str, context: &CheckContext<'_>) -> bool {
 }
 
 impl Running for Answered {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.learn(entry, context);
-        let restarted = self.life.restarted(self.traffic, entry, context);
-        if restarted || self.traffic.disturbed || outside_influence(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.learn(record, context);
+        let restarted = context.world.restarts().now(record);
+        if restarted || record.link.disturbed || record.outside_influence() {
             self.asked.clear();
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         if !state.get("actionStates").is_some_and(Value::is_array) || self.asked.is_empty() {
             return false;
         }
         let order = text(state, "orderId").chars().take(512).collect();
-        let order = (order, super::orders::number(state, "orderUpdateId").unwrap_or_default());
+        let order = (order, number(state, "orderUpdateId").unwrap_or_default());
         let before = self.order.replace(order.clone());
         let renewed = before.is_some_and(|before| before.0 != order.0);
-        let slow = context.time("slow").unwrap_or(Duration::from_secs(5));
-        let limits = (slow, context.time("react").unwrap_or(Duration::from_secs(31)));
-        let now = entry.at().moment;
+        let slow = context.time.slow;
+        let limits = (slow, context.time.react);
+        let now = record.at().moment;
         for asked in self.asked.values_mut() {
             asked.states += 1;
         }
         let mut found = Vec::new();
-        self.listed(state, now, entry.seq(), context, limits, &mut found);
-        self.missing(now, entry.seq(), renewed, limits, &mut found);
+        self.listed(state, now, record.seq(), context, limits, &mut found);
+        self.missing(now, record.seq(), renewed, limits, &mut found);
         let mine = |finding: &CheckFinding| {
             finding
                 .requirement

@@ -5,11 +5,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use super::continuity::Continuity;
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
+use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind, and how many of a state are looked at.
 const ACTIONS: usize = 256;
@@ -24,6 +24,16 @@ pub(super) const NOT_QUEUED: Check = Check {
           are WAITING until the very state that ends an action which was under way all the while, and one of them had been \
           WAITING in several states for half a second and more; one alone is a warning.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(NotQueued::default()),
 };
 
@@ -38,16 +48,14 @@ struct Asked {
 
 #[derive(Default)]
 struct NotQueued {
-    traffic: Traffic,
-    life: Continuity,
     /// By actionId.
     asked: BTreeMap<String, Asked>,
     told: bool,
 }
 
 impl NotQueued {
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let Some(message) = to_vehicle("instantActions", entry, context) else {
+    fn learn(&mut self, record: &Observation<'_>) {
+        let Some(message) = record.to_vehicle(Topic::InstantActions) else {
             return;
         };
         for action in actions(message).take(ACTIONS) {
@@ -59,7 +67,7 @@ impl NotQueued {
                 self.asked.pop_first();
             }
             let asked = Asked {
-                message: entry.seq(),
+                message: record.seq(),
                 kind: kind.to_owned(),
                 since: None,
                 states: 0,
@@ -72,20 +80,24 @@ impl NotQueued {
 }
 
 impl Running for NotQueued {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.learn(entry, context);
-        let restarted = self.life.restarted(self.traffic, entry, context);
-        if restarted || self.traffic.disturbed || outside_influence(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.learn(record);
+        let restarted = context.world.restarts().now(record);
+        if restarted || record.link.disturbed || record.outside_influence() {
             self.asked.clear();
         }
         if self.asked.is_empty() {
             return false;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let now = entry.at().moment;
+        let now = record.at().moment;
         let statuses: BTreeMap<&str, &str> = elements(state, "actionStates")
             .take(ACTIONS)
             .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
@@ -142,9 +154,9 @@ impl Running for NotQueued {
             );
             self.told = messages.len() > 1;
             findings.push(if self.told {
-                broken("IACT-05", entry.seq(), text)
+                broken("IACT-05", record.seq(), text)
             } else {
-                remark("IACT-05", entry.seq(), text)
+                remark("IACT-05", record.seq(), text)
             });
         }
         judged

@@ -5,12 +5,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
+use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
-use tck_journal::event::Event;
+use tck_world::members::{actions, elements, text};
+use tck_world::{Fact, Listen, Observation, Seen, Topic};
 
 /// How many requests are kept in mind.
 const REQUESTS: usize = 64;
@@ -24,13 +23,23 @@ pub(super) const REQUESTS_MET: Check = Check {
           a factsheet within time.react; from time.slow on it is a warning. Not judged while the harness disturbs the \
           link, nor over a restart.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Stored(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Requests::default()),
 };
 
 #[derive(Default)]
 struct Requests {
-    traffic: Traffic,
-    life: Continuity,
     /// When the next state came for each stateRequest, as soon as it did: time it took, and entry.
     states: BTreeMap<String, (Moment, Option<(Duration, u64)>)>,
     /// When each factsheetRequest was seen FINISHED, and whether that was remarked on.
@@ -38,8 +47,11 @@ struct Requests {
 }
 
 impl Requests {
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let Some(message) = to_vehicle("instantActions", entry, context).filter(|_| !self.traffic.disturbed) else {
+    fn learn(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
+        let Some(message) = record
+            .to_vehicle(Topic::InstantActions)
+            .filter(|_| !record.link.disturbed)
+        else {
             return;
         };
         let schema = context.pack.schema("instantActions");
@@ -50,7 +62,7 @@ impl Requests {
             let id: String = text(action, "actionId").chars().take(512).collect();
             match text(action, "actionType") {
                 "stateRequest" if self.states.len() < REQUESTS => {
-                    self.states.entry(id).or_insert((entry.at().moment, None));
+                    self.states.entry(id).or_insert((record.at().moment, None));
                 }
                 "factsheetRequest" if self.sheets.len() < REQUESTS => {
                     self.sheets.entry(id).or_insert(None);
@@ -63,17 +75,15 @@ impl Requests {
     fn state_came(
         &mut self,
         state: &Value,
-        entry: &Entry,
+        record: &Observation<'_>,
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) {
-        let now = entry.at().moment;
-        let soft = context.time("event").unwrap_or(Duration::from_secs(1));
-        let hard = context
-            .time("eventWarning")
-            .map_or(Duration::from_secs(5), |hard| hard.max(soft));
+        let now = record.at().moment;
+        let soft = context.time.event;
+        let hard = context.time.event_warning.max(soft);
         for (since, came) in self.states.values_mut() {
-            came.get_or_insert((now.since(*since), entry.seq()));
+            came.get_or_insert((now.since(*since), record.seq()));
         }
         for action in elements(state, "actionStates").take(REQUESTS * 4) {
             let (id, status) = (text(action, "actionId"), text(action, "actionStatus"));
@@ -97,14 +107,14 @@ impl Requests {
             if status == "FAILED" {
                 self.sheets.remove(id);
             } else if let Some(seen) = self.sheets.get_mut(id) {
-                seen.get_or_insert((now, entry.seq(), false));
+                seen.get_or_insert((now, record.seq(), false));
             }
         }
     }
 
     fn overdue(&mut self, now: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        let slow = context.time("slow").unwrap_or(Duration::from_secs(5));
-        let react = context.time("react").unwrap_or(Duration::from_secs(31));
+        let slow = context.time.slow;
+        let react = context.time.react;
         let mut given_up = Vec::new();
         for (id, seen) in &mut self.sheets {
             let Some((since, seq, remarked)) = seen else { continue };
@@ -127,25 +137,27 @@ impl Requests {
 }
 
 impl Running for Requests {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let restarted = self.life.restarted(self.traffic, entry, context);
-        if restarted || self.traffic.disturbed || outside_influence(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let restarted = context.world.restarts().now(record);
+        if restarted || record.link.disturbed || record.outside_influence() {
             self.states.clear();
             self.sheets.clear();
         }
-        self.learn(entry, context);
-        if let Event::Message { topic, .. } = entry.event()
-            && context.topic_name(topic) == Some("factsheet")
-        {
+        self.learn(record, context);
+        if record.is(Seen::Delivered, Topic::Factsheet) || record.is(Seen::Stored, Topic::Factsheet) {
             self.sheets.clear();
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let judged = !self.states.is_empty() || !self.sheets.is_empty();
-        self.overdue(entry.at().moment, context, findings);
-        self.state_came(state, entry, context, findings);
+        self.overdue(record.at().moment, context, findings);
+        self.state_came(state, record, context, findings);
         judged
     }
 }

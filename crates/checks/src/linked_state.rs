@@ -7,14 +7,13 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::continuity::Continuity;
-use super::orders::sets_position;
 use super::state::driving::Pose;
-use super::traffic::{Traffic, actions, broken, elements, quote, show, state, text, to_vehicle};
+use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::Event;
+use tck_world::members::{actions, elements, text};
+use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 
 /// How many actions are kept in mind.
 const ACTIONS: usize = 1024;
@@ -46,6 +45,16 @@ pub(super) const LINKED_STATE: Check = Check {
           while an emergency stop, the protective field, a mode or an error may hold it, and for two minutes after what \
           a person or a hook did to what is linked.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Linked::default()),
 };
 
@@ -60,8 +69,6 @@ struct Known {
 
 #[derive(Default)]
 struct Linked {
-    traffic: Traffic,
-    life: Continuity,
     known: BTreeMap<String, Known>,
     /// Actions of nodes and edges, and the entry with the last order.
     placed: BTreeSet<String>,
@@ -90,9 +97,9 @@ fn topic(kind: &str) -> Option<&'static str> {
 }
 
 /// What a hook may have changed beside the protocol, or a person. Loads, obstacles and triggers are none of it.
-fn touched(entry: &Entry) -> &'static [&'static str] {
-    let Event::Hook { hook, .. } = entry.event() else {
-        let answered = matches!(entry.event(), Event::Answer { .. });
+fn touched(record: &Observation<'_>) -> &'static [&'static str] {
+    let Event::Hook { hook, .. } = record.event() else {
+        let answered = matches!(record.event(), Event::Answer { .. });
         return if answered { &TOPICS } else { &[] };
     };
     match hook.as_str() {
@@ -136,13 +143,11 @@ fn parameter<'v>(action: &'v Value, key: &str) -> Option<&'v Value> {
 }
 
 impl Linked {
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let instant = to_vehicle("instantActions", entry, context)
-            .into_iter()
-            .flat_map(actions);
-        let order = to_vehicle("order", entry, context);
+    fn learn(&mut self, record: &Observation<'_>) {
+        let instant = record.to_vehicle(Topic::InstantActions).into_iter().flat_map(actions);
+        let order = record.to_vehicle(Topic::Order);
         if order.is_some() {
-            self.ordered = entry.seq();
+            self.ordered = record.seq();
         }
         let placed = order
             .into_iter()
@@ -168,7 +173,7 @@ impl Linked {
             let known = Known {
                 kind: kind.to_owned(),
                 action: action.clone(),
-                seq: entry.seq(),
+                seq: record.seq(),
             };
             self.known.insert(id, known);
         }
@@ -292,22 +297,26 @@ impl Linked {
 }
 
 impl Running for Linked {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.learn(entry, context);
-        for topic in touched(entry) {
-            self.touched.insert(topic, entry.at().moment);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.learn(record);
+        for topic in touched(record) {
+            self.touched.insert(topic, record.at().moment);
         }
-        if self.life.restarted(self.traffic, entry, context) {
+        if context.world.restarts().now(record) {
             self.order = None;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let order: String = text(state, "orderId").chars().take(512).collect();
         let same_order = self.order.as_ref() == Some(&order);
         let begun = self.order.replace(order).is_some();
-        let now = entry.at().moment;
+        let now = record.at().moment;
         let left_alone = |topic| self.touched.get(topic).is_none_or(|at| now.since(*at) > INFLUENCE);
         let still = state.get("driving").and_then(Value::as_bool) == Some(false);
         let listed: Vec<(&str, &str)> = elements(state, "actionStates")
@@ -352,7 +361,7 @@ impl Running for Linked {
             };
             for (requirement, text) in Self::contradiction(known, state).into_iter().chain(outlive) {
                 let text = format!("{} {} is FINISHED, and {text}", known.kind, quote(id));
-                findings.push(broken(requirement, entry.seq(), text));
+                findings.push(broken(requirement, record.seq(), text));
             }
         }
         let over = listed

@@ -7,12 +7,11 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::orders::Malformed;
-use super::traffic::{Traffic, broken, quote, remark};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::json::JsonProblem;
 use tck_pack::{Finding, FindingKind, Pack};
+use tck_world::{Fact, Listen, Observation};
 
 /// `message/schema`.
 pub(super) const SCHEMA: Check = Check {
@@ -61,6 +60,8 @@ pub(super) const SCHEMA: Check = Check {
           single precision makes of pi is a warning, once. What a state repeats of a malformed order of the harness \
           is not judged: that it was taken over is the mistake.",
     arguments: &[],
+    listens: &[Listen::AnyDelivered],
+    reads: &[Fact::Malformed],
     start: |context| Box::new(Schema::new(context)),
 };
 
@@ -71,16 +72,16 @@ pub(super) const ENCODING: Check = Check {
     doc: "Every payload is one JSON object in UTF-8 without NaN, Infinity or numbers beyond all limits. A byte order \
           mark and a member that occurs twice are warnings. Clearing a retained topic with nothing is no finding.",
     arguments: &[],
-    start: |_| Box::new(Encoding::default()),
+    listens: &[Listen::AnyDelivered, Listen::AnyPublished],
+    reads: &[],
+    start: |_| Box::new(Encoding),
 };
 
 struct Schema {
-    traffic: Traffic,
     /// The member names of each topic's messages.
     members: BTreeMap<String, Vec<String>>,
     /// The same of what is inside of messages: topic and path.
     inner: Vec<(&'static str, &'static [&'static str], Vec<String>)>,
-    malformed: Malformed,
     /// An angle beyond pi by what single precision does to it was remarked on.
     rounded: bool,
 }
@@ -121,10 +122,8 @@ impl Schema {
             .iter()
             .filter_map(|(topic, path)| Some((*topic, *path, context.pack.schema(topic)?.members(path))));
         Self {
-            traffic: Traffic::default(),
             members: members.collect(),
             inner: inner.collect(),
-            malformed: Malformed::default(),
             rounded: false,
         }
     }
@@ -202,20 +201,23 @@ fn plain(name: &str) -> String {
 }
 
 impl Running for Schema {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.malformed.note(entry, context);
-        let Some(message) = self.traffic.delivered(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(message) = record.delivered() else {
             return false;
         };
-        let (Some(schema), Some(value)) = (context.pack.schema(message.name), entry.json()) else {
+        let (Some(schema), Some(value)) = (context.pack.schema(message.name), record.json()) else {
             return false;
         };
         if !value.is_object() {
             return false;
         }
-        let (topic, seq) = (message.name, entry.seq());
-        let of_order = topic == "state" && self.malformed.is_shown_in(value);
+        let (topic, seq) = (message.name, record.seq());
+        let of_order = topic == "state" && context.world.malformed().is_shown(record);
         for finding in schema.findings(value) {
             let first = finding.path.split('/').nth(1).unwrap_or_default();
             if of_order && OF_ORDER.contains(&first) {
@@ -305,21 +307,17 @@ fn special(text: &str) -> bool {
         .any(|name| text.eq_ignore_ascii_case(name))
 }
 
-#[derive(Default)]
-struct Encoding {
-    traffic: Traffic,
-}
+struct Encoding;
 
 impl Running for Encoding {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(message) = self.traffic.published(entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(message) = record.published() else {
             return false;
         };
-        let (Some(parsed), Some(payload)) = (entry.parsed(), entry.payload()) else {
+        let (Some(parsed), Some(payload)) = (record.parsed(), record.payload()) else {
             return false;
         };
-        let (topic, seq) = (message.name, entry.seq());
+        let (topic, seq) = (message.name, record.seq());
         let mut judged = true;
         for problem in parsed.problems().iter().take(8) {
             let text = format!("{topic}: {}", quote(&problem.to_string()));

@@ -3,14 +3,15 @@
 //! Whether vx is positive forwards is `motion/velocity-sign`'s, which knows the edge the vehicle is on.
 
 use std::time::Duration;
+use tck_journal::event::Event;
 
 use serde_json::Value;
 
-use super::state::driving::{Pose, is_displaced};
-use super::traffic::{Delivered, Traffic, broken};
+use super::state::driving::Pose;
+use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// Messages further apart may leave out a stop or a turn between them.
 const CLOSE: Duration = Duration::from_secs(2);
@@ -34,6 +35,17 @@ pub(super) const VELOCITY_AXES: Check = Check {
           between, and the velocity fits along the axes of the map, or with vy mirrored. Not judged where a message in between \
           shows the vehicle turned another way.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::Delivered(Topic::State),
+        Listen::Delivered(Topic::Visualization),
+    ],
+    reads: &[Fact::Displaced],
     start: |_| Box::new(Signs::new(axes, "MAP-03").of_straight_ways()),
 };
 
@@ -44,6 +56,17 @@ pub(super) const TURN_SIGN: Check = Check {
     doc: "From one state, or one visualization, to the next of a vehicle that turns, theta grows when velocity.omega is \
           positive, and falls when it is negative. Found when it happens twice, never the other way in between.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::Delivered(Topic::State),
+        Listen::Delivered(Topic::Visualization),
+    ],
+    reads: &[Fact::Displaced],
     start: |_| Box::new(Signs::new(turn, "MAP-01")),
 };
 
@@ -139,7 +162,6 @@ fn turn(then: &Seen, now: &Seen) -> Option<Result<(), String>> {
 }
 
 struct Signs {
-    traffic: Traffic,
     judge: Judge,
     requirement: &'static str,
     /// The last state and the last visualization: they may overtake each other.
@@ -153,7 +175,6 @@ struct Signs {
 impl Signs {
     fn new(judge: Judge, requirement: &'static str) -> Self {
         Self {
-            traffic: Traffic::default(),
             judge,
             requirement,
             state: None,
@@ -179,20 +200,27 @@ impl Signs {
 }
 
 impl Running for Signs {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if is_displaced(entry, context) || self.traffic.disturbed {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.displaced().now(record)
+            || record.link.disturbed
+            || matches!(record.event(), Event::Fault { .. })
+        {
             self.state = None;
             self.visualization = None;
         }
-        let Some(Delivered { name, .. }) = self.traffic.delivered(entry, context) else {
+        let Some(name) = record.delivered().map(|message| message.name) else {
             return false;
         };
         if !matches!(name, "state" | "visualization") {
             return false;
         }
         if self.straight
-            && let Some(pose) = entry.json().and_then(Pose::of)
+            && let Some(pose) = record.json().and_then(Pose::of)
         {
             self.forget_before_corner(&pose);
         }
@@ -200,7 +228,9 @@ impl Running for Signs {
             "state" => &mut self.state,
             _ => &mut self.visualization,
         };
-        let now = entry.json().and_then(|message| Seen::read(entry.at().moment, message));
+        let now = record
+            .json()
+            .and_then(|message| Seen::read(record.at().moment, message));
         let then = std::mem::replace(before, now.clone());
         let (Some(then), Some(now)) = (then, now) else {
             return false;
@@ -218,7 +248,7 @@ impl Running for Signs {
                 self.against += 1;
                 if self.against >= TIMES {
                     self.against = 0;
-                    findings.push(broken(self.requirement, entry.seq(), text));
+                    findings.push(broken(self.requirement, record.seq(), text));
                     return true;
                 }
                 false

@@ -3,14 +3,14 @@
 //! What the messages say is left to the other checks.
 
 use std::collections::VecDeque;
+use tck_world::members::text;
 
-use super::traffic::{HEADER, Traffic, broken, quote, remark, says_broken};
-use tck_base::clock::Moment;
-use tck_check::device_publish;
+use crate::finding::{HEADER, broken, quote, remark, says_broken};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::Parsed;
 use tck_journal::event::{Event, Packet, Will};
-use tck_journal::{Entry, Parsed};
 use tck_pack::Role;
+use tck_world::{End, Listen, Observation};
 
 /// How many open connections of a device are kept in mind.
 const CONNECTIONS: usize = 32;
@@ -23,7 +23,9 @@ pub(super) const QUALITY: Check = Check {
           with QoS 1 (2 is a warning); connection and factsheet with RETAIN, which only the tap can see here, order and \
           instantActions without it (with it is a warning).",
     arguments: &[],
-    start: |_| Box::new(Quality::default()),
+    listens: &[Listen::AnyDelivered, Listen::AnyPublished],
+    reads: &[],
+    start: |_| Box::new(Quality),
 };
 
 /// `mqtt/connect`.
@@ -35,28 +37,26 @@ pub(super) const CONNECT: Check = Check {
           connections of the device are not held to this. Of a master control only the version of MQTT is judged, on every \
           connection.",
     arguments: &[],
+    listens: &[Listen::Connect, Listen::AnyPublished],
+    reads: &[],
     start: |_| Box::new(Connect::default()),
 };
 
-#[derive(Default)]
-struct Quality {
-    traffic: Traffic,
-}
+struct Quality;
 
 impl Running for Quality {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(message) = self.traffic.published(entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(message) = record.published() else {
             return false;
         };
-        let seq = entry.seq();
+        let seq = record.seq();
         let (name, qos) = (message.name, message.qos);
         let text = format!("{name} is published with QoS {qos}");
         match (name, qos) {
             ("order" | "instantActions", 1..) => findings.push(remark("MQTT-06", seq, text)),
             ("state" | "visualization" | "factsheet", 1..) => findings.push(remark("MQTT-07", seq, text)),
             // To a subscriber the will looks like any message; its QoS is judged in the CONNECT packet.
-            ("connection", 0) if self.traffic.tap || !entry.json().is_some_and(says_broken) => {
+            ("connection", 0) if record.link.tap || !record.json().is_some_and(says_broken) => {
                 findings.push(broken("MQTT-08", seq, text));
             }
             ("connection", 2..) => findings.push(remark("MQTT-08", seq, text)),
@@ -80,7 +80,6 @@ impl Running for Quality {
 
 #[derive(Default)]
 struct Connect {
-    traffic: Traffic,
     open: VecDeque<Opened>,
     /// Whether any connection ever published on the connection topic.
     announced: bool,
@@ -97,8 +96,12 @@ struct Opened {
 }
 
 impl Running for Connect {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         if let Event::Packet {
             connection,
             packet:
@@ -108,10 +111,10 @@ impl Running for Connect {
                     will,
                     ..
                 },
-        } = entry.event()
+        } = record.event()
         {
             if context.role == Role::MasterControl {
-                findings.extend(too_old(*level, entry.seq()));
+                findings.extend(too_old(*level, record.seq()));
                 return true;
             }
             if self.open.len() == CONNECTIONS {
@@ -119,7 +122,7 @@ impl Running for Connect {
             }
             self.open.push_back(Opened {
                 connection: *connection,
-                seq: entry.seq(),
+                seq: record.seq(),
                 level: *level,
                 keep_alive: *keep_alive,
                 will: will.clone(),
@@ -127,13 +130,17 @@ impl Running for Connect {
             });
             return false;
         }
-        let Some(message) = self.traffic.published(entry, context) else {
+        let Some(message) = record.published() else {
             return false;
         };
-        let Some((connection, ..)) = device_publish(entry) else {
+        let Some(publish) = record.device_publish() else {
             return false;
         };
-        let Some(at) = self.open.iter().position(|opened| opened.connection == connection) else {
+        let Some(at) = self
+            .open
+            .iter()
+            .position(|opened| opened.connection == publish.connection)
+        else {
             return false;
         };
         if message.name != "connection" {
@@ -150,7 +157,7 @@ impl Running for Connect {
         true
     }
 
-    fn finish(&mut self, _: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+    fn finish(&mut self, _: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         // A device that never announces itself is judged on what it publishes states with.
         if !self.announced {
             for opened in self.open.iter().filter(|opened| opened.publishes) {
@@ -197,7 +204,7 @@ impl Opened {
             return;
         };
         if !says_broken(value) {
-            let state = quote(super::traffic::text(value, "connectionState"));
+            let state = quote(text(value, "connectionState"));
             findings.push(broken("CONN-02", seq, format!("the last will says {state}")));
         }
         let missing: Vec<&str> = HEADER.into_iter().filter(|name| value.get(*name).is_none()).collect();

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use tck_base::clock::Moment;
-use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
+use tck_world::Observation;
 
 /// Measures from message to message. What a link fault held back comes all at once when it ends, so that no interval counts
 /// until one is as long as the device's own.
@@ -16,11 +16,11 @@ pub(super) struct Rhythm {
 
 impl Rhythm {
     /// Learns from an entry; whether it breaks the rhythm off.
-    pub fn note(&mut self, entry: &Entry) -> bool {
-        let faulty = matches!(entry.event(), Event::Fault { .. });
+    pub fn note(&mut self, record: &Observation<'_>) -> bool {
+        let faulty = matches!(record.event(), Event::Fault { .. });
         let packet = |packet: &Packet| matches!(packet, Packet::Disconnect { .. } | Packet::Connect { .. });
         let ends = faulty
-            || match entry.event() {
+            || match record.event() {
                 Event::Closed { .. } => true,
                 Event::Packet { packet: seen, .. } => packet(seen),
                 _ => false,

@@ -8,14 +8,13 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::header::serial_character;
-use super::traffic::{Traffic, broken, quote, remark};
+use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_base::pattern::whole;
-use tck_check::device_publish;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
 use tck_pack::Role;
+use tck_world::{End, Listen, Observation};
 
 /// How many different topics are remembered; a device that invents more is judged on the first ones.
 const TOPICS: usize = 64;
@@ -31,6 +30,8 @@ pub(super) const NAMES: Check = Check {
           and, for thirty seconds, never where it belongs. An order of a master control belongs on its topic by its \
           orderId and orderUpdateId, an instant action by its actionId. Where only the levels before the name differ, that is a warning.",
     arguments: &[],
+    listens: &[Listen::Everything],
+    reads: &[],
     start: |_| Box::new(Names::default()),
 };
 
@@ -41,6 +42,8 @@ pub(super) const STRUCTURE: Check = Check {
     doc: "Topics have five levels: interface, major version, manufacturer, serial number, name. The structure is only \
           suggested: anything else is a warning, and so is a level that contradicts the version of its message, except characters that a serial number must not hold.",
     arguments: &[],
+    listens: &[Listen::AnyDelivered, Listen::AnyPublished, Listen::Elsewhere],
+    reads: &[],
     start: |_| Box::new(Structure::default()),
 };
 
@@ -51,7 +54,9 @@ pub(super) const OWN_SIDE: Check = Check {
     doc: "The device publishes only on the topics of its own side, and has no last will on one of the other side. Only the \
           tap knows who published.",
     arguments: &[],
-    start: |_| Box::new(OwnSide::default()),
+    listens: &[Listen::Connect, Listen::AnyPublished],
+    reads: &[],
+    start: |_| Box::new(OwnSide),
 };
 
 /// Topics seen before, bounded.
@@ -67,7 +72,6 @@ impl Seen {
 
 #[derive(Default)]
 struct Names {
-    traffic: Traffic,
     seen: Seen,
     /// Names of topics the device has published on as it must.
     proper: BTreeSet<String>,
@@ -138,32 +142,32 @@ fn almost(topic: &str) -> Option<&'static str> {
 
 impl Names {
     /// Notes where the device publishes what.
-    fn note(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
+    fn note(&mut self, topic: &str, record: &Observation<'_>, context: &CheckContext<'_>) {
         if topic.len() > 1024 {
             return;
         }
         if context.role == Role::MasterControl {
-            self.note_order(topic, entry, context);
+            self.note_order(topic, record, context);
             return;
         }
-        if let Some(name) = context.topic_name(topic) {
+        if let Some(name) = record.topic_name() {
             self.proper.insert(name.to_owned());
             return;
         }
-        let Some(name) = entry.json().and_then(looks_like).or_else(|| almost(topic)) else {
+        let Some(name) = record.json().and_then(looks_like).or_else(|| almost(topic)) else {
             return;
         };
-        let first = || (topic.to_owned(), entry.seq(), entry.at().moment, 0);
+        let first = || (topic.to_owned(), record.seq(), record.at().moment, 0);
         self.astray.entry(name).or_insert_with(first).3 += 1;
     }
 
     /// Notes where a master control publishes its orders and instant actions.
-    fn note_order(&mut self, topic: &str, entry: &Entry, context: &CheckContext<'_>) {
-        let Some(key) = entry.json().and_then(Sent::read) else {
+    fn note_order(&mut self, topic: &str, record: &Observation<'_>, context: &CheckContext<'_>) {
+        let Some(key) = record.json().and_then(Sent::read) else {
             return;
         };
         let belongs = key.topic();
-        if context.topic_name(topic) == Some(belongs) {
+        if record.topic_name() == Some(belongs) {
             self.strays.remove(&key);
             if self.orders.len() == ORDERS {
                 self.orders.pop_first();
@@ -176,8 +180,8 @@ impl Names {
             .topics
             .get(belongs)
             .is_some_and(|usual| above(usual) == above(topic));
-        if beside && context.topic_name(topic).is_none() && !self.orders.contains(&key) && self.strays.len() < ORDERS {
-            let place = (topic.to_owned(), entry.seq(), entry.at().moment);
+        if beside && record.topic().is_none() && !self.orders.contains(&key) && self.strays.len() < ORDERS {
+            let place = (topic.to_owned(), record.seq(), record.at().moment);
             self.strays.entry(key).or_insert(place);
         }
     }
@@ -236,27 +240,31 @@ impl Names {
 }
 
 impl Running for Names {
-    fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        self.astray(end, context, findings);
+    fn finish(&mut self, end: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        self.astray(end.moment, context, findings);
         // What came at the very last may still be on its way to the other topic.
-        self.strayed(end, Duration::from_secs(2), findings);
+        self.strayed(end.moment, Duration::from_secs(2), findings);
     }
 
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.astray(entry.at().moment, context, findings);
-        self.strayed(entry.at().moment, ELSEWHERE, findings);
-        let topic = match entry.event() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.astray(record.at().moment, context, findings);
+        self.strayed(record.at().moment, ELSEWHERE, findings);
+        let topic = match record.event() {
             Event::Message {
                 topic, retain: false, ..
-            } if !self.traffic.tap => topic,
-            _ => match device_publish(entry) {
-                Some((_, topic, ..)) => topic,
+            } if !record.link.tap => topic,
+            _ => match record.device_publish() {
+                Some(publish) => publish.topic,
                 None => return false,
             },
         };
-        self.note(topic, entry, context);
-        if context.topic_name(topic).is_some() {
+        self.note(topic, record, context);
+        if record.topic().is_some() {
             return true;
         }
         let last = topic.rsplit('/').next().unwrap_or_default();
@@ -269,7 +277,7 @@ impl Running for Names {
         }
         if last != name && self.seen.first(topic) {
             let text = format!("the last level of {} is no topic name; meant is {name:?}", quote(topic));
-            findings.push(broken("TOPIC-01", entry.seq(), text));
+            findings.push(broken("TOPIC-01", record.seq(), text));
         }
         last != name
     }
@@ -294,26 +302,29 @@ fn plain(name: &str) -> String {
 
 #[derive(Default)]
 struct Structure {
-    traffic: Traffic,
     seen: Seen,
 }
 
 impl Running for Structure {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Some((_, topic, ..)) = device_publish(entry) {
-            return self.elsewhere(topic, entry, context, findings);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if let Some(publish) = record.device_publish() {
+            return self.elsewhere(publish.topic, record, context, findings);
         }
-        if self.traffic.delivered(entry, context).is_none() {
+        if record.delivered().is_none() {
             return false;
         }
-        let Event::Message { topic, .. } = entry.event() else {
+        let Event::Message { topic, .. } = record.event() else {
             return false;
         };
         if !self.seen.first(topic) {
             return false;
         }
-        let seq = entry.seq();
+        let seq = record.seq();
         if topic.contains('$') {
             findings.push(remark("TOPIC-07", seq, format!("{} holds a dollar sign", quote(topic))));
         }
@@ -345,27 +356,27 @@ impl Structure {
     fn elsewhere(
         &mut self,
         topic: &str,
-        entry: &Entry,
+        record: &Observation<'_>,
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         let levels: Vec<&str> = topic.split('/').collect();
         if context.role == Role::MasterControl {
-            return self.command_elsewhere(topic, &levels, entry, context, findings);
+            return self.command_elsewhere(topic, &levels, record, context, findings);
         }
         let [_, level, manufacturer, serial, name] = levels[..] else {
             return false;
         };
         let own = (manufacturer, serial) == context.identity && context.topics.contains_key(name);
-        let spoken = entry.json().and_then(|value| value.get("version")?.as_str());
+        let spoken = record.json().and_then(|value| value.get("version")?.as_str());
         let (Some(major), Some(spoken)) = (level.strip_prefix('v'), spoken.and_then(|text| text.split('.').next()))
         else {
             return false;
         };
-        let judged = own && context.topic_name(topic).is_none() && major.bytes().all(|byte| byte.is_ascii_digit());
+        let judged = own && record.topic().is_none() && major.bytes().all(|byte| byte.is_ascii_digit());
         if judged && major != spoken && self.seen.first(topic) {
             let text = format!("{} carries messages of version {}", quote(topic), quote(spoken));
-            findings.push(remark("TOPIC-03", entry.seq(), text));
+            findings.push(remark("TOPIC-03", record.seq(), text));
         }
         judged
     }
@@ -375,7 +386,7 @@ impl Structure {
         &mut self,
         topic: &str,
         levels: &[&str],
-        entry: &Entry,
+        record: &Observation<'_>,
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
@@ -384,11 +395,11 @@ impl Structure {
             .pack
             .topic(name)
             .is_some_and(|rule| rule.publisher == Role::MasterControl);
-        let known = context.topic_name(topic).is_some();
+        let known = record.topic().is_some();
         if known || !commands || !names_vehicle(topic, context) || !self.seen.first(topic) {
             return false;
         }
-        let (shown, seq) = (quote(topic), entry.seq());
+        let (shown, seq) = (quote(topic), record.seq());
         if topic.contains('$') {
             findings.push(remark("TOPIC-07", seq, format!("{shown} holds a dollar sign")));
         }
@@ -410,14 +421,15 @@ impl Structure {
     }
 }
 
-#[derive(Default)]
-struct OwnSide {
-    traffic: Traffic,
-}
+struct OwnSide;
 
 impl Running for OwnSide {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         let owner = match context.role {
             Role::Agv => "master control",
             Role::MasterControl => "the vehicle",
@@ -425,25 +437,22 @@ impl Running for OwnSide {
         if let Event::Packet {
             packet: Packet::Connect { will: Some(will), .. },
             ..
-        } = entry.event()
+        } = record.event()
         {
             let name = context.topic_name(&will.topic);
             let rule = name.and_then(|name| context.pack.topic(name));
             if let Some(name) = name.filter(|_| rule.is_some_and(|rule| rule.publisher != context.role)) {
                 let text = format!("the device has a last will on {name}, which belongs to {owner}");
-                findings.push(broken("TOPIC-15", entry.seq(), text));
+                findings.push(broken("TOPIC-15", record.seq(), text));
             }
             return name.is_some();
         }
-        let Some((_, topic, ..)) = device_publish(entry) else {
+        let Some(name) = record.device_publish().and(record.topic_name()) else {
             return false;
         };
-        let Some(name) = context.topic_name(topic) else {
-            return false;
-        };
-        if self.traffic.published(entry, context).is_none() {
+        if record.published().is_none() {
             let text = format!("the device publishes on {name}, which belongs to {owner}");
-            findings.push(broken("TOPIC-15", entry.seq(), text));
+            findings.push(broken("TOPIC-15", record.seq(), text));
         }
         true
     }

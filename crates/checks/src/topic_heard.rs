@@ -8,11 +8,12 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::traffic::{Traffic, actions, broken, elements, state, text, to_vehicle};
+use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, Packet};
+use tck_world::members::{actions, elements, text};
+use tck_world::{End, Listen, Observation, Topic};
 
 /// The topics a vehicle has to listen to.
 const TOPICS: [&str; 2] = ["order", "instantActions"];
@@ -30,12 +31,13 @@ pub(super) const HEARD: Check = Check {
           was not listened to. Without the tap only a reaction shows something: an order or an action that a state \
           names.",
     arguments: &[],
+    listens: &[Listen::Everything],
+    reads: &[],
     start: |_| Box::new(Heard::default()),
 };
 
 #[derive(Default)]
 struct Heard {
-    traffic: Traffic,
     /// Since when each connection is open, and the topics it subscribed to.
     open: BTreeMap<u64, (Moment, BTreeSet<&'static str>)>,
     /// Topics on which something has arrived, or is sure to.
@@ -48,9 +50,9 @@ struct Heard {
 }
 
 impl Heard {
-    fn packet(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let down = entry.record.direction == Some(Direction::ToDevice);
-        let Event::Packet { connection, packet } = entry.event() else {
+    fn packet(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
+        let down = record.entry.record.direction == Some(Direction::ToDevice);
+        let Event::Packet { connection, packet } = record.event() else {
             return;
         };
         match packet {
@@ -60,7 +62,7 @@ impl Heard {
                 }
                 self.open
                     .entry(*connection)
-                    .or_insert((entry.at().moment, BTreeSet::new()));
+                    .or_insert((record.at().moment, BTreeSet::new()));
                 self.pending.clear();
             }
             Packet::Disconnect { .. } if !down => {
@@ -73,7 +75,7 @@ impl Heard {
                         continue;
                     };
                     if filters.iter().any(|filter| covers(&filter.filter, topic)) {
-                        let opened = (entry.at().moment, BTreeSet::new());
+                        let opened = (record.at().moment, BTreeSet::new());
                         self.open.entry(*connection).or_insert(opened).1.insert(name);
                         self.arrived.insert(name);
                         self.pending.remove(name);
@@ -91,9 +93,9 @@ impl Heard {
     }
 
     /// Notes what the harness sends while the vehicle is there and has had the time to subscribe.
-    fn sent(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+    fn sent(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
         for name in TOPICS {
-            let Some(message) = to_vehicle(name, entry, context) else {
+            let Some(message) = record.to_vehicle(Topic::of_name(name)) else {
                 continue;
             };
             let mut keep = |id: &str| {
@@ -108,18 +110,18 @@ impl Heard {
             let excess = self.sent.len().saturating_sub(2 * KEPT);
             self.sent.drain(..excess);
         }
-        let Event::Sent { topic, .. } = entry.event() else {
+        let Event::Sent { topic, .. } = record.event() else {
             return;
         };
         let Some(name) = TOPICS.into_iter().find(|name| context.topics.get(*name) == Some(topic)) else {
             return;
         };
-        let now = entry.at().moment;
-        let settled = context.time("settle").unwrap_or_default();
+        let now = record.at().moment;
+        let settled = context.time.settle;
         let there = self.open.values().any(|(since, _)| now.since(*since) >= settled);
         let subscribed = self.open.values().any(|(_, topics)| topics.contains(name));
-        if self.traffic.tap && !self.traffic.disturbed && there && !subscribed {
-            self.pending.entry(name).or_insert((entry.seq(), now));
+        if record.link.tap && !record.link.disturbed && there && !subscribed {
+            self.pending.entry(name).or_insert((record.seq(), now));
         }
     }
 
@@ -168,10 +170,14 @@ fn covers(filter: &str, topic: &str) -> bool {
 }
 
 impl Running for Heard {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         let before = self.arrived.len();
-        match entry.event() {
+        match record.event() {
             Event::Closed { connection, .. } => {
                 self.open.remove(connection);
                 self.pending.clear();
@@ -180,11 +186,11 @@ impl Running for Heard {
             Event::Fault { .. } | Event::Hook { .. } => self.pending.clear(),
             _ => {}
         }
-        self.packet(entry, context);
-        self.sent(entry, context);
-        self.overdue(entry.at().moment, findings);
-        if !self.traffic.tap
-            && let Some(state) = state(self.traffic, entry, context)
+        self.packet(record, context);
+        self.sent(record, context);
+        self.overdue(record.at().moment, findings);
+        if !record.link.tap
+            && let Some(state) = record.state()
         {
             self.reaction(state);
         }
@@ -192,8 +198,8 @@ impl Running for Heard {
         self.arrived.len() > before && self.arrived.len() == TOPICS.len()
     }
 
-    fn finish(&mut self, end: Moment, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        self.overdue(end, findings);
+    fn finish(&mut self, end: &End, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        self.overdue(end.moment, findings);
     }
 }
 

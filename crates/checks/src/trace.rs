@@ -1,19 +1,22 @@
 //! Traces for the tests of the checks: a recorded run in a few lines.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use super::REGISTRY;
-
 use tck_base::clock::{Moment, Stamp};
+use tck_base::time::TimeLimits;
 use tck_base::verdict::Verdict;
-use tck_check::{CheckContext, CheckFinding, Shared, find};
+use tck_check::{Check, CheckContext, CheckFinding, Shared, find};
 use tck_journal::event::{Close, Direction, Event, LinkFault, Occurrence, Packet, RunHeader, Source, Will};
 use tck_journal::{Entry, Journal, Payload};
 use tck_pack::{Assets, Pack, Packs, Role};
+use tck_world::{Listen, Listens, Observer, Setting, World};
+
+use super::REGISTRY;
 
 /// A run under construction.
 pub(super) struct Trace {
@@ -344,40 +347,72 @@ impl Trace {
         .map(|name| (name.to_owned(), self.topic(name)))
         .collect();
         let Value::Object(bindings) =
-            json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000, "notice": 1_000 } })
+            json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000, "notice": 1_000, "settle": 0 } })
         else {
             unreachable!()
         };
-        let shared = Shared::default();
-        let context = CheckContext {
+        let time = TimeLimits::of_bindings(&bindings);
+        let setting = Setting {
             pack: &pack,
             topics: &topics,
             role: self.role,
             identity: ("acme", &self.serial),
-            with: &self.with,
             bindings: &bindings,
-            shared: &shared,
+            time: &time,
         };
-        let mut running = (find(REGISTRY, name).expect("known check").start)(&context);
-        let mut findings = Vec::new();
-        let mut judged = 0;
-        for entry in self.journal.entries() {
-            let entry: &Arc<Entry> = entry;
-            match self.place(entry) {
-                Some((vehicle, name)) => shared.fleet.borrow_mut().note(entry, vehicle, &name),
-                None => shared.fleet.borrow_mut().link(entry),
-            }
-            judged += usize::from(running.observe(entry, &context, &mut findings));
-        }
-        running.finish(self.at.moment, &context, &mut findings);
-        for finding in &findings {
+        let check = find(REGISTRY, name).expect("known check");
+        let outcome = self.outcome(check, check.listens, setting);
+        let shown_all = self.outcome(check, &[Listen::Everything], setting);
+        assert_eq!(
+            outcome.findings, shown_all.findings,
+            "{name} misses what it does not listen to"
+        );
+        assert_eq!(
+            outcome.judged, shown_all.judged,
+            "{name} misses what it does not listen to"
+        );
+        for finding in &outcome.findings {
             if let Some(id) = &finding.requirement {
-                let check = find(REGISTRY, name).expect("known check");
                 assert!(check.decides.contains(&id.as_str()), "{name} does not declare {id}");
                 assert_ne!(finding.verdict, Some(Verdict::Pass));
             }
         }
+        outcome
+    }
+
+    /// What comes out where a check is shown what is listened to.
+    fn outcome(&self, check: &Check, listens: &[Listen], setting: Setting<'_>) -> Outcome {
+        let fleet = Rc::default();
+        let (mut world, shared) = (World::of_fleet(&fleet), Shared::default());
+        world.reads(check.reads);
+        let mut observer = Observer::new(setting.topics, setting.pack, setting.role);
+        let listens = Listens::to(listens);
+        let mut running = (check.start)(&self.context(setting, &world, &shared));
+        let mut findings = Vec::new();
+        let mut judged = 0;
+        for entry in self.journal.entries() {
+            match self.place(entry) {
+                Some((vehicle, name)) => fleet.borrow_mut().note(entry, vehicle, &name),
+                None => fleet.borrow_mut().link(entry),
+            }
+            let record = observer.see(entry);
+            world.learn(&record, &setting);
+            if listens.hears(record.kind()) {
+                judged += usize::from(running.observe(&record, &self.context(setting, &world, &shared), &mut findings));
+            }
+        }
+        let end = observer.end(self.at.moment);
+        running.finish(&end, &self.context(setting, &world, &shared), &mut findings);
         Outcome { findings, judged }
+    }
+
+    fn context<'c>(&'c self, setting: Setting<'c>, world: &'c World, shared: &'c Shared) -> CheckContext<'c> {
+        CheckContext {
+            setting,
+            with: &self.with,
+            world,
+            shared,
+        }
     }
 }
 

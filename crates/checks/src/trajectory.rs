@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use serde_json::Value;
 
-use super::orders::number;
-use super::traffic::{Traffic, broken, elements, remark, state, text, to_vehicle};
+use crate::finding::{broken, remark};
 use tck_base::nurbs::{Curve, Flaw, Path};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, number, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// `state/trajectory`.
 pub(super) const TRAJECTORY: Check = Check {
@@ -18,6 +18,8 @@ pub(super) const TRAJECTORY: Check = Check {
           not below 0, and as many knots within 0 to 1 as control points, degree and one together. A missing degree \
           and knots out of order are warnings.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(Shape::default()),
 };
 
@@ -29,6 +31,8 @@ pub(super) const TRAJECTORY_ENDS: Check = Check {
           their allowedDeviationXY and 0.5 m at the end or 1 m at the start. The start of the edge the vehicle is on is \
           not judged, for it is where the vehicle entered the edge.",
     arguments: &[],
+    listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(Ends::default()),
 };
 
@@ -40,6 +44,8 @@ pub(super) const PLANNED_PATH: Check = Check {
           written differently, and be cut off where it was driven already. An edge with a corridor is not judged, for \
           there the vehicle may drive round something.",
     arguments: &[],
+    listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(Planned::default()),
 };
 
@@ -69,15 +75,13 @@ fn order_of(message: &Value) -> String {
 
 #[derive(Default)]
 struct Shape {
-    traffic: Traffic,
     /// What was complained about: one complaint per kind and edge is enough.
     said: BTreeSet<(String, u64, String)>,
 }
 
 impl Running for Shape {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(state) = state(self.traffic, entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(state) = record.state() else {
             return false;
         };
         let mut judged = false;
@@ -90,10 +94,10 @@ impl Running for Shape {
                 }
                 let message = format!("the trajectory of edge {sequence}: {flaw}");
                 findings.push(match flaw {
-                    Flaw::Member(_) => broken("ORD-MSG-28", entry.seq(), message),
-                    Flaw::DegreeMissing => remark("ORD-MSG-28", entry.seq(), message),
-                    Flaw::KnotCount { .. } | Flaw::KnotRange { .. } => broken("ORD-MSG-29", entry.seq(), message),
-                    Flaw::KnotOrder(_) => remark("ORD-MSG-29", entry.seq(), message),
+                    Flaw::Member(_) => broken("ORD-MSG-28", record.seq(), message),
+                    Flaw::DegreeMissing => remark("ORD-MSG-28", record.seq(), message),
+                    Flaw::KnotCount { .. } | Flaw::KnotRange { .. } => broken("ORD-MSG-29", record.seq(), message),
+                    Flaw::KnotOrder(_) => remark("ORD-MSG-29", record.seq(), message),
                 });
             }
         }
@@ -147,18 +151,16 @@ impl Places {
 
 #[derive(Default)]
 struct Ends {
-    traffic: Traffic,
     places: Places,
     said: BTreeSet<(String, u64)>,
 }
 
 impl Running for Ends {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Some(order) = to_vehicle("order", entry, context) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if let Some(order) = record.to_vehicle(Topic::Order) {
             self.places.note(order);
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let order = order_of(state);
@@ -186,7 +188,7 @@ impl Running for Ends {
                 if distance > reach + allowed && self.said.len() < EDGES && self.said.insert((order.clone(), sequence))
                 {
                     let message = format!("the trajectory of edge {sequence} {verb} {distance:.2} m from its node");
-                    findings.push(broken("ORD-MSG-30", entry.seq(), message));
+                    findings.push(broken("ORD-MSG-30", record.seq(), message));
                 }
             }
         }
@@ -196,7 +198,6 @@ impl Running for Ends {
 
 #[derive(Default)]
 struct Planned {
-    traffic: Traffic,
     /// Edges with a corridor, by order and sequenceId.
     free: BTreeSet<(String, u64)>,
     order: String,
@@ -206,9 +207,8 @@ struct Planned {
 }
 
 impl Running for Planned {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Some(order) = to_vehicle("order", entry, context) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if let Some(order) = record.to_vehicle(Topic::Order) {
             let edges = elements(order, "edges").filter(|edge| edge.get("corridor").is_some_and(|one| !one.is_null()));
             for sequence in edges.filter_map(|edge| number(edge, "sequenceId")) {
                 if self.free.len() < EDGES {
@@ -216,7 +216,7 @@ impl Running for Planned {
                 }
             }
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let order = order_of(state);
@@ -246,7 +246,7 @@ impl Running for Planned {
             if farthest > SAME && self.said.insert(sequence) {
                 let message =
                     format!("the trajectory of edge {sequence} is {farthest:.2} m beside the one reported first");
-                findings.push(broken("STATE-15", entry.seq(), message));
+                findings.push(broken("STATE-15", record.seq(), message));
             }
         }
         judged

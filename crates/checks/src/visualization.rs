@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::rhythm::Rhythm;
-use super::traffic::{Traffic, broken, lag, outside_influence, remark};
+use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Listen, Observation, Topic};
 
 /// `visualization/rate`.
 pub(super) const RATE: Check = Check {
@@ -17,6 +17,19 @@ pub(super) const RATE: Check = Check {
           visualizationInterval of the vehicle's own factsheet: a vehicle may pause when it stands still. A vehicle \
           that states an interval and publishes nothing for ten of them while it is connected publishes none.",
     arguments: &[],
+    listens: &[
+        Listen::Fault,
+        Listen::Closed,
+        Listen::Disconnect,
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Lag,
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::Visualization),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(Rate::default()),
 };
 
@@ -27,6 +40,19 @@ pub(super) const PUBLISHED: Check = Check {
     doc: "Nobody has to publish the topic. A vehicle whose factsheet states a visualizationInterval, and which publishes \
           nothing for ten of them while it is connected, claims what it does not do: a warning.",
     arguments: &[],
+    listens: &[
+        Listen::Fault,
+        Listen::Closed,
+        Listen::Disconnect,
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Lag,
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::Visualization),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| {
         Box::new(Rate {
             presence_only: true,
@@ -45,7 +71,6 @@ const READING: f64 = 0.02;
 
 #[derive(Default)]
 struct Rate {
-    traffic: Traffic,
     /// visualizationInterval, once a factsheet came.
     stated: Option<Duration>,
     rhythm: Rhythm,
@@ -97,29 +122,24 @@ impl Rate {
 }
 
 impl Running for Rate {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let now = entry.at().moment;
-        if self.rhythm.note(entry) || outside_influence(entry) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let now = record.at().moment;
+        if self.rhythm.note(record) || record.outside_influence() {
             self.rhythm.forget();
             self.since = None;
             self.gaps.clear();
         }
-        if let Some(late) = lag(entry) {
+        if let Some(late) = record.lag() {
             // The interval in which the harness was late is not counted.
             self.rhythm.forget();
             self.since = self.since.map(|since| since + late);
         }
-        let Some(message) = self
-            .traffic
-            .delivered(entry, context)
-            .filter(|_| !self.traffic.disturbed)
-        else {
+        let Some(message) = record.delivered().filter(|_| !record.link.disturbed) else {
             return false;
         };
         match message.name {
             "factsheet" => {
-                let interval = entry
+                let interval = record
                     .json()
                     .and_then(|value| value.pointer("/protocolLimits/timing/visualizationInterval")?.as_f64());
                 self.stated = interval
@@ -130,11 +150,11 @@ impl Running for Rate {
             "visualization" => {
                 self.published = true;
                 self.gaps.extend(self.rhythm.beat(now, self.stated));
-                self.presence_only || self.judge(entry.seq(), findings)
+                self.presence_only || self.judge(record.seq(), findings)
             }
             "state" => {
                 self.since.get_or_insert(now);
-                self.silence(now, entry.seq(), findings);
+                self.silence(now, record.seq(), findings);
                 false
             }
             _ => false,

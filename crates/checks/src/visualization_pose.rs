@@ -3,14 +3,15 @@
 //! The form of its members is left to `message/schema`, how often it comes to `visualization/rate`.
 
 use std::time::Duration;
+use tck_journal::event::Event;
 
 use serde_json::Value;
 
-use super::state::driving::{Pose, is_displaced};
-use super::traffic::{Traffic, broken, remark, state};
+use super::state::driving::Pose;
+use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How far it may be from the states of a vehicle at rest, in metres and radians.
 const BESIDE: f64 = 0.5;
@@ -31,12 +32,22 @@ pub(super) const POSITION: Check = Check {
           name, within half a metre and half a radian, on the same map; a thousand times their coordinates are \
           millimetres, also while it drives. One without a position, although the states have one, is a warning. Judged when it happens twice.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Fault,
+        Listen::Delivered(Topic::State),
+        Listen::Delivered(Topic::Visualization),
+    ],
+    reads: &[Fact::Displaced],
     start: |_| Box::new(Position::default()),
 };
 
 #[derive(Default)]
 struct Position {
-    traffic: Traffic,
     /// The last state: when it came, where the vehicle stood.
     stood: Option<(Moment, Pose)>,
     /// The pose of the last state, and the visualizations since.
@@ -114,16 +125,23 @@ fn is_in_millimetres(from: &Pose, to: &Pose, shown: &Pose) -> bool {
 }
 
 impl Running for Position {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if is_displaced(entry, context) || self.traffic.disturbed {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.displaced().now(record)
+            || record.link.disturbed
+            || matches!(record.event(), Event::Fault { .. })
+        {
             self.stood = None;
             self.last = None;
             self.since.clear();
             self.on_the_way.clear();
         }
-        let now = entry.at().moment;
-        if let Some(state) = state(self.traffic, entry, context) {
+        let now = record.at().moment;
+        if let Some(state) = record.state() {
             let pose = Pose::of(state).filter(|_| state.get("driving") == Some(&Value::Bool(false)));
             let seen = Pose::of(state);
             self.known = seen.is_some();
@@ -139,27 +157,27 @@ impl Running for Position {
                 }
             };
         }
-        let message = self.traffic.delivered(entry, context);
+        let message = record.delivered();
         if message.is_none_or(|message| message.name != "visualization") {
             return false;
         }
-        let Some(value) = entry.json().filter(|value| value.is_object()) else {
+        let Some(value) = record.json().filter(|value| value.is_object()) else {
             return false;
         };
         if value.get("agvPosition").is_none() {
             self.without += u32::from(self.known);
             if self.without == 2 {
                 let text = "the visualization has no agvPosition, although the states have one";
-                findings.push(remark("VIS-01", entry.seq(), text));
+                findings.push(remark("VIS-01", record.seq(), text));
             }
             return self.known;
         }
         if let Some(pose) = Pose::of(value).filter(|_| self.on_the_way.len() < WAITING) {
-            self.on_the_way.push((entry.seq(), pose));
+            self.on_the_way.push((record.seq(), pose));
         }
         let stood = self.stood.as_ref().is_some_and(|(at, _)| now.since(*at) > OVERTAKING);
         if let Some(pose) = Pose::of(value).filter(|_| stood && self.since.len() < WAITING) {
-            self.since.push((entry.seq(), pose));
+            self.since.push((record.seq(), pose));
         }
         false
     }

@@ -42,6 +42,9 @@ pub trait Operator {
         None
     }
 
+    /// Ends what was started for the run, and waits until nothing of it is left.
+    async fn end(&mut self) {}
+
     /// How long a hook takes when nobody has to be asked, for the estimate before a run.
     fn usual_time(&self) -> Duration {
         Duration::from_secs(1)

@@ -76,7 +76,7 @@ fn an_order_ends_where_the_grammar_says() {
     let route = regex::Regex::new(r"base: \[([^\]]*)\]").expect("a pattern");
     let mut seen = 0;
     for pack in library.rules.packs.all() {
-        for (name, stimulus) in grammar(&library, pack, Role::Agv).stimuli {
+        for (name, stimulus) in grammar(library, pack, Role::Agv).stimuli {
             let then = &stimulus.then;
             let taken = usize::from(then.order) + usize::try_from(then.update).expect("a few updates");
             // A cancelled order is not updated any more.
@@ -102,7 +102,7 @@ fn an_order_ends_where_the_grammar_says() {
 #[test]
 fn what_was_not_tried_yet_is_drawn_first() {
     let library = tck_testing::library();
-    let grammar = grammar(&library, library.rules.packs.latest(), Role::Agv);
+    let grammar = grammar(library, library.rules.packs.latest(), Role::Agv);
     let mut coverage = Coverage::default();
     let drawn = exploration(grammar.clone(), 1, 300).drawn(&grammar, &mut coverage);
     let (tried, of) = coverage.pairs(&grammar);
@@ -142,7 +142,7 @@ fn a_stimulus_with_words_to_choose_from_becomes_one_for_every_mixture() {
 #[test]
 fn what_failed_when_it_was_tried_is_drawn_less() {
     let library = tck_testing::library();
-    let grammar = grammar(&library, library.rules.packs.latest(), Role::Agv);
+    let grammar = grammar(library, library.rules.packs.latest(), Role::Agv);
     let times = |coverage: &mut Coverage| {
         let drawn = exploration(grammar.clone(), 1, 40).drawn(&grammar, coverage);
         let said = drawn.iter().flat_map(|(chain, _)| chain.stimuli());
@@ -215,7 +215,7 @@ fn a_fault_is_found_where_it_shows() {
 #[test]
 fn shrinking_keeps_what_a_failure_needs_and_nothing_else() {
     let library = tck_testing::library();
-    let grammar = grammar(&library, library.rules.packs.latest(), Role::Agv);
+    let grammar = grammar(library, library.rules.packs.latest(), Role::Agv);
     let names = |all: &[&str]| all.iter().map(|&name| name.to_owned()).collect::<Vec<String>>();
     let long = names(&[
         "ask-state",

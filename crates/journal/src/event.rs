@@ -11,6 +11,7 @@ pub use super::fault::LinkFault;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
 pub use super::plan::{Capability, Gate, MockVehicle, Plan, PlannedTest, RunHeader, Setting};
+pub use super::program::{Ending, Origin, Program};
 pub use super::waiver::{Reading, Waiver};
 use tck_base::clock::Stamp;
 
@@ -161,6 +162,13 @@ pub enum Event {
         /// Address of the peer.
         peer: String,
     },
+    /// Whose the other end of a connection to the tap is, where a run has started a program.
+    Traced {
+        /// Number of the connection.
+        connection: u64,
+        /// See [`Origin`].
+        origin: Origin,
+    },
     /// A packet passed the tap.
     Packet {
         /// Number of the connection.
@@ -250,6 +258,13 @@ pub enum Event {
         /// Whether it counts as done.
         ok: bool,
     },
+    /// Something has become of the program that the run has started.
+    Program {
+        /// See [`Program`].
+        program: Program,
+    },
+    /// Somebody wants the run to end; nothing that happens from now on is held against the device.
+    Interrupted,
     /// A lasting mistake of the vehicle does not stand in the way of further tests.
     Waived {
         /// See [`Waiver`].

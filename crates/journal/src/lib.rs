@@ -14,6 +14,8 @@ mod packet;
 mod payload;
 pub mod place;
 mod plan;
+mod program;
+mod read;
 mod serving;
 mod vantage;
 mod waiver;
@@ -22,22 +24,24 @@ use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use serde_json::Value;
+use tck_view::{MessageView, Names, Topic};
 
 pub use event::{Direction, Event, Packet, Payload, Record, Source, Will};
 pub use json::Parsed;
 pub use plan::tool;
+use read::Read;
 pub use serving::ServeBehaviour;
 pub use vantage::Vantage;
 
 use tck_base::clock::Stamp;
 
-/// One record together with the one parse of its payload.
+/// One record together with the one parse and the one reading of its payload.
 #[derive(Debug)]
 pub struct Entry {
     /// The record as it stands in the journal.
     pub record: Record,
-    parsed: OnceLock<Arc<Parsed>>,
-    view: OnceLock<Value>,
+    read: OnceLock<Arc<Read>>,
+    picture: OnceLock<Value>,
 }
 
 impl Entry {
@@ -46,18 +50,18 @@ impl Entry {
     pub fn new(record: Record) -> Arc<Self> {
         Arc::new(Self {
             record,
-            parsed: OnceLock::new(),
-            view: OnceLock::new(),
+            read: OnceLock::new(),
+            picture: OnceLock::new(),
         })
     }
 
-    /// Wraps another record of the same payload, which is not parsed again.
+    /// Wraps another record of the same payload, which is not parsed or read again.
     #[must_use]
     pub fn beside(other: &Self, record: Record) -> Arc<Self> {
         let entry = Self::new(record);
-        if let Some(parsed) = other.shared() {
+        if let Some(read) = other.shared() {
             // It is empty: nobody else has seen it yet.
-            let _ = entry.parsed.set(Arc::clone(parsed));
+            let _ = entry.read.set(Arc::clone(read));
         }
         entry
     }
@@ -99,7 +103,7 @@ impl Entry {
     /// The payload parsed as JSON, once.
     #[must_use]
     pub fn parsed(&self) -> Option<&Parsed> {
-        self.shared().map(Arc::as_ref)
+        self.shared().map(|read| &read.parsed)
     }
 
     /// About how many bytes of memory its payload takes: its bytes, and the value they are parsed to, unless another record
@@ -107,13 +111,20 @@ impl Entry {
     #[must_use]
     pub fn held(&self) -> u64 {
         let bytes = self.payload().map_or(0, |payload| payload.bytes().len() as u64);
-        let own = self.shared().filter(|parsed| Arc::strong_count(parsed) == 1);
-        bytes + own.map_or(0, |parsed| parsed.weight())
+        let own = self.shared().filter(|read| Arc::strong_count(read) == 1);
+        bytes + own.map_or(0, |read| read.parsed.weight())
     }
 
-    fn shared(&self) -> Option<&Arc<Parsed>> {
+    fn shared(&self) -> Option<&Arc<Read>> {
         let payload = self.payload()?;
-        Some(self.parsed.get_or_init(|| Arc::new(Parsed::of(payload))))
+        Some(self.read.get_or_init(|| Arc::new(Read::of(payload))))
+    }
+
+    /// The payload as a message of a topic, read once for a version's names of members; `None` when there is none or it is
+    /// not JSON.
+    #[must_use]
+    pub fn view(&self, topic: Topic, names: &Names) -> Option<&MessageView> {
+        self.shared()?.view(topic, names)
     }
 
     /// The payload as a JSON value; `None` when there is none or it is not JSON.
@@ -128,7 +139,7 @@ impl Entry {
     pub fn subject(&self) -> Option<Cow<'_, Value>> {
         match &self.record.event {
             Event::Message { .. } | Event::Sent { .. } | Event::Retained { .. } => self.json().map(Cow::Borrowed),
-            event => Some(Cow::Borrowed(self.view.get_or_init(|| event.picture()))),
+            event => Some(Cow::Borrowed(self.picture.get_or_init(|| event.picture()))),
         }
     }
 }

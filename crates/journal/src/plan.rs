@@ -58,6 +58,9 @@ pub struct RunHeader {
     pub settings: Vec<Setting>,
     /// The command line as typed, passwords left out.
     pub command: Vec<String>,
+    /// SHA-256 of the files that make the device what it is: its profile, its program, and what both of them name.
+    #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
+    pub files: std::collections::BTreeMap<String, String>,
 }
 
 /// A mock AGV that a master control is tested with.
@@ -88,6 +91,9 @@ pub struct Plan {
     pub series_name: Option<String>,
     /// Whether every test of the suites was selected.
     pub complete: bool,
+    /// How often each test is to be run; absent when that is once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeat: Option<u32>,
 }
 
 /// One test of a plan.

@@ -3,14 +3,16 @@
 //! The device is the connection, or the connections, that publish on its topics, carry its will or subscribe to just what is
 //! sent to it. While one of these is open, a connection that does none of this belongs to a bystander: an onlooker, a
 //! visitor, another tool. What bystanders do is recorded and never judged. One that publishes where only the device may is
-//! named in the limits of the report; what it may have caused is held against nobody.
+//! named in the limits of the report; what it may have caused is undecided.
 //!
 //! A device may have several clients, and may come back while its former connection seems open. So only a connection that
 //! says what an open connection of the device says already, and does not look like that connection, is taken for a
-//! stranger.
+//! stranger. Where the run has started the device, and the system tells whose a connection is, no look is needed: what is of
+//! another program is a stranger's from its first byte on, whatever it says.
 
 mod client;
 mod influence;
+mod rivals;
 #[cfg(test)]
 mod tests;
 
@@ -20,9 +22,10 @@ use std::time::Duration;
 
 use client::{Client, Look, Stranger, Who};
 use influence::{AFTER_COMMAND, AFTER_FORGERY, AFTER_TAKEOVER, Excuse, Influence};
+use rivals::Rivals;
 use tck_base::clock::Moment;
 use tck_journal::Entry;
-use tck_journal::event::{Direction, Event, Occurrence, Packet, Payload, Will};
+use tck_journal::event::{Direction, Event, Occurrence, Origin, Packet, Payload, RunHeader, Will};
 use tck_pack::{Pack, Role};
 
 /// How many client ids are kept in mind, and how many strangers are named.
@@ -43,6 +46,9 @@ pub(super) enum Part {
 /// Everybody on the tap.
 #[derive(Debug, Default)]
 pub(super) struct Company {
+    /// Whether the device is one vehicle, of which is known how it uses its connections. Of a master control nobody knows how
+    /// many it has: only what is known to be of another program is a stranger's.
+    is_vehicle: bool,
     /// The full topics on which only the device publishes.
     own: BTreeSet<String>,
     /// The one of them that says whether it is connected; two clients of a device may both say so.
@@ -55,30 +61,45 @@ pub(super) struct Company {
     device: BTreeMap<String, (Look, BTreeSet<String>)>,
     /// The client ids of bystanders.
     strangers: BTreeMap<String, Stranger>,
+    /// Programs that are not what was started, by client id.
+    foreign: BTreeMap<String, Stranger>,
+    /// Others that may have been taken for the device.
+    rivals: Rivals,
     /// The peers of connections, until they say who they are.
     peers: BTreeMap<u64, String>,
+    /// Whose connections are, where the system tells, until they say who they are.
+    origins: BTreeMap<u64, Origin>,
     excuse: Excuse,
     influence: Influence,
+    /// What of it was done to the device itself.
+    harm: Influence,
 }
 
 impl Company {
-    /// Of an AGV under test with these topics by name. Of a master control nobody knows how many connections it has.
-    pub fn of(role: Role, topics: &BTreeMap<String, String>, pack: &Pack) -> Option<Self> {
-        if role != Role::Agv {
-            return None;
-        }
+    /// Of a device under test in a run with this header.
+    pub fn of(role: Role, header: &RunHeader, pack: &Pack) -> Self {
+        let of_vehicles = header.vehicles.iter().map(|vehicle| &vehicle.topics);
+        let all: Vec<_> = match header.vehicles.is_empty() {
+            true => vec![&header.topics],
+            false => of_vehicles.collect(),
+        };
         let published_by = |publisher: Role| {
-            let all = topics.iter();
+            let all = all.iter().copied().flatten();
             all.filter(move |(name, _)| pack.topic(name).is_some_and(|topic| topic.publisher == publisher))
                 .map(|(_, full)| full.clone())
                 .collect()
         };
-        Some(Self {
-            own: published_by(Role::Agv),
-            connection: topics.get("connection").cloned().unwrap_or_default(),
-            commands: published_by(Role::MasterControl),
+        let is_vehicle = role == Role::Agv;
+        Self {
+            is_vehicle,
+            own: published_by(role),
+            connection: header.topics.get("connection").cloned().unwrap_or_default(),
+            commands: match is_vehicle {
+                true => published_by(Role::MasterControl),
+                false => BTreeSet::new(),
+            },
             ..Self::default()
-        })
+        }
     }
 
     /// Sees the next entry.
@@ -90,6 +111,11 @@ impl Company {
             Event::Opened { connection, peer } => {
                 self.peers.insert(*connection, peer.clone());
             }
+            Event::Traced { connection, origin } => {
+                let peer = self.peers.get(connection).map_or("", String::as_str);
+                self.rivals.traced(origin, peer);
+                self.origins.insert(*connection, origin.clone());
+            }
             // A stranger's, if a stranger has just sent the same.
             Event::Message { topic, payload, .. } if self.influence.is_delivery(topic, payload) => {
                 return Part::Bystander;
@@ -99,12 +125,18 @@ impl Company {
             Event::Closed { connection, .. } => {
                 let part = self.part_of(*connection, entry);
                 self.peers.remove(connection);
+                self.origins.remove(connection);
                 self.open.remove(connection);
                 return part;
             }
             _ => {}
         }
         Part::Judged
+    }
+
+    /// Why the device itself may have been harmed now: thrown out, or commanded by somebody else.
+    pub fn harm(&self, now: Moment) -> Option<&Arc<str>> {
+        self.harm.at(now)
     }
 
     /// Why what is found now may stem from somebody else.
@@ -130,13 +162,15 @@ impl Company {
         };
         match self.open.get(&connection) {
             Some(client) => client.who != Who::Device,
+            None if !self.is_vehicle => self.is_foreign(connection),
             None => self.device_beside(connection).any(|client| self.is_known(client)),
         }
     }
 
     /// What restricts the statement.
     pub fn limits(&self) -> Vec<String> {
-        let busy = self.strangers.iter().filter(|(_, stranger)| stranger.is_busy());
+        let strangers = self.foreign.iter().chain(&self.strangers);
+        let busy = strangers.filter(|(_, stranger)| stranger.is_busy());
         let mut all: Vec<String> = busy
             .clone()
             .take(NAMED)
@@ -146,7 +180,22 @@ impl Company {
         if more > 0 {
             all.push(format!("{more} more clients did the like."));
         }
+        all.extend(self.rivals.limits());
         all
+    }
+
+    /// Why it is not certain that it was the device that was judged; nothing as long as nothing speaks against it.
+    pub fn mixed(&self) -> Option<String> {
+        let strangers = self.foreign.iter().chain(&self.strangers);
+        let rival = strangers.filter(|(_, stranger)| stranger.is_rival()).map(|(id, _)| id);
+        let named = rival.map(|id| format!("the client {id:?}, which is not the device, may have been taken for it"));
+        named.chain(self.rivals.mixed()).next()
+    }
+
+    /// Whether a connection is known to be of another program than what was started.
+    fn is_foreign(&self, connection: u64) -> bool {
+        let origin = self.origins.get(&connection);
+        origin.is_some_and(Origin::is_foreign) || self.open.get(&connection).is_some_and(Client::is_foreign)
     }
 
     /// A connection of the device other than this one.
@@ -160,7 +209,8 @@ impl Company {
     /// Whether something of a connection is to be judged. One that has not said who it is yet is the device as long as
     /// nobody else is.
     fn part_of(&mut self, connection: u64, entry: &Arc<Entry>) -> Part {
-        let known = self.device_beside(connection).any(|client| self.is_known(client));
+        let somebody = self.is_vehicle && self.device_beside(connection).any(|client| self.is_known(client));
+        let known = somebody || self.is_foreign(connection);
         match self.open.get_mut(&connection) {
             Some(client) if client.who == Who::Device => Part::Judged,
             Some(client) => {
@@ -206,13 +256,20 @@ impl Company {
     fn connects(&mut self, connection: u64, id: &str, look: Look, will: Option<&Will>, entry: &Arc<Entry>) -> Part {
         let now = entry.at().moment;
         let is_like = self.device.get(id).map(|(known, _)| *known == look);
-        let taken = self
+        let before = self
             .device_beside(connection)
-            .any(|client| client.id == id && self.is_known(client));
+            .find(|client| client.id == id && self.is_known(client))
+            .map(|client| client.peer.clone());
+        let taken = before.is_some() && self.is_vehicle;
         let is_excused = self.excuse.holds(now);
         let carries_will = will.is_some_and(|will| self.own.contains(&will.topic));
         let somebody = self.device_beside(connection).any(|client| self.is_known(client));
+        let origin = self.origins.remove(&connection);
+        let is_foreign = origin.as_ref().is_some_and(Origin::is_foreign);
+        let is_own = matches!(origin, Some(Origin::Started { .. }));
         let who = match is_like {
+            _ if is_foreign => Who::Bystander,
+            _ if is_own || !self.is_vehicle => Who::Device,
             Some(true) => Who::Device,
             Some(false) if taken && !is_excused => Who::Bystander,
             _ if self.strangers.contains_key(id) => Who::Bystander,
@@ -220,15 +277,33 @@ impl Company {
             Some(false) | None => Who::Device,
         };
         let peer = self.peers.remove(&connection).unwrap_or_default();
+        let mut client = Client::new(id, peer.clone(), look, who, entry.seq());
+        client.origin = origin;
         if who == Who::Bystander {
-            let stranger = self.stranger(id, &peer, entry.seq());
+            let goes_by_its_name = taken || self.device.contains_key(id);
+            let stranger = self.stranger(&client);
             stranger.takeovers += u64::from(taken);
+            if is_foreign && (carries_will || goes_by_its_name) {
+                stranger.poses();
+            }
+        }
+        if is_foreign && let Some(will) = will.filter(|_| carries_will) {
+            // The broker may say so in its place.
+            self.influence.await_delivery(&will.topic, &will.payload);
+        }
+        if is_own && let Some(rival) = self.foreign.get_mut(id) {
+            rival.poses();
         }
         if taken && who == Who::Bystander {
             let why = format!("a client at {peer} took the client id of the device, {id:?}, which was thrown out");
+            self.harm.lasts(now + AFTER_TAKEOVER, why.clone());
             self.influence.lasts(now + AFTER_TAKEOVER, why);
         }
-        let mut client = Client::new(id, peer, look, who, entry.seq());
+        if let (Some(former), Who::Device, false, false, true) = (&before, who, is_own, is_excused, taken) {
+            let why = self.rivals.connects(id, (former, &peer), entry.seq(), now);
+            self.harm.lasts(now + AFTER_TAKEOVER, why.clone());
+            self.influence.lasts(now + AFTER_TAKEOVER, why);
+        }
         if let Some((_, published)) = self.device.get(id).filter(|_| who == Who::Device) {
             client.publishes.clone_from(published);
         }
@@ -240,16 +315,26 @@ impl Company {
         self.part_of(connection, entry)
     }
 
-    /// The client with an id is not the device.
-    fn stranger(&mut self, id: &str, peer: &str, seq: u64) -> &mut Stranger {
-        if !self.strangers.contains_key(id) && self.strangers.len() >= KEPT {
+    /// A client is not the device.
+    fn stranger(&mut self, client: &Client) -> &mut Stranger {
+        let strangers = match client.is_foreign() {
+            true => &mut self.foreign,
+            false => &mut self.strangers,
+        };
+        if !strangers.contains_key(&client.id) && strangers.len() >= KEPT {
             // Those that did nothing are forgotten first.
-            let idle = self.strangers.iter().find(|(_, stranger)| !stranger.is_busy());
-            let forgotten = idle.or(self.strangers.iter().next()).map(|(id, _)| id.clone());
-            forgotten.map(|id| self.strangers.remove(&id));
+            let idle = strangers.iter().find(|(_, stranger)| !stranger.is_busy());
+            let forgotten = idle.or(strangers.iter().next()).map(|(id, _)| id.clone());
+            forgotten.map(|id| strangers.remove(&id));
         }
-        let new = || Stranger::new(peer, seq);
-        self.strangers.entry(id.to_owned()).or_insert_with(new)
+        let new = || {
+            let mut stranger = Stranger::new(&client.peer, client.seq);
+            if let Some(origin) = &client.origin {
+                stranger.is_of(origin);
+            }
+            stranger
+        };
+        strangers.entry(client.id.clone()).or_insert_with(new)
     }
 
     /// This connection is the device's: open ones that have not shown to be so are not.
@@ -273,8 +358,8 @@ impl Company {
                 continue;
             };
             client.who = Who::Bystander;
-            let (id, peer, seq) = (client.id.clone(), client.peer.clone(), client.seq);
-            self.stranger(&id, &peer, seq);
+            let named = client.named();
+            self.stranger(&named);
         }
     }
 
@@ -283,8 +368,11 @@ impl Company {
         let Some(client) = self.open.get_mut(&connection) else {
             return self.part_of(connection, entry);
         };
-        if client.who == Who::Stranger {
+        if client.who == Who::Stranger || client.is_foreign() {
             return Part::Bystander;
+        }
+        if !self.is_vehicle {
+            return Part::Judged;
         }
         let before = std::mem::take(&mut client.held);
         let came = std::mem::replace(&mut client.who, Who::Device);
@@ -302,8 +390,11 @@ impl Company {
         let Some(client) = self.open.get(&connection) else {
             return self.part_of(connection, entry);
         };
-        if client.who == Who::Stranger {
+        if client.who == Who::Stranger || client.is_foreign() {
             return self.forges(connection, topic, payload, retain, entry);
+        }
+        if !self.is_vehicle {
+            return Part::Judged;
         }
         // Two connections with one client id follow each other; the broker ends the first.
         let says_so = |other: &&Client| other.publishes.contains(topic) && other.id != client.id;
@@ -312,14 +403,17 @@ impl Company {
             let is_stronger = client.look.will.is_some() && other.look.will.is_none();
             let is_alike = client.look == other.look || is_stronger;
             let why = format!("two clients publish on {topic}: {:?} and {:?}", other.id, client.id);
-            (is_alike, why)
+            (is_alike || client.is_own(), client.is_own() && other.is_own(), why)
         });
-        if let Some((is_alike, why)) = beside {
+        if let Some((is_alike, false, why)) = beside {
             let now = entry.at().moment;
             if is_new && !is_alike && !self.excuse.holds(now) {
                 return self.forges(connection, topic, payload, retain, entry);
             }
             if topic != self.connection {
+                if !self.excuse.holds(now) {
+                    self.rivals.publish(topic, connection, &why, entry.seq());
+                }
                 self.influence.lasts(now + AFTER_TAKEOVER, why);
             }
         }
@@ -332,7 +426,7 @@ impl Company {
     fn forges(&mut self, connection: u64, topic: &str, payload: &Payload, retain: bool, entry: &Arc<Entry>) -> Part {
         let now = entry.at().moment;
         self.influence.await_delivery(topic, payload);
-        if let Some(who) = self.disown(connection, topic, entry) {
+        if let Some(who) = self.disown(connection, topic) {
             let why = format!("{who} published on {topic}, where only the device may");
             // What is stored in its name comes to every later subscriber.
             let long = if retain {
@@ -354,20 +448,21 @@ impl Company {
             return self.part_of(connection, entry);
         }
         self.influence.await_delivery(topic, payload);
-        if let Some(who) = self.disown(connection, topic, entry) {
+        if let Some(who) = self.disown(connection, topic) {
             let why = format!("{who} published on {topic}, where the device is commanded");
+            self.harm.lasts(entry.at().moment + AFTER_COMMAND, why.clone());
             self.influence.lasts(entry.at().moment + AFTER_COMMAND, why);
         }
         Part::Bystander
     }
 
     /// A connection is a stranger's that has published on a topic: who it is.
-    fn disown(&mut self, connection: u64, topic: &str, entry: &Entry) -> Option<String> {
+    fn disown(&mut self, connection: u64, topic: &str) -> Option<String> {
         let client = self.open.get_mut(&connection)?;
         client.who = Who::Stranger;
         client.held.clear();
-        let (id, peer) = (client.id.clone(), client.peer.clone());
-        self.stranger(&id, &peer, entry.seq()).publishes(topic);
-        Some(format!("the client {id:?} at {peer}"))
+        let named = client.named();
+        self.stranger(&named).publishes(topic);
+        Some(format!("the client {:?} at {}", named.id, named.peer))
     }
 }

@@ -19,7 +19,7 @@ impl Departure {
     pub(super) fn observe(&mut self, entry: &Entry, subject: Option<&str>) {
         match entry.event() {
             Event::Fault { fault } if !matches!(fault, LinkFault::Restore) => self.disturbed = true,
-            Event::Hook { .. } | Event::Vehicle { .. } => self.disturbed = true,
+            Event::Hook { .. } | Event::Vehicle { .. } | Event::Interrupted => self.disturbed = true,
             Event::Sent { .. } => self.last_sent = Some(entry.seq()),
             Event::Closed {
                 how: Close::DeviceFin | Close::DeviceReset,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::rules::{JudgeError, Rules};
 use super::test::Ground;
+use tck_base::time::TimeLimits;
 use tck_journal::event::RunHeader;
 use tck_pack::Role;
 
@@ -38,8 +39,10 @@ impl Grounds {
             role,
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: Arc::clone(&bindings),
+            time: TimeLimits::of_bindings(&bindings),
             waivers: Vec::new(),
             interference: None,
+            is_interrupted: false,
         };
         // What a master control sends names the vehicle it is for.
         let mut of_vehicles = header

@@ -46,6 +46,32 @@ fn both(one: &mut TestResult, other: &TestResult) {
     one.repetitions = repetitions;
 }
 
+/// Adds the repetitions of a test that were asked for and not done: each is inconclusive, and with it the test.
+pub(super) fn left_out(test: &mut TestResult, asked: u32, why: &str) {
+    let done = test.repetitions.len();
+    let missing: Vec<u32> = (1..=asked)
+        .filter(|number| test.repetitions.iter().all(|one| one.number != *number))
+        .collect();
+    if missing.is_empty() {
+        return;
+    }
+    test.repetitions.extend(missing.into_iter().map(|number| Repetition {
+        number,
+        verdict: Some(Verdict::Inconclusive),
+        seconds: 0.0,
+        reason: Some(why.to_owned()),
+        journal: None,
+    }));
+    test.repetitions.sort_by_key(|one| one.number);
+    let verdict = test
+        .verdict
+        .map_or(Verdict::Inconclusive, |verdict| verdict.join(Verdict::Inconclusive));
+    if test.verdict != Some(verdict) {
+        test.verdict = Some(verdict);
+        test.reason = Some(format!("run {done} of {asked} times: {why}"));
+    }
+}
+
 /// Whether a run that goes on with another one need not run a test again. A fail stands on its evidence, though the test
 /// may have been broken off.
 pub(super) fn is_decided(test: &TestResult) -> bool {
@@ -110,7 +136,7 @@ mod tests {
                 verdict: Some(verdict),
                 seconds: 1.0,
                 reason: None,
-                journal: None,
+                journal: Some((u64::from(number), u64::from(number))),
             }],
         }
     }
@@ -141,6 +167,25 @@ mod tests {
             assert!(joined[0].is_flaky() && joined[0].repetitions.len() == 3);
         }
         assert!(!repetitions(&[pass.clone(), run(2, Verdict::Pass, &[])])[0].is_flaky());
+    }
+
+    #[test]
+    fn a_repetition_that_was_not_done_leaves_the_test_undecided_and_takes_no_failure_back() {
+        let mut passed = run(1, Verdict::Pass, &[("A", Verdict::Pass)]);
+        left_out(&mut passed, 3, "nobody was there");
+        assert_eq!(passed.verdict, Some(Verdict::Inconclusive));
+        assert_eq!(passed.reason.as_deref(), Some("run 1 of 3 times: nobody was there"));
+        let done: Vec<bool> = passed.repetitions.iter().map(Repetition::was_done).collect();
+        assert_eq!(
+            (done, passed.left_out(), passed.is_flaky()),
+            (vec![true, false, false], 2, false)
+        );
+        assert!(!is_decided(&passed), "a run that goes on with this one does them");
+        let mut failed = run(2, Verdict::Fail, &[("A", Verdict::Fail)]);
+        left_out(&mut failed, 2, "why");
+        assert_eq!((failed.verdict, failed.repetitions[0].number), (Some(Verdict::Fail), 1));
+        left_out(&mut failed, 2, "why");
+        assert_eq!(failed.left_out(), 1);
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod mend;
 mod monitor;
 mod opinions;
 mod own_errors;
+mod program;
 mod reactions;
 mod rules;
 mod run;

@@ -41,6 +41,31 @@ impl Library {
         })
     }
 
+    /// How many suites of somebody's own there are, such as `own suites: 3 tests, 1 monitor`; nothing without any.
+    #[must_use]
+    pub fn own(&self) -> Option<String> {
+        let own = self.assets.own();
+        if own.is_empty() {
+            return None;
+        }
+        let tests = self.rules.suites.tests.iter();
+        let tests = tests.filter(|test| own.contains(&test.source.name)).count();
+        let files = |folder: &str| own.iter().filter(|path| path.starts_with(folder)).count();
+        let all = [
+            (tests, "test"),
+            (files("suites/monitors/"), "monitor"),
+            (files("suites/explore/"), "file of stimuli"),
+            (files("suites/requirements/"), "file of requirements"),
+        ];
+        let all = all.into_iter().filter(|(count, _)| *count > 0);
+        let all = all.map(|(count, what)| match (count, what.split_once(' ')) {
+            (1, _) => format!("1 {what}"),
+            (_, None) => format!("{count} {what}s"),
+            (_, Some((first, rest))) => format!("{count} {first}s {rest}"),
+        });
+        Some(format!("own suites: {}", all.collect::<Vec<String>>().join(", ")))
+    }
+
     /// The tests of a role for a protocol version that decide at least one requirement of it, by id.
     pub fn tests(&self, role: Role, protocol: &str) -> Vec<Arc<Test>> {
         let Some(pack) = self.rules.packs.get(protocol) else {

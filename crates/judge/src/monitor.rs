@@ -12,7 +12,6 @@ use super::hidden::Hidden;
 use super::holds::unbound_text;
 use super::step::shown_path;
 use super::test::Ground;
-use tck_base::clock::Moment;
 use tck_base::pattern::{Bindings, Bound, Unbound};
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
@@ -20,6 +19,7 @@ use tck_journal::Entry;
 use tck_journal::event::Event;
 use tck_result::{MonitorFinding, MonitorResult};
 use tck_suite::model::{Monitor, Need, Rule};
+use tck_world::{End, Listens, Observation, World};
 
 /// How many occurrences of a finding are kept by number.
 pub(super) const FIRST: usize = 5;
@@ -49,6 +49,15 @@ struct Awaited {
     pattern: Bound,
 }
 
+/// What the monitors of one vehicle know together.
+#[derive(Debug, Default)]
+pub struct Knowledge {
+    /// The facts.
+    pub world: World,
+    /// What several of them work out once.
+    pub shared: Shared,
+}
+
 enum Watching {
     Pattern {
         topic: String,
@@ -58,6 +67,7 @@ enum Watching {
     },
     Check {
         running: Box<dyn Running>,
+        listens: Listens,
         with: Map<String, serde_json::Value>,
     },
     /// Something it needs is not there: judges nothing.
@@ -66,7 +76,13 @@ enum Watching {
 
 impl MonitorJudge {
     /// Puts a monitor on duty; `None` when it is not meant for this version.
-    pub fn start(monitor: &Arc<Monitor>, ground: &Ground, bindings: &Bindings, tap: bool) -> Option<Self> {
+    pub fn start(
+        monitor: &Arc<Monitor>,
+        ground: &Ground,
+        bindings: &Bindings,
+        tap: bool,
+        known: &mut Knowledge,
+    ) -> Option<Self> {
         let wanted = monitor
             .checks
             .iter()
@@ -78,7 +94,7 @@ impl MonitorJudge {
         let rule = if monitor.needs.contains(&Need::Tap) && !tap {
             Watching::Off
         } else {
-            Self::watch(&monitor.rule, ground, bindings).unwrap_or_else(|unbound| {
+            Self::watch(&monitor.rule, ground, bindings, known).unwrap_or_else(|unbound| {
                 open = Some(unbound_text(&unbound));
                 Watching::Off
             })
@@ -102,7 +118,7 @@ impl MonitorJudge {
         })
     }
 
-    fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings) -> Result<Watching, Unbound> {
+    fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings, known: &mut Knowledge) -> Result<Watching, Unbound> {
         Ok(match rule {
             Rule::Always { topic, when, pattern } => Watching::Pattern {
                 topic: topic.clone(),
@@ -124,16 +140,19 @@ impl MonitorJudge {
                 for (name, term) in &check.with {
                     with.insert(name.clone(), term.bind(bindings)?);
                 }
+                known.world.reads(definition.reads);
                 Watching::Check {
-                    running: (definition.start)(&context(ground, &with, &Shared::default())),
+                    running: (definition.start)(&context(ground, &with, known)),
+                    listens: Listens::to(definition.listens),
                     with,
                 }
             }
         })
     }
 
-    /// Shows it one entry.
-    pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground, shared: &Shared) {
+    /// Shows it one record.
+    pub fn observe(&mut self, record: &Observation<'_>, subject: Option<&str>, ground: &Ground, known: &Knowledge) {
+        let entry = record.entry;
         if matches!(entry.event(), Event::TestBegun { .. }) {
             self.broken = None;
         }
@@ -141,8 +160,11 @@ impl MonitorJudge {
         let mut found = Vec::new();
         match &mut self.rule {
             Watching::Off => {}
-            Watching::Check { running, with } => {
-                if running.observe(entry, &context(ground, with, shared), &mut found) {
+            Watching::Check { running, listens, with } => {
+                if !listens.hears(record.kind()) {
+                    return;
+                }
+                if running.observe(record, &context(ground, with, known), &mut found) {
                     self.judged += 1;
                 }
             }
@@ -209,10 +231,10 @@ impl MonitorJudge {
     }
 
     /// The run has ended.
-    pub fn finish(&mut self, end: Moment, ground: &Ground, shared: &Shared) {
+    pub fn finish(&mut self, end: &End, ground: &Ground, known: &Knowledge) {
         let mut found = Vec::new();
-        if let Watching::Check { running, with } = &mut self.rule {
-            running.finish(end, &context(ground, with, shared), &mut found);
+        if let Watching::Check { running, with, .. } = &mut self.rule {
+            running.finish(end, &context(ground, with, known), &mut found);
         }
         self.keep(found, ground);
     }
@@ -232,7 +254,7 @@ impl MonitorJudge {
                 continue;
             }
             let (verdict, message) = match &ground.interference {
-                Some(why) if verdict == Verdict::Fail => (
+                Some(why) if verdict == Verdict::Fail || ground.is_interrupted => (
                     Verdict::Inconclusive,
                     format!("cannot be told, since {why}; {}", finding.message),
                 ),
@@ -332,14 +354,11 @@ fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String
     }
 }
 
-fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>, shared: &'a Shared) -> CheckContext<'a> {
+fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>, known: &'a Knowledge) -> CheckContext<'a> {
     CheckContext {
-        pack: &ground.pack,
-        topics: &ground.topics,
-        role: ground.role,
-        identity: (&ground.identity.0, &ground.identity.1),
+        setting: ground.setting(),
         with,
-        bindings: &ground.bindings,
-        shared,
+        world: &known.world,
+        shared: &known.shared,
     }
 }

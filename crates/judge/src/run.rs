@@ -20,6 +20,7 @@ use super::company::{Company, Part};
 use super::grounds::Grounds;
 use super::hidden::Hidden;
 use super::mend::mended;
+use super::program;
 use super::reactions::Reactions;
 use super::rules::{JudgeError, Rules};
 use super::test::{Ground, TestJudge};
@@ -27,6 +28,7 @@ use super::timeline::Timeline;
 use super::unheard::Unheard;
 use super::watches::Watches;
 use tck_base::clock::{Moment, Stamp};
+use tck_base::time::TimeLimits;
 use tck_base::verdict::Verdict;
 use tck_journal::Entry;
 use tck_journal::event::{Event, Occurrence, Plan, Reading, RunHeader, Waiver};
@@ -49,8 +51,12 @@ pub struct RunJudge {
     records: u64,
     timeline: Timeline,
     watches: Watches,
-    /// Who is on the tap, where that is known.
-    company: Option<Company>,
+    /// Who is on the tap.
+    company: Company,
+    /// What becomes of the program that the run has started.
+    program: program::Watched,
+    /// Why nothing is held against the device any more: the run was interrupted.
+    interrupted: Option<Arc<str>>,
     /// What the device does not show to have heard, where nobody sees what reaches it.
     unheard: Option<Unheard>,
     /// Whether the last entry was left out.
@@ -90,7 +96,7 @@ impl RunJudge {
         let reactions = Reactions::of(&header.vehicles);
         let is_unseen = !tap && role == Role::Agv;
         let unheard = is_unseen.then(|| Unheard::of(&ground.topics, &ground.pack));
-        let company = Company::of(role, &ground.topics, &ground.pack);
+        let company = Company::of(role, &header, &ground.pack);
         let timeline = if header.vehicles.is_empty() {
             Timeline::new(&header.topics)
         } else {
@@ -107,6 +113,8 @@ impl RunJudge {
             records: first.seq(),
             watches,
             company,
+            program: program::Watched::default(),
+            interrupted: None,
             unheard,
             reactions,
             instants: BTreeMap::new(),
@@ -130,9 +138,7 @@ impl RunJudge {
     /// Whether nothing would be judged otherwise without this: somebody who is not the device does something that has
     /// nothing to do with it.
     pub fn can_do_without(&self, occurrence: &Occurrence) -> bool {
-        self.company
-            .as_ref()
-            .is_some_and(|company| company.is_dispensable(occurrence))
+        self.company.is_dispensable(occurrence)
     }
 
     /// Shows it the next entry.
@@ -163,6 +169,7 @@ impl RunJudge {
                 let mut bindings = tck_base::pattern::Bindings::above(vec![Arc::clone(&self.ground.bindings)]);
                 bindings.set(name, value.clone());
                 self.ground.bindings = Arc::new(bindings.to_map());
+                self.ground.time = TimeLimits::of_bindings(&self.ground.bindings);
             }
             Event::TestBegun {
                 test,
@@ -206,12 +213,23 @@ impl RunJudge {
     /// Whether an entry is about somebody on the tap who is not the device. What was left out of a client that turns out to be
     /// the device is made up for.
     fn is_of_bystander(&mut self, entry: &Arc<Entry>) -> bool {
-        let Some(company) = &mut self.company else { return false };
-        let part = company.observe(entry);
-        self.ground.interference = company.interference(entry.at().moment).cloned();
-        if let (Some(why), Some(current)) = (&self.ground.interference, &mut self.current) {
+        let part = self.company.observe(entry);
+        let present = self.company.interference(entry.at().moment).cloned();
+        if let (Some(why), Some(current)) = (&present, &mut self.current) {
             current.interfered(why);
         }
+        if *entry.event() == Event::Interrupted && self.interrupted.is_none() {
+            let why = interrupted(entry);
+            if let Some(current) = &mut self.current {
+                current.interrupted(entry.seq(), &why);
+            }
+            self.interrupted = Some(why);
+        }
+        let is_interrupted = self.interrupted.is_some();
+        let harm = self.company.harm(entry.at().moment);
+        self.program.observe(entry, harm.map(AsRef::as_ref), is_interrupted);
+        self.ground.interference = self.interrupted.clone().or(present);
+        self.ground.is_interrupted = is_interrupted;
         match part {
             Part::Judged => false,
             Part::Bystander => true,
@@ -334,6 +352,16 @@ impl RunJudge {
             .cloned()
     }
 
+    /// Whether the journal says that the run was interrupted.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupted.is_some()
+    }
+
+    /// How the program that the run has started has ended by itself, as long as it was not started again.
+    pub fn program_is_down(&self) -> Option<&str> {
+        self.program.is_down()
+    }
+
     /// The test that is running.
     pub fn current(&self) -> Option<&TestJudge> {
         self.current.as_ref()
@@ -358,6 +386,11 @@ impl RunJudge {
     pub fn ground(&self) -> &Ground {
         &self.ground
     }
+}
+
+/// Why nothing is held against the device after this entry.
+pub(super) fn interrupted(entry: &Entry) -> Arc<str> {
+    format!("the run was interrupted (#{})", entry.seq()).into()
 }
 
 /// What shows nothing in a test: what was found in it, and what is known from before.

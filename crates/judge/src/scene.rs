@@ -7,10 +7,12 @@ use serde_json::{Map, Value};
 
 use super::timeline::Timeline;
 use tck_base::pattern::Bindings;
+use tck_base::time::TimeLimits;
 use tck_check::Check;
 use tck_journal::Entry;
 use tck_journal::event::Waiver;
 use tck_pack::{Pack, Role};
+use tck_world::Setting;
 
 /// Everything around a step.
 #[derive(Clone, Copy)]
@@ -27,6 +29,8 @@ pub struct Scene<'a> {
     pub identity: (&'a str, &'a str),
     /// The run's own bindings: `time`, `device`.
     pub run_bindings: &'a Map<String, Value>,
+    /// How long something may take.
+    pub time: &'a TimeLimits,
     /// All variables of the test.
     pub bindings: &'a Bindings,
     /// By subject.
@@ -35,4 +39,18 @@ pub struct Scene<'a> {
     pub entries: &'a [Arc<Entry>],
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: &'a [Waiver],
+}
+
+impl<'a> Scene<'a> {
+    /// What a check and the facts it reads may know besides the records.
+    pub(super) fn setting(&self) -> Setting<'a> {
+        Setting {
+            pack: self.pack,
+            topics: self.topics,
+            role: self.role,
+            identity: self.identity,
+            bindings: self.run_bindings,
+            time: self.time,
+        }
+    }
 }

@@ -8,11 +8,12 @@ use std::sync::Arc;
 use super::company::{Company, Part};
 use super::grounds::Grounds;
 use super::rules::{JudgeError, Rules};
+use super::run::interrupted;
 use super::test::Ground;
 use super::timeline::Timeline;
 use super::watches::{Observed, Watches};
 use tck_journal::Entry;
-use tck_journal::event::RunHeader;
+use tck_journal::event::{Event, RunHeader};
 use tck_suite::model::Monitor;
 
 /// See the module.
@@ -22,6 +23,8 @@ pub struct SideJudge {
     watches: Watches,
     /// Who is on the tap besides the device, where a journal tells.
     company: Option<Company>,
+    /// Why nothing is held against the device any more: the run was interrupted.
+    interrupted: Option<Arc<str>>,
 }
 
 impl SideJudge {
@@ -44,13 +47,14 @@ impl SideJudge {
             timeline,
             ground,
             company: None,
+            interrupted: None,
         })
     }
 
     /// The same for the journal of a run, which tells who is on the tap besides the device: what bystanders do is not judged.
     #[must_use]
-    pub fn among_others(mut self) -> Self {
-        self.company = Company::of(self.ground.role, &self.ground.topics, &self.ground.pack);
+    pub fn among_others(mut self, header: &RunHeader) -> Self {
+        self.company = Some(Company::of(self.ground.role, header, &self.ground.pack));
         self
     }
 
@@ -59,7 +63,12 @@ impl SideJudge {
         let mut part = Part::Judged;
         if let Some(company) = &mut self.company {
             part = company.observe(entry);
-            self.ground.interference = company.interference(entry.at().moment).cloned();
+            if *entry.event() == Event::Interrupted {
+                self.interrupted.get_or_insert_with(|| interrupted(entry));
+            }
+            let present = company.interference(entry.at().moment);
+            self.ground.interference = self.interrupted.as_ref().or(present).cloned();
+            self.ground.is_interrupted = self.interrupted.is_some();
         }
         match part {
             Part::Judged => self.judge(entry),

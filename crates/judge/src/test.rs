@@ -18,6 +18,7 @@ use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
 use tck_base::pattern::Bindings;
+use tck_base::time::TimeLimits;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::Check;
 use tck_journal::Entry;
@@ -25,6 +26,7 @@ use tck_journal::event::{Event, StepEnd, Waiver};
 use tck_pack::{Catalogue, Pack, Role};
 use tck_result::{Decision, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
+use tck_world::Setting;
 
 /// What does not change during a run.
 pub struct Ground {
@@ -42,10 +44,28 @@ pub struct Ground {
     pub identity: (String, String),
     /// `time`, `device`.
     pub bindings: Arc<Map<String, Value>>,
+    /// The limits among them.
+    pub time: TimeLimits,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
-    /// Why what is found at present may stem from somebody else on the tap.
+    /// Why what is found at present may stem from somebody else: one on the tap, or who has interrupted the run.
     pub interference: Option<Arc<str>>,
+    /// Whether the run was interrupted. Then nothing is held against the device any more, not even as a remark.
+    pub is_interrupted: bool,
+}
+
+impl Ground {
+    /// What monitors and facts may know besides the records.
+    pub(super) fn setting(&self) -> Setting<'_> {
+        Setting {
+            pack: &self.pack,
+            topics: &self.topics,
+            role: self.role,
+            identity: (&self.identity.0, &self.identity.1),
+            bindings: &self.bindings,
+            time: &self.time,
+        }
+    }
 }
 
 /// What is only preferred by a ruling of the catalogue: broken is a warning.
@@ -84,6 +104,8 @@ pub struct TestJudge {
     departure: Departure,
     /// Why what is found may stem from somebody else.
     interference: Option<Arc<str>>,
+    /// The run was interrupted then, and why that says nothing about the device.
+    interrupted: Option<(u64, Arc<str>)>,
     hidden: Vec<Hidden>,
     /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
     /// decided before.
@@ -137,6 +159,7 @@ impl TestJudge {
             },
             departure: Departure::default(),
             interference: ground.interference.clone(),
+            interrupted: None,
             hidden: Vec::new(),
             open: Vec::new(),
             ended: false,
@@ -225,6 +248,7 @@ impl TestJudge {
             role: ground.role,
             identity: (&ground.identity.0, &ground.identity.1),
             run_bindings: &ground.bindings,
+            time: &ground.time,
             bindings: &self.bindings,
             timeline,
             entries: &self.entries,
@@ -426,8 +450,21 @@ impl TestJudge {
         self.interference.get_or_insert_with(|| Arc::clone(why));
     }
 
+    /// The run was interrupted: what is found from now on is not held against the device. What was found before stands.
+    pub(super) fn interrupted(&mut self, seq: u64, why: &Arc<str>) {
+        self.interrupted.get_or_insert_with(|| (seq, Arc::clone(why)));
+    }
+
     /// What somebody else may have caused is not held against the device.
     fn allow_for_others(&mut self) {
+        if let Some((since, why)) = &self.interrupted {
+            for open in self.open.iter_mut().filter(|open| open.ended > *since) {
+                if matches!(open.clause.holds, Holds::No | Holds::Late | Holds::Softly) {
+                    open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+                    open.clause.holds = Holds::Unseen(why.to_string());
+                }
+            }
+        }
         let Some(why) = &self.interference else { return };
         for open in &mut self.open {
             if matches!(open.clause.holds, Holds::No | Holds::Late) {

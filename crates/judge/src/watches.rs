@@ -9,17 +9,18 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use super::hidden::Hidden;
-use super::monitor::{FIRST, MonitorJudge};
+use super::monitor::{FIRST, Knowledge, MonitorJudge};
 use super::test::Ground;
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
 use tck_base::pattern::Bindings;
 use tck_base::verdict::{Accumulated, Verdict};
-use tck_check::{FleetSeen, Shared};
+use tck_check::Shared;
 use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
 use tck_result::{MonitorFinding, MonitorResult};
 use tck_suite::model::Monitor;
+use tck_world::{FleetSeen, Observer, World};
 
 /// Something a monitor found.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,30 +43,39 @@ pub(super) struct Watches {
 /// The monitors of one vehicle.
 struct Watch {
     monitors: Vec<MonitorJudge>,
-    shared: Shared,
+    observer: Observer,
+    known: Knowledge,
 }
 
 impl Watch {
     fn begin(monitors: &[&Arc<Monitor>], ground: &Ground, tap: bool, fleet: &Rc<RefCell<FleetSeen>>) -> Self {
         let bindings = Bindings::above(vec![ground.pack.words(), Arc::clone(&ground.bindings)]);
+        let mut known = Knowledge {
+            world: World::of_fleet(fleet),
+            shared: Shared::default(),
+        };
         let all = monitors.iter();
         Self {
             monitors: all
-                .filter_map(|monitor| MonitorJudge::start(monitor, ground, &bindings, tap))
+                .filter_map(|monitor| MonitorJudge::start(monitor, ground, &bindings, tap, &mut known))
                 .collect(),
-            shared: Shared::of_fleet(fleet),
+            observer: Observer::new(&ground.topics, &ground.pack, ground.role),
+            known,
         }
     }
 
     fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground) {
+        let record = self.observer.see(entry);
+        self.known.world.learn(&record, &ground.setting());
         for monitor in &mut self.monitors {
-            monitor.observe(entry, subject, ground, &self.shared);
+            monitor.observe(&record, subject, ground, &self.known);
         }
     }
 
     fn finish(&mut self, end: Moment, ground: &Ground) {
+        let end = self.observer.end(end);
         for monitor in &mut self.monitors {
-            monitor.finish(end, ground, &self.shared);
+            monitor.finish(&end, ground, &self.known);
         }
     }
 }

@@ -10,10 +10,14 @@ use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
 use tck_journal::Entry;
 use tck_pack::RequirementId;
 use tck_suite::model::{Binding, CheckUse};
+use tck_world::{Listens, Observer, World};
 
 /// A named check running over a window.
 pub(super) struct CheckWindow {
     running: Box<dyn Running>,
+    listens: Listens,
+    observer: Observer,
+    world: World,
     shared: Shared,
     with: Map<String, Value>,
     findings: Vec<CheckFinding>,
@@ -59,9 +63,14 @@ impl CheckWindow {
             with.insert(name.clone(), value);
         }
         let shared = Shared::default();
-        let running = (definition.start)(&context(scene, &with, &shared));
+        let mut world = World::default();
+        world.reads(definition.reads);
+        let running = (definition.start)(&context(scene, &with, &world, &shared));
         Ok(Self {
             running,
+            listens: Listens::to(definition.listens),
+            observer: Observer::new(scene.topics, scene.pack, scene.role),
+            world,
             shared,
             with,
             findings: Vec::new(),
@@ -102,9 +111,11 @@ impl CheckWindow {
             let before = self.findings.len();
             let meant = self.mends.read(next, scene);
             let shown = meant.as_deref().unwrap_or(next);
-            let judged = self
-                .running
-                .observe(shown, &context(scene, &self.with, &self.shared), &mut self.findings);
+            let record = self.observer.see(shown);
+            self.world.learn(&record, &scene.setting());
+            let context = context(scene, &self.with, &self.world, &self.shared);
+            let judged =
+                self.listens.hears(record.kind()) && self.running.observe(&record, &context, &mut self.findings);
             if next.seq() == entry.seq() {
                 let here = self.findings.iter().skip(before);
                 let here = here.filter(|finding| finding.seq == next.seq() && self.counts(finding));
@@ -156,8 +167,9 @@ impl CheckWindow {
     /// The window has ended; returns what was found by that.
     pub(super) fn finish(&mut self, end: tck_base::clock::Moment, scene: &Scene<'_>) -> Option<(Holds, String)> {
         let before = self.findings.len();
+        let context = context(scene, &self.with, &self.world, &self.shared);
         self.running
-            .finish(end, &context(scene, &self.with, &self.shared), &mut self.findings);
+            .finish(&self.observer.end(end), &context, &mut self.findings);
         let here = self.findings.iter().skip(before);
         let here: Vec<CheckFinding> = here.filter(|finding| self.counts(finding)).cloned().collect();
         self.told.extend(here);
@@ -168,28 +180,33 @@ impl CheckWindow {
     }
 }
 
-fn context<'a>(scene: &'a Scene<'_>, with: &'a Map<String, Value>, shared: &'a Shared) -> CheckContext<'a> {
+fn context<'a>(
+    scene: &'a Scene<'_>,
+    with: &'a Map<String, Value>,
+    world: &'a World,
+    shared: &'a Shared,
+) -> CheckContext<'a> {
     CheckContext {
-        pack: scene.pack,
-        topics: scene.topics,
-        role: scene.role,
-        identity: scene.identity,
+        setting: scene.setting(),
         with,
-        bindings: scene.run_bindings,
+        world,
         shared,
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
     use tck_base::diagnostic::{Source, Span};
-    use tck_pack::RequirementId;
+    use tck_pack::{Assets, Packs, RequirementId, Role};
+    use tck_world::Observation;
 
     struct Silent;
 
     impl Running for Silent {
-        fn observe(&mut self, _: &Entry, _: &CheckContext<'_>, _: &mut Vec<CheckFinding>) -> bool {
+        fn observe(&mut self, _: &Observation<'_>, _: &CheckContext<'_>, _: &mut Vec<CheckFinding>) -> bool {
             false
         }
     }
@@ -204,8 +221,12 @@ mod tests {
     }
 
     fn window(told: Vec<CheckFinding>) -> CheckWindow {
+        let packs = Packs::load(&Assets::of_source_tree().unwrap()).unwrap();
         CheckWindow {
             running: Box::new(Silent),
+            listens: Listens::default(),
+            observer: Observer::new(&BTreeMap::new(), packs.latest(), Role::Agv),
+            world: World::default(),
             shared: Shared::default(),
             with: Map::new(),
             findings: Vec::new(),

@@ -1,5 +1,6 @@
 //! The files of `suites/` and `schemas/`, replaceable by a directory.
 
+use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 
@@ -23,15 +24,27 @@ pub struct AssetFile {
 #[derive(Clone, Debug)]
 pub struct Assets {
     files: Vec<AssetFile>,
+    /// Paths of files that were checked before the program was built.
+    checked: BTreeSet<String>,
     sha256: String,
     modified: bool,
+    /// The paths of the files that somebody has given.
+    own: Vec<String>,
 }
 
 impl Assets {
-    /// These files, as built in; hidden ones are left out.
+    /// The files that the program carries, without hidden ones. They were checked before it was built.
     #[must_use]
-    pub fn of_files(files: impl IntoIterator<Item = AssetFile>) -> Self {
-        Self::new(files.into_iter().filter(|file| !hidden(&file.path)).collect())
+    pub fn built_in(files: impl IntoIterator<Item = AssetFile>) -> Self {
+        let mut assets = Self::new(files.into_iter().filter(|file| !hidden(&file.path)).collect());
+        assets.checked = assets.files.iter().map(|file| file.path.clone()).collect();
+        assets
+    }
+
+    /// Whether a file was checked before the program was built, so that nobody has to look for mistakes in it again.
+    #[must_use]
+    pub fn is_checked(&self, path: &str) -> bool {
+        self.checked.contains(path)
     }
 
     /// The folders `suites/` and `schemas/` of a source tree.
@@ -53,9 +66,13 @@ impl Assets {
     pub fn with_suites(&self, dir: &Path) -> io::Result<Self> {
         let mut files = Vec::new();
         files_below(dir, "suites", 0, &mut files)?;
+        let own = paths(&files);
         files.extend(self.under("schemas/").cloned());
         let mut assets = Self::new(files);
+        assets.own = own;
         assets.modified = assets.sha256 != self.sha256;
+        let same = |path: &&String| assets.get(path) == self.get(path);
+        assets.checked = self.checked.iter().filter(same).cloned().collect();
         Ok(assets)
     }
 
@@ -66,6 +83,7 @@ impl Assets {
     pub fn with_added(&self, dir: &Path) -> io::Result<Self> {
         let mut own = Vec::new();
         files_below(dir, "suites", 0, &mut own)?;
+        let paths = paths(&own);
         let mut files = self.files.clone();
         for file in own {
             match self.get(&file.path) {
@@ -78,7 +96,10 @@ impl Assets {
             }
         }
         let mut assets = Self::new(files);
+        assets.own = paths;
         assets.modified = assets.sha256 != self.sha256;
+        let same = |path: &&String| assets.get(path) == self.get(path);
+        assets.checked = self.checked.iter().filter(same).cloned().collect();
         Ok(assets)
     }
 
@@ -111,8 +132,10 @@ impl Assets {
             });
         Self {
             files,
+            checked: BTreeSet::new(),
             sha256,
             modified: false,
+            own: Vec::new(),
         }
     }
 
@@ -128,6 +151,12 @@ impl Assets {
         self.files.get(at)
     }
 
+    /// The paths of the files that somebody has given, built in or not.
+    #[must_use]
+    pub fn own(&self) -> &[String] {
+        &self.own
+    }
+
     /// SHA-256 over all paths and texts, in hexadecimal.
     #[must_use]
     pub fn sha256(&self) -> &str {
@@ -139,6 +168,10 @@ impl Assets {
     pub fn modified(&self) -> bool {
         self.modified
     }
+}
+
+fn paths(files: &[AssetFile]) -> Vec<String> {
+    files.iter().map(|file| file.path.clone()).collect()
 }
 
 fn hidden(path: &str) -> bool {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use tck_view::Names;
 
 use super::fields::{self, FieldRule};
 use super::schema::FindingKind;
@@ -64,6 +65,8 @@ struct Protocol {
     topic: Vec<TopicRule>,
     features: BTreeMap<String, bool>,
     fields: Vec<FieldRule>,
+    #[serde(default)]
+    members: Names,
 }
 
 /// One protocol version as data.
@@ -80,6 +83,7 @@ pub struct Pack {
     topic_template: String,
     features: BTreeMap<String, bool>,
     fields: Vec<FieldRule>,
+    names: Names,
 }
 
 /// Why a pack could not be read.
@@ -148,6 +152,7 @@ impl Pack {
             topic_template: protocol.topic_template,
             features: protocol.features,
             fields: protocol.fields,
+            names: protocol.members,
         })
     }
 
@@ -238,6 +243,12 @@ impl Pack {
         self.fields
             .iter()
             .map(|rule| (rule.names().collect(), rule.requirement()))
+    }
+
+    /// What the version calls the members of messages (`[members]` of `protocol.toml`): what views are read by.
+    #[must_use]
+    pub fn names(&self) -> &Names {
+        &self.names
     }
 
     /// Whether the version has a feature (`[features]` of `protocol.toml`): what reference devices switch on.

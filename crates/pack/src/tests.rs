@@ -299,3 +299,19 @@ mod hostile {
         places.push(place);
     }
 }
+
+#[test]
+fn good_messages_are_read_by_the_names_of_their_version() {
+    use tck_view::{MessageView, StateView, Topic};
+
+    for pack in packs().all() {
+        assert_eq!(pack.names().lacks(StateView::maps), !pack.has("maps"), "{}", pack.id);
+        for (name, topic, message) in good_messages(pack) {
+            let view = MessageView::of_value(Topic::of_name(&topic), &message, pack.names());
+            let header = view.header();
+            assert!(header.header_id.whole().is_some(), "{} {name}", pack.id);
+            assert!(header.serial_number.text().is_some(), "{} {name}", pack.id);
+            assert!(!format!("{view:?}").contains("Other("), "{} {name}: {view:?}", pack.id);
+        }
+    }
+}

@@ -13,6 +13,13 @@ pub struct HookInfo {
     pub parameters: &'static [&'static str],
     /// What to do, as an order to a person.
     pub doc: &'static str,
+    /// Whether the program of the device may end by it.
+    pub ends: bool,
+}
+
+/// The same hook; the program of the device may end by it.
+const fn ending(hook: HookInfo) -> HookInfo {
+    HookInfo { ends: true, ..hook }
 }
 
 const fn agv(name: &'static str, parameters: &'static [&'static str], doc: &'static str) -> HookInfo {
@@ -21,6 +28,7 @@ const fn agv(name: &'static str, parameters: &'static [&'static str], doc: &'sta
         role: Role::Agv,
         parameters,
         doc,
+        ends: false,
     }
 }
 
@@ -30,6 +38,7 @@ const fn master_control(name: &'static str, parameters: &'static [&'static str],
         role: Role::MasterControl,
         parameters,
         doc,
+        ends: false,
     }
 }
 
@@ -40,12 +49,12 @@ pub const HOOKS: &[HookInfo] = &[
         &[],
         "Give the vehicle what it needs after every start, before anything else: a position, a login.",
     ),
-    agv("power-cycle", &[], "Switch the vehicle off hard and on again."),
-    agv(
+    ending(agv("power-cycle", &[], "Switch the vehicle off hard and on again.")),
+    ending(agv(
         "shutdown",
         &[],
         "Shut the vehicle down, or end its communication, in good order.",
-    ),
+    )),
     agv("start", &[], "Start the vehicle after a shutdown."),
     agv(
         "set-mode",
@@ -175,13 +184,17 @@ pub const HOOKS: &[HookInfo] = &[
         "Close a way for the vehicle in the layout.",
     ),
     master_control("unblock-edge", &["vehicle", "from", "to"], "Open the way again."),
-    master_control(
+    ending(master_control(
         "configure",
         &["vehicle", "what"],
         "Set the master control up for what comes next.",
-    ),
+    )),
     master_control("start", &["vehicle"], "Start the master control."),
-    master_control("shutdown", &["vehicle"], "Shut the master control down."),
+    ending(master_control(
+        "shutdown",
+        &["vehicle"],
+        "Shut the master control down.",
+    )),
     master_control(
         "confirm",
         &["vehicle", "question"],
@@ -193,6 +206,12 @@ pub const HOOKS: &[HookInfo] = &[
 #[must_use]
 pub fn find(name: &str, role: Role) -> Option<&'static HookInfo> {
     HOOKS.iter().find(|hook| hook.name == name && hook.role == role)
+}
+
+/// Whether the program of a device may end by a hook of that name.
+#[must_use]
+pub fn ends_the_device(name: &str) -> bool {
+    HOOKS.iter().any(|hook| hook.name == name && hook.ends)
 }
 
 #[cfg(test)]

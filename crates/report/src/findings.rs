@@ -1,10 +1,16 @@
 //! What a device breaks, requirement by requirement: the rows that stand directly below the headline.
 //!
 //! A row joins what tests and monitors found of one requirement, so that one mistake is one row however many tests saw it.
+//! A program that ended by itself has a row of its own: no requirement says so, and no device may do it.
 
 use super::sources::Sources;
 use tck_base::verdict::Verdict;
 use tck_result::RunResult;
+
+/// How a program that ended by itself is called where requirements have their ids.
+pub const PROGRAM: &str = "device.command";
+/// What is asked of it.
+const STAYS: &str = "The program of `device.command` runs until a hook, a person or the end of the run ends it.";
 
 /// A requirement that is broken, or about which there is a remark.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +69,23 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
                 finding.monitors.push(&monitor.id);
             }
         }
+    }
+    if let Some(program) = result
+        .program
+        .as_ref()
+        .filter(|program| program.verdict() == Some(Verdict::Fail))
+    {
+        all.push(Finding {
+            requirement: PROGRAM,
+            verdict: Verdict::Fail,
+            asks: Some(STAYS),
+            origin: Some("by the profile".to_owned()),
+            seen: program.story().unwrap_or_default(),
+            count: program.ends - program.excused,
+            first: program.first().map(|end| end.seq),
+            tests: Vec::new(),
+            monitors: Vec::new(),
+        });
     }
     all.sort_by_key(|finding| std::cmp::Reverse((finding.verdict, finding.tests.len() + finding.monitors.len())));
     all

@@ -6,7 +6,9 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::clean::{block, line, short};
+use super::no_result::NoResult;
 use super::sources::Sources;
+use super::statement;
 use tck_base::verdict::Verdict;
 use tck_journal::event::hex;
 use tck_result::RunResult;
@@ -23,6 +25,8 @@ struct Issue<'a> {
     place: (String, usize),
     /// The test or monitor.
     by: &'a str,
+    /// Whether it is about the run itself, and not about the device.
+    of_run: bool,
 }
 
 impl Issue<'_> {
@@ -33,10 +37,36 @@ impl Issue<'_> {
     }
 }
 
-/// Fails and warnings of tests and monitors, in the order of the result.
+/// The name under which a run that is not complete, or decided nothing, stands in the lists: without it a list that is empty
+/// would look as if all had been mended.
+pub const INCOMPLETE: &str = "run-incomplete";
+
+/// Where a run is described: the file that says what the device is.
+fn profile(result: &RunResult) -> String {
+    let said = result
+        .settings
+        .iter()
+        .filter(|setting| setting.name.starts_with("device."));
+    let mut files = said.map(|setting| setting.origin.as_str());
+    let file = files.find(|origin| !matches!(*origin, "default" | "environment" | "flag"));
+    file.unwrap_or(USUAL_PROFILE).to_owned()
+}
+
+/// How a profile is usually called.
+pub const USUAL_PROFILE: &str = "device.toml";
+
+/// What is wrong with the run itself; then fails and warnings of tests and monitors, in the order of the result.
 fn issues(result: &RunResult) -> Vec<Issue<'_>> {
     let bad = |verdict: Verdict| matches!(verdict, Verdict::Fail | Verdict::Warning);
     let mut all: Vec<Issue<'_>> = Vec::new();
+    all.extend(statement::trouble(result).map(|message| Issue {
+        requirement: INCOMPLETE,
+        verdict: Verdict::Fail,
+        message,
+        place: (profile(result), 1),
+        by: "run",
+        of_run: true,
+    }));
     for test in &result.tests {
         for decision in test.decisions.iter().filter(|decision| bad(decision.verdict())) {
             all.push(Issue {
@@ -45,6 +75,7 @@ fn issues(result: &RunResult) -> Vec<Issue<'_>> {
                 message: decision.message.clone(),
                 place: place(&decision.place),
                 by: &test.id,
+                of_run: false,
             });
         }
     }
@@ -56,6 +87,7 @@ fn issues(result: &RunResult) -> Vec<Issue<'_>> {
                 message: format!("{} ({} ×)", found.message, found.count),
                 place: (format!("suites/monitors/{}.yaml", monitor.id), 1),
                 by: &monitor.id,
+                of_run: false,
             });
         }
     }
@@ -73,31 +105,104 @@ fn place(text: &str) -> (String, usize) {
 /// GitLab's code quality report.
 #[must_use]
 pub fn code_quality(result: &RunResult) -> String {
-    let all = issues(result).into_iter().map(|issue| {
+    quality_page(&issues(result))
+}
+
+/// GitLab's code quality report of a run that never came to be.
+#[must_use]
+pub fn code_quality_of(trouble: &NoResult) -> String {
+    quality_page(&trouble_issues(trouble))
+}
+
+fn quality_page(issues: &[Issue<'_>]) -> String {
+    let all = issues.iter().map(|issue| {
         json!({
             "description": short(&line(&format!("{}: {} ({})", issue.requirement, issue.message, issue.by)), 500),
             "check_name": line(issue.requirement),
             "fingerprint": issue.fingerprint(),
-            "severity": if issue.verdict == Verdict::Fail { "major" } else { "minor" },
-            "location": { "path": line(&issue.place.0), "lines": { "begin": issue.place.1 } },
+            "severity": match issue.verdict {
+                _ if issue.of_run => "blocker",
+                Verdict::Fail => "major",
+                _ => "minor",
+            },
+            "location": { "path": line(&issue.place.0), "lines": { "begin": issue.place.1.max(1) } },
         })
     });
     format!("{:#}\n", Value::Array(all.collect()))
 }
 
+/// What stands in the way of a run, as issues.
+fn trouble_issues(trouble: &NoResult) -> Vec<Issue<'_>> {
+    let all = trouble.problems.iter().map(|problem| Issue {
+        requirement: INCOMPLETE,
+        verdict: Verdict::Fail,
+        message: problem.title.clone(),
+        place: match &problem.place {
+            Some((file, line)) => (file.clone(), *line),
+            None => (trouble.profile.clone().unwrap_or_else(|| USUAL_PROFILE.to_owned()), 1),
+        },
+        by: "run",
+        of_run: true,
+    });
+    all.collect()
+}
+
 /// SARIF 2.1.0.
 #[must_use]
 pub fn sarif(result: &RunResult, sources: &Sources) -> String {
-    let issues = issues(result);
+    sarif_log(
+        &issues(result),
+        sources,
+        &Invocation {
+            tool: &result.tool,
+            run: Some(&result.run),
+            started: Some(&result.started),
+            successful: statement::trouble(result).is_none(),
+            exit: None,
+        },
+    )
+}
+
+/// SARIF 2.1.0 of a run that never came to be.
+#[must_use]
+pub fn sarif_of(trouble: &NoResult) -> String {
+    sarif_log(
+        &trouble_issues(trouble),
+        &Sources::default(),
+        &Invocation {
+            tool: &trouble.tool,
+            run: None,
+            started: None,
+            successful: false,
+            exit: Some(trouble.exit),
+        },
+    )
+}
+
+/// What SARIF says of the call itself.
+struct Invocation<'a> {
+    tool: &'a str,
+    run: Option<&'a str>,
+    started: Option<&'a str>,
+    successful: bool,
+    exit: Option<u8>,
+}
+
+fn sarif_log(issues: &[Issue<'_>], sources: &Sources, call: &Invocation<'_>) -> String {
     let mut rules: Vec<&str> = issues.iter().map(|issue| issue.requirement).collect();
     rules.sort_unstable();
     rules.dedup();
     let rules = rules.into_iter().map(|id| {
-        let text = sources.requirement(id).map_or("", |known| known.text.as_str());
-        let section = sources.requirement(id).map_or("", |known| known.section.as_str());
+        let known = sources.requirement(id);
+        let text = match known {
+            Some(known) => line(&known.text),
+            None if id == INCOMPLETE => "The run is complete, and decided something of what was selected.".into(),
+            None => line(id),
+        };
+        let section = known.map_or("", |known| known.section.as_str());
         json!({
             "id": line(id),
-            "shortDescription": { "text": if text.is_empty() { line(id) } else { line(text) } },
+            "shortDescription": { "text": text },
             "properties": { "section": line(section) },
         })
     });
@@ -117,18 +222,25 @@ pub fn sarif(result: &RunResult, sources: &Sources) -> String {
         })
     });
     let found: Vec<Value> = found.collect();
-    let (name, version) = result.tool.rsplit_once(' ').unwrap_or((&result.tool, ""));
+    let (name, version) = call.tool.rsplit_once(' ').unwrap_or((call.tool, ""));
     let version_of_sarif = SARIF.map(|part| part.to_string()).join(".");
+    let mut invocation = json!({ "executionSuccessful": call.successful });
+    if let Some(started) = call.started {
+        invocation["startTimeUtc"] = line(started).into();
+    }
+    if let Some(exit) = call.exit {
+        invocation["exitCode"] = exit.into();
+    }
+    let run = call
+        .run
+        .map_or_else(|| "vda5050-tck".to_owned(), |run| format!("vda5050-tck/{}", line(run)));
     let log = json!({
         "$schema": format!("https://json.schemastore.org/sarif-{version_of_sarif}.json"),
         "version": version_of_sarif,
         "runs": [{
             "tool": { "driver": { "name": line(name), "version": line(version), "rules": rules } },
-            "automationDetails": { "id": format!("vda5050-tck/{}", line(&result.run)) },
-            "invocations": [{
-                "executionSuccessful": !result.partial,
-                "startTimeUtc": line(&result.started),
-            }],
+            "automationDetails": { "id": run },
+            "invocations": [invocation],
             "results": found,
         }],
     });

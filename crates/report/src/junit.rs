@@ -19,13 +19,18 @@ use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult
 use askama::filters::Escaper as _;
 
 use super::clean;
-use super::findings::{Finding, findings};
+use super::findings::{Finding, PROGRAM, findings};
 use super::html::Escape;
 use super::repeated;
 use super::sources::Sources;
 use super::statement::{self, Gap};
 use tck_base::verdict::Verdict;
 use tck_result::{Decision, MonitorResult, RequirementResult, RunResult, TestResult};
+
+/// The suite that is about the run itself.
+pub const RUN_SUITE: &str = "run";
+/// The case of that suite.
+pub const RUN_CASE: &str = "the run is complete and decided something";
 
 /// Why no JUnit file could be made.
 #[derive(Debug, thiserror::Error)]
@@ -58,7 +63,7 @@ pub struct Flavour<'a> {
 pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
     let how = flavour.inconclusive;
     let mut report = ReportBuilder::new();
-    report.add_testsuite(suite(result, "run", vec![run_case(result)]));
+    report.add_testsuite(suite(result, RUN_SUITE, run_cases(result)));
     let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
     for test in &result.tests {
         let group = test.id.split_once('/').map_or("tests", |(group, _)| group);
@@ -82,6 +87,39 @@ pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitE
     written(&report, result, flavour)
 }
 
+/// What is about the run itself: whether it came to its end, whether its program did so by itself, and who was judged.
+fn run_cases(result: &RunResult) -> Vec<TestCase> {
+    let mut all = vec![run_case(result)];
+    if let Some(program) = &result.program {
+        let story = program.story().unwrap_or_default();
+        let verdict = program.verdict().or(Some(Verdict::Pass));
+        let words = program.first().map_or("", |end| end.words.as_str());
+        all.push(
+            Case {
+                name: "the program that was started ran until it was ended",
+                class: "run",
+                seconds: 0.0,
+                outcome: outcome(verdict, PROGRAM, &story, words, Inconclusive::Error),
+                out: None,
+            }
+            .build(),
+        );
+    }
+    if let Some(why) = &result.mixed {
+        all.push(
+            Case {
+                name: "nobody else was taken for the device",
+                class: "run",
+                seconds: 0.0,
+                outcome: outcome(Some(Verdict::Inconclusive), "", why, "", Inconclusive::Error),
+                out: None,
+            }
+            .build(),
+        );
+    }
+    all
+}
+
 /// The result as JUnit XML: a case for each requirement, and a suite for each group of requirements.
 ///
 /// # Errors
@@ -89,7 +127,7 @@ pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitE
 pub fn by_requirement(result: &RunResult, sources: &Sources, flavour: Flavour<'_>) -> Result<String, JunitError> {
     let found = findings(result, sources);
     let mut report = ReportBuilder::new();
-    report.add_testsuite(suite(result, "run", vec![run_case(result)]));
+    report.add_testsuite(suite(result, RUN_SUITE, run_cases(result)));
     let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
     for requirement in &result.requirements {
         let group = requirement.id.rsplit_once('-').map_or("other", |(group, _)| group);
@@ -152,22 +190,53 @@ pub fn plain(cases: &[Plain]) -> Result<String, JunitError> {
             system_err: None,
         });
     }
-    let mut xml = Vec::new();
-    let built = report.build().write_xml(&mut xml);
-    built.map_err(|error| JunitError(error.to_string()))?;
-    let xml = String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))?;
-    let xml = xml.replace("><testcase ", ">\n<testcase ");
-    Ok(xml.replace("><testsuite ", ">\n<testsuite ") + "\n")
+    Ok(lines(&xml(&report)?))
 }
 
 fn written(report: &ReportBuilder, result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
+    Ok(lines(&with_properties(&xml(report)?, result, flavour)))
+}
+
+fn xml(report: &ReportBuilder) -> Result<String, JunitError> {
     let mut xml = Vec::new();
     let written = report.build().write_xml(&mut xml);
     written.map_err(|error| JunitError(error.to_string()))?;
     let xml = String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))?;
-    // A line for each case: whoever compares two files sees what differs.
-    let xml = with_properties(&xml, result, flavour).replace("><testcase ", ">\n<testcase ");
-    Ok(xml.replace("><testsuite ", ">\n<testsuite ") + "\n")
+    Ok(with_times(&xml))
+}
+
+/// A line for each case: whoever compares two files sees what differs.
+fn lines(xml: &str) -> String {
+    let xml = xml.replace("><testcase ", ">\n<testcase ");
+    xml.replace("><testsuite ", ">\n<testsuite ") + "\n"
+}
+
+/// Gives every time at most three decimals, as the schema of Jenkins' xUnit plugin has it. The writer prints sums of binary
+/// fractions, such as `1.9969999999999999`. Only tags are touched: the writer escapes `>` and `"` in their attributes, and
+/// what stands in CDATA sections is not ours.
+fn with_times(xml: &str) -> String {
+    const CDATA: &str = "<![CDATA[";
+    let mut text = String::with_capacity(xml.len());
+    let mut rest = xml;
+    while let Some(begin) = rest.find('<') {
+        let is_data = rest[begin..].starts_with(CDATA);
+        let close = if is_data { "]]>" } else { ">" };
+        let Some(length) = rest[begin..].find(close) else { break };
+        let end = begin + length + close.len();
+        text.push_str(&rest[..begin]);
+        let tag = &rest[begin..end];
+        match tag.split_once(" time=\"").filter(|_| !is_data) {
+            Some((before, after)) => {
+                let (time, after) = after.split_once('"').unwrap_or((after, ""));
+                let rounded = time.parse::<f64>().map_or(0.0, |time| (time * 1000.0).round() / 1000.0);
+                // Writing to a text does not fail.
+                let _ = write!(text, "{before} time=\"{rounded}\"{after}");
+            }
+            None => text.push_str(tag),
+        }
+        rest = &rest[end..];
+    }
+    text + rest
 }
 
 /// Puts what is known of the run into the first suite, which is about the run. The writer escapes `>` in attributes, so
@@ -300,24 +369,13 @@ fn outcome(verdict: Option<Verdict>, kind: &str, message: &str, cause: &str, how
 }
 
 fn run_case(result: &RunResult) -> TestCase {
-    let trouble = match (result.partial, result.verdict) {
-        (true, _) => Some(
-            result
-                .partial_reason
-                .as_deref()
-                .unwrap_or("the run ended before its plan did"),
-        ),
-        (false, None) => Some("nothing was decided"),
-        // Were all of it skipped, nothing would be red.
-        (false, Some(_)) if statement::requirements(result).decided() == 0 => Some("no requirement was decided"),
-        (false, Some(_)) => None,
-    };
+    let trouble = statement::trouble(result);
     let statement = statement::statement(result);
     Case {
-        name: "the run is complete and decided something",
-        class: "run",
+        name: RUN_CASE,
+        class: RUN_SUITE,
         seconds: 0.0,
-        outcome: trouble.map_or(Outcome::Success, |reason| {
+        outcome: trouble.as_deref().map_or(Outcome::Success, |reason| {
             outcome(Some(Verdict::Error), "", reason, &statement, Inconclusive::Error)
         }),
         out: trouble.is_none().then_some(statement),

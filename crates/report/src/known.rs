@@ -2,6 +2,7 @@
 //!
 //! It changes no verdict: it says whether anything failed that is not known, for the exit code.
 
+use super::findings::PROGRAM;
 use tck_base::verdict::Verdict;
 use tck_profile::KnownFailure;
 use tck_result::RunResult;
@@ -61,7 +62,12 @@ pub fn measure(result: &RunResult, known: &[KnownFailure]) -> Measured {
                 }
             }
             if any && all {
-                left = Verdict::Pass;
+                // What was asked for and not done is not borne.
+                left = if test.left_out() == 0 {
+                    Verdict::Pass
+                } else {
+                    Verdict::Inconclusive
+                };
             }
         }
         measured.rest = join(measured.rest, left);
@@ -82,6 +88,14 @@ pub fn measure(result: &RunResult, known: &[KnownFailure]) -> Measured {
             left = verdict;
         }
         measured.rest = join(measured.rest, left);
+    }
+    // No list bears a program that ends by itself, or doubt about who was judged.
+    if let Some(verdict) = result.aside() {
+        if verdict == Verdict::Fail {
+            let by = "the program that was started".to_owned();
+            measured.others.push((PROGRAM.to_owned(), by));
+        }
+        measured.rest = join(measured.rest, verdict);
     }
     for (known, met) in valid.iter().zip(met) {
         let list = if met { &mut measured.met } else { &mut measured.unmet };

@@ -22,6 +22,7 @@ pub mod junit;
 pub mod known;
 pub mod manifest;
 pub mod markdown;
+pub mod no_result;
 pub mod overview;
 pub mod repeated;
 pub mod sequence;

@@ -14,7 +14,7 @@ use tck_result::RunResult;
 /// How many rows a table has at most: a summary page is bounded, and the report has everything.
 const ROWS: usize = 50;
 /// How many annotations are made: GitHub shows ten of a kind for a step.
-const ANNOTATIONS: usize = 10;
+pub(super) const ANNOTATIONS: usize = 10;
 
 /// The run on one page of Markdown. `report` says where the whole report is.
 #[must_use]
@@ -139,7 +139,7 @@ fn more(all: usize, text: &mut String) {
 }
 
 /// One line that is no markup, whatever a device wrote into it.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let line = short(&line(text), 600).into_owned();
     let mut safe = String::with_capacity(line.len());
     for character in line.chars() {
@@ -157,17 +157,20 @@ fn escaped(text: &str) -> String {
     safe
 }
 
-/// Workflow commands of GitHub: an annotation for each finding, the first ten of them.
+/// Workflow commands of GitHub: an annotation for what is wrong with the run itself, and for each of the first ten findings.
 #[must_use]
 pub fn annotations(result: &RunResult, sources: &Sources) -> String {
     let mut text = String::new();
+    if let Some(trouble) = statement::trouble(result) {
+        let _ = writeln!(text, "::error title=vda5050-tck::{}", command(&trouble));
+    }
     for finding in findings(result, sources).iter().take(ANNOTATIONS) {
         let kind = if finding.verdict == Verdict::Fail {
             "error"
         } else {
             "warning"
         };
-        let title = command(finding.requirement).replace(':', "%3A").replace(',', "%2C");
+        let title = property(finding.requirement);
         let asks = finding.asks.unwrap_or_default();
         let _ = writeln!(
             text,
@@ -178,8 +181,13 @@ pub fn annotations(result: &RunResult, sources: &Sources) -> String {
     text
 }
 
+/// A property of a workflow command.
+pub(super) fn property(text: &str) -> String {
+    command(text).replace(':', "%3A").replace(',', "%2C")
+}
+
 /// The value of a workflow command: one line, and no end of it.
-fn command(text: &str) -> String {
+pub(super) fn command(text: &str) -> String {
     short(&line(text), 500)
         .replace('%', "%25")
         .replace('\r', "%0D")

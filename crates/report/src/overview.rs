@@ -110,6 +110,9 @@ fn row(finding: &Finding<'_>, journal: Option<&Journal>, color: Color, text: &mu
         0 => String::new(),
         more => format!(" and {more} more"),
     };
+    if by.is_empty() {
+        return;
+    }
     let named = by.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
     let _ = writeln!(
         text,

@@ -6,8 +6,8 @@ use tck_result::{RunResult, TestResult};
 use super::clean::line;
 use super::statement::many;
 
-/// How often a test was run and what came out, such as `run 3 times: 2 pass, 1 fail (flaky)`; nothing of one that was run
-/// once.
+/// How often a test was run and what came out, such as `run 3 times: 2 pass, 1 fail (flaky)`, or `run 1 of 3 times: 1 pass`
+/// when the others were not done; nothing of one that was to be run once.
 #[must_use]
 pub fn summary(test: &TestResult) -> Option<String> {
     let count = test.repetitions.len();
@@ -15,15 +15,19 @@ pub fn summary(test: &TestResult) -> Option<String> {
         return None;
     }
     let counted = Verdict::ALL.map(|verdict| {
-        let with = test.repetitions.iter().filter(|one| one.verdict == Some(verdict));
-        (with.count(), verdict)
+        let done = test.repetitions.iter().filter(|one| one.was_done());
+        (done.filter(|one| one.verdict == Some(verdict)).count(), verdict)
     });
     let counted = counted.into_iter().filter(|(count, _)| *count > 0);
     let counted: Vec<String> = counted
         .map(|(count, verdict)| format!("{count} {}", verdict.word()))
         .collect();
     let flaky = if test.is_flaky() { " (flaky)" } else { "" };
-    Some(format!("run {}: {}{flaky}", many(count, "time"), counted.join(", ")))
+    let times = match test.left_out() {
+        0 => many(count, "time"),
+        left_out => format!("{} of {}", count - left_out, many(count, "time")),
+    };
+    Some(format!("run {times}: {}{flaky}", counted.join(", ")))
 }
 
 /// The flaky tests of a run, a line each.

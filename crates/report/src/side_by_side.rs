@@ -4,11 +4,10 @@
 
 use askama::Template;
 
-use super::compare::{Trend, compare};
+use super::compare::{Standing, Trend, compare};
 use super::html::view::{self, Badge};
 use super::sources::Sources;
 use super::statement;
-use tck_base::verdict::Verdict;
 use tck_result::{RequirementResult, RunResult};
 
 /// One run: a column.
@@ -33,8 +32,8 @@ struct Row {
     cells: Vec<Cell>,
     /// Whether all runs say the same.
     same: bool,
-    /// Whether it became worse from one run to the next.
-    worse: bool,
+    /// What became of it from one run to the next that is to be looked at first: it became worse, or is lost.
+    worst: Option<Trend>,
 }
 
 struct Cell {
@@ -69,8 +68,11 @@ pub fn render(runs: &[RunResult], names: &[String], sources: &Sources) -> Result
     for id in ids {
         rows.push(row(id, runs, sources));
     }
-    // What became worse is looked at first.
-    rows.sort_by_key(|row| !row.worse);
+    rows.sort_by_key(|row| match row.worst {
+        Some(Trend::Worse) => 0,
+        Some(_) => 1,
+        None => 2,
+    });
     let (same, changed) = rows.into_iter().partition(|row| row.same);
     let tool = runs.last().map_or("", |run| run.tool.as_str());
     Page {
@@ -87,9 +89,9 @@ pub fn render(runs: &[RunResult], names: &[String], sources: &Sources) -> Result
 fn columns(runs: &[RunResult], names: &[String]) -> Vec<Column> {
     let all = runs.iter().enumerate().map(|(at, run)| {
         let changes = at.checked_sub(1).map(|before| compare(&runs[before], run).requirements);
-        let count = |wanted: Trend| {
+        let count = |wanted: &[Trend]| {
             let changes = changes.iter().flatten();
-            changes.filter(|change| change.trend() == wanted).count()
+            changes.filter(|change| wanted.contains(&change.trend)).count()
         };
         let counts = statement::requirements(run);
         let applicable = counts.total() - statement::gaps(run).not_applicable;
@@ -103,8 +105,8 @@ fn columns(runs: &[RunResult], names: &[String]) -> Vec<Column> {
             started: view::started(&run.started),
             badge: Badge::of(run.verdict),
             decided: format!("{} of {applicable}", counts.decided()),
-            better: count(Trend::Better),
-            worse: count(Trend::Worse),
+            better: count(&[Trend::Better]),
+            worse: count(&[Trend::Worse, Trend::Lost]),
         }
     });
     all.collect()
@@ -115,16 +117,17 @@ fn row(id: &str, runs: &[RunResult], sources: &Sources) -> Row {
         .iter()
         .map(|run| run.requirements.iter().find(|requirement| requirement.id == id))
         .collect();
-    let verdicts: Vec<Option<Verdict>> = found.iter().map(|one| one.and_then(|one| one.verdict)).collect();
+    let standings: Vec<Standing> = found.iter().map(|one| Standing::of_requirement(*one)).collect();
+    let steps = standings.windows(2).map(|pair| Trend::of(pair[0], pair[1]));
+    let trends: Vec<Trend> = steps.collect();
     let cells: Vec<Cell> = found
         .iter()
         .enumerate()
         .map(|(at, requirement)| Cell {
             badge: requirement.map_or(ABSENT, Badge::of_requirement),
-            trend: match at.checked_sub(1).map(|before| (verdicts[before], verdicts[at])) {
-                Some((Some(before), Some(after))) if after > before => "worse",
-                Some((Some(before), Some(after))) if after < before => "better",
-                Some((None, Some(Verdict::Fail))) => "worse",
+            trend: match at.checked_sub(1).map(|before| trends[before]) {
+                Some(trend) if trend.is_bad() => "worse",
+                Some(Trend::Better) => "better",
                 _ => "",
             },
         })
@@ -135,7 +138,9 @@ fn row(id: &str, runs: &[RunResult], sources: &Sources) -> Row {
         section: known.map_or_else(String::new, |known| format!("{}, §{}", known.mood, known.section)),
         text: known.map(|known| known.text.clone()).unwrap_or_default(),
         same: cells.windows(2).all(|pair| pair[0].badge == pair[1].badge),
-        worse: cells.iter().any(|cell| cell.trend == "worse"),
+        worst: [Trend::Worse, Trend::Lost]
+            .into_iter()
+            .find(|trend| trends.contains(trend)),
         cells,
     }
 }

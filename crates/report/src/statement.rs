@@ -5,7 +5,7 @@
 
 use super::clean::line;
 use tck_base::verdict::Verdict;
-use tck_result::{RequirementResult, RunResult, TestResult};
+use tck_result::{ProgramResult, RequirementResult, RunResult, TestResult};
 
 /// How many of something got which verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -200,10 +200,20 @@ pub fn statement(result: &RunResult) -> String {
         _ => format!("; {open} not decided"),
     };
     let sentence = match result.verdict {
+        Some(Verdict::Fail) if counts.fail == 0 && !anything_failed(result) => {
+            format!(
+                "{who} failed: {}, though no requirement of {standard} was found broken; {of_decided}{rest}.",
+                ended(result)
+            )
+        }
         Some(Verdict::Fail) => {
             let broken = match counts.fail {
                 0 => "a test or monitor failed".to_owned(),
                 count => format!("{} broken", many(count, "requirement")),
+            };
+            let broken = match program_failed(result) {
+                true => format!("{broken}, and {}", ended(result)),
+                false => broken,
             };
             format!("{who} does not conform to {standard} as {role}: {broken}; {of_decided}{rest}.")
         }
@@ -212,6 +222,7 @@ pub fn statement(result: &RunResult) -> String {
         ),
         Some(Verdict::Inconclusive) => {
             let undecided = match counts.inconclusive {
+                _ if result.mixed.is_some() => line(result.mixed.as_deref().unwrap_or_default()).into_owned(),
                 0 => "not every test could be completed".to_owned(),
                 count => format!("{} could not be decided", many(count, "requirement")),
             };
@@ -258,6 +269,53 @@ pub fn statement(result: &RunResult) -> String {
         ""
     };
     format!("{own}{joined}{partial}{sentence}{flaky}")
+}
+
+/// Whether the program that was started ended by itself.
+fn program_failed(result: &RunResult) -> bool {
+    let program = result.program.as_ref().and_then(ProgramResult::verdict);
+    program == Some(Verdict::Fail)
+}
+
+fn ended(result: &RunResult) -> String {
+    let ends = result
+        .program
+        .as_ref()
+        .map_or(0, |program| program.ends - program.excused.min(program.ends));
+    match ends {
+        1 => "its program ended by itself".to_owned(),
+        ends => format!("its program ended by itself {ends} times"),
+    }
+}
+
+/// Whether a test or a monitor failed. What else makes a run fail is the end of its program.
+fn anything_failed(result: &RunResult) -> bool {
+    !program_failed(result) || tests(result).fail > 0 || monitors(result).fail > 0
+}
+
+/// Why nobody may take a run for a green one, whatever stands in its tests: it ended early, or decided nothing of what was
+/// selected.
+#[must_use]
+pub fn trouble(result: &RunResult) -> Option<String> {
+    let tests = tests(result);
+    if result.partial {
+        let reason = result.partial_reason.as_deref();
+        return Some(reason.unwrap_or("the run ended before its plan did").to_owned());
+    }
+    if result.verdict.is_none() {
+        return Some("nothing was decided".to_owned());
+    }
+    if requirements(result).decided() == 0 {
+        return Some("no requirement was decided".to_owned());
+    }
+    // What monitors found is about the traffic. Were all tests skipped, nothing would be red.
+    match result.tests.len() {
+        0 => Some("no test was selected".to_owned()),
+        _ if tests.none == result.tests.len() => Some("none of the selected tests applies to the device".to_owned()),
+        1 if tests.decided() == 0 => Some("the selected test was not decided".to_owned()),
+        all if tests.decided() == 0 => Some(format!("none of the {all} selected tests was decided")),
+        _ => None,
+    }
 }
 
 /// What restricts the statement, one sentence each: what follows from the result itself, then what the run

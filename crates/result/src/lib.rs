@@ -3,13 +3,15 @@
 #![warn(missing_docs)]
 
 mod exploration;
+mod program;
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 pub use self::exploration::{Answers, ExplorationResult, MemberResult, SaidResult};
-use tck_base::verdict::Verdict;
+pub use self::program::{ProgramEnd, ProgramResult};
+use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::event::Setting;
 
 /// `result.json`.
@@ -38,8 +40,14 @@ pub struct RunResult {
     /// Why it is partial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partial_reason: Option<String>,
-    /// Join over tests and monitors; absent when nothing was decided.
+    /// Join over tests, monitors, and what became of the program that was started; absent when nothing was decided.
     pub verdict: Option<Verdict>,
+    /// What became of the program that the run has started; absent when it has started none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub program: Option<ProgramResult>,
+    /// Why it is not certain that it was the device that was judged; absent as long as nothing speaks against it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mixed: Option<String>,
     /// The device.
     pub device: DeviceIdentity,
     /// `tap` or `subscriber`.
@@ -149,6 +157,14 @@ pub struct ReactionTimes {
 pub const CERTIFY: &str = "certify";
 
 impl RunResult {
+    /// What counts beside tests and monitors: a program that ended by itself, and doubt about who was judged.
+    #[must_use]
+    pub fn aside(&self) -> Option<Verdict> {
+        let program = self.program.as_ref().and_then(ProgramResult::verdict);
+        let mixed = self.mixed.as_ref().map(|_| Verdict::Inconclusive);
+        program.into_iter().chain(mixed).collect::<Accumulated>().get()
+    }
+
     /// Whether nothing was left to choose in the run, so that a certificate can be given.
     #[must_use]
     pub fn certifies(&self) -> bool {
@@ -259,17 +275,31 @@ pub struct Repetition {
     /// Why the verdict is not a pass, in one line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// First and last journal number.
+    /// First and last journal number; absent when it was asked for and not done.
     pub journal: Option<(u64, u64)>,
 }
 
+impl Repetition {
+    /// Whether it was carried out, and not only asked for.
+    #[must_use]
+    pub fn was_done(&self) -> bool {
+        self.journal.is_some()
+    }
+}
+
 impl TestResult {
-    /// Whether its repetitions have different verdicts.
+    /// Whether the repetitions that were carried out have different verdicts.
     #[must_use]
     pub fn is_flaky(&self) -> bool {
-        self.repetitions
-            .windows(2)
-            .any(|pair| pair[0].verdict != pair[1].verdict)
+        let mut done = self.repetitions.iter().filter(|one| one.was_done());
+        let first = done.next();
+        first.is_some_and(|first| done.any(|other| other.verdict != first.verdict))
+    }
+
+    /// How many of its repetitions were asked for and not carried out.
+    #[must_use]
+    pub fn left_out(&self) -> usize {
+        self.repetitions.iter().filter(|one| !one.was_done()).count()
     }
 
     /// The decisions that are not a pass.

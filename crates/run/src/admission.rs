@@ -22,8 +22,15 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     pub(super) async fn admit(&mut self) -> Result<Result<(), String>, EngineError> {
         let vantage = self.setup.capabilities.vantage;
         let patience = self.time("connect");
-        let there = |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
-        if !self.wait_for(patience, there).await? {
+        // A program that has ended connects no more.
+        let there = |recorder: &Recorder| {
+            recorder.judge().program_is_down().is_some() || Presence::of(recorder.judge(), vantage).is_there()
+        };
+        let came = self.wait_for(patience, there).await?;
+        if let Some(why) = self.program_is_down() {
+            return Ok(Err(why));
+        }
+        if !came {
             return Ok(Err(format!("no device connected within {}", show_duration(patience))));
         }
         if let Err(why) = self.after_start().await? {
@@ -38,10 +45,16 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             let states = recorder.judge().timeline().of("state");
             states.iter().any(|entry| !is_stale(entry))
         };
-        let speaks =
-            |recorder: &Recorder| has_state(recorder) || (!is_virtual && somebody_else(recorder.judge()).is_some());
+        let speaks = |recorder: &Recorder| {
+            let judge = recorder.judge();
+            let is_over = judge.program_is_down().is_some() || (!is_virtual && somebody_else(judge).is_some());
+            is_over || has_state(recorder)
+        };
         let patience = self.time("statePeriod");
         self.wait_for(patience, speaks).await?;
+        if let Some(why) = self.program_is_down() {
+            return Ok(Err(why));
+        }
         if !has_state(&self.engine.recorder) {
             let why = format!(
                 "the device connected (see #{begun}) but sent no state within {} on {}",
@@ -51,11 +64,29 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             return Ok(Err(why));
         }
         self.factsheet().await?;
+        if let Some(why) = self.is_another() {
+            return Ok(Err(why));
+        }
         self.active_map()?;
         self.home.first = self.engine.recorder.judge().state().map(Cow::into_owned);
         self.home.before.clone_from(&self.home.first);
         self.read_over(self.engine.link.now().moment).await?;
         Ok(Ok(()))
+    }
+
+    /// How the program that the run has started has ended by itself, as long as it was not started again.
+    pub(super) fn program_is_down(&self) -> Option<String> {
+        self.engine.recorder.judge().program_is_down().map(str::to_owned)
+    }
+
+    /// What the device says otherwise of itself than in the run that this one goes on with.
+    pub(super) fn is_another(&self) -> Option<String> {
+        let before = self.engine.recorder.judge().factsheet_before()?;
+        let now = self.setup.capabilities.factsheet.as_ref()?;
+        let (place, before, now) = difference(before, now)?;
+        Some(format!(
+            "the run cannot be resumed: `{place}` of the factsheet was {before}, and is {now} now"
+        ))
     }
 
     /// Who speaks instead of the device of the profile. A built-in device in virtual time is wrong on purpose.
@@ -134,6 +165,10 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             self.setup.limits.push(
                 "The device published no factsheet, so what it can do is only known from the profile.".to_owned(),
             );
+            if self.engine.recorder.judge().factsheet_before().is_some() {
+                let limit = "Before the interruption it published one, so nobody knows whether it is what it was then.";
+                self.setup.limits.push(limit.to_owned());
+            }
             return Ok(());
         }
         let sheet = self
@@ -217,5 +252,64 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             .and_then(|times| times.get(name))
             .and_then(serde_json::Value::as_u64);
         Duration::from_millis(millis.unwrap_or(31_000))
+    }
+}
+
+/// Members of the header: they differ from message to message.
+const HEADER: [&str; 2] = ["headerId", "timestamp"];
+
+/// Where two factsheets differ first, and what stands there in each.
+fn difference(before: &Value, now: &Value) -> Option<(String, String, String)> {
+    fn first(path: &str, before: Option<&Value>, now: Option<&Value>) -> Option<(String, String, String)> {
+        if before == now {
+            return None;
+        }
+        let inside = match (before, now) {
+            (Some(Value::Object(before)), Some(Value::Object(now))) => {
+                let names = before.keys().chain(now.keys());
+                let mut names = names.filter(|name| !path.is_empty() || !HEADER.contains(&name.as_str()));
+                return names.find_map(|name| {
+                    let path = if path.is_empty() {
+                        name.clone()
+                    } else {
+                        format!("{path}.{name}")
+                    };
+                    first(&path, before.get(name), now.get(name))
+                });
+            }
+            (Some(Value::Array(before)), Some(Value::Array(now))) if before.len() == now.len() => {
+                let mut pairs = before.iter().zip(now).enumerate();
+                pairs.find_map(|(at, (before, now))| first(&format!("{path}[{at}]"), Some(before), Some(now)))
+            }
+            _ => None,
+        };
+        let shown = |value: Option<&Value>| {
+            let text = value.map_or_else(|| "absent".to_owned(), Value::to_string);
+            text.chars().take(80).collect::<String>()
+        };
+        inside.or_else(|| Some((path.to_owned(), shown(before), shown(now))))
+    }
+    first("", Some(before), Some(now))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factsheet_that_differs_is_named_by_the_place_and_its_header_does_not_count() {
+        let before = json!({ "headerId": 1, "timestamp": "a", "x": { "y": [1, 2], "z": null } });
+        let differs = |now: Value| difference(&before, &now);
+        assert_eq!(
+            differs(json!({ "headerId": 7, "timestamp": "b", "x": { "y": [1, 2], "z": null } })),
+            None
+        );
+        let found = |place: &str, before: &str, now: &str| Some((place.to_owned(), before.to_owned(), now.to_owned()));
+        let now = json!({ "headerId": 1, "timestamp": "a", "x": { "y": [1, 3], "z": null } });
+        assert_eq!(differs(now), found("x.y[1]", "2", "3"));
+        let now = json!({ "headerId": 1, "timestamp": "a", "x": { "y": [1, 2] } });
+        assert_eq!(differs(now), found("x.z", "null", "absent"));
+        let now = json!({ "headerId": 1, "timestamp": "a", "x": { "y": [1], "z": null } });
+        assert_eq!(differs(now), found("x.y", "[1,2]", "[1]"));
     }
 }

@@ -48,14 +48,19 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         } else {
             self.time("reconnect")
         };
+        // A program that has ended does not come back by itself.
+        let down = self.program_is_down();
         let until = self.engine.link.now().moment + first;
-        if self.engine.watch(until, there).await? {
+        if down.is_none() && self.engine.watch(until, there).await? {
             return Ok(None);
         }
-        let why = format!(
-            "the device is gone: it did not come back within {}",
-            show_duration(self.time("reconnect"))
-        );
+        let why = match self.program_is_down() {
+            Some(why) => format!("the device is gone: {why}"),
+            None => format!(
+                "the device is gone: it did not come back within {}",
+                show_duration(self.time("reconnect"))
+            ),
+        };
         if !has_hook {
             return Ok(Some(why));
         }
@@ -150,7 +155,14 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     };
     let begun = session.engine.link.now().moment;
     let patience = session.time("connect");
-    if session.engine.watch(begun + patience, back).await? {
+    // A program that has ended again is not waited for.
+    let is_down = |recorder: &Recorder| recorder.judge().program_is_down().is_some();
+    let is_over = |recorder: &Recorder| is_down(recorder) || back(recorder);
+    let came = session.engine.watch(begun + patience, is_over).await?;
+    if let Some(why) = session.program_is_down() {
+        return Ok(Err(format!("after hook `power-cycle` {why}")));
+    }
+    if came {
         return Ok(Ok(()));
     }
     // It has connected meanwhile, so it is on its way.

@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::latest::Latest;
 use tck_journal::file::{self, JournalWriter};
 
 /// Why a bundle cannot be written.
@@ -26,13 +27,11 @@ const LARGE: u64 = 1 << 20;
 /// The evidence of a run.
 pub const JOURNAL: &str = tck_journal::file::NAME;
 
-/// The link in the folder of reports that leads to the run that was begun last.
-pub const LATEST: &str = "latest";
-
 /// A folder for the evidence of one run.
 #[derive(Debug)]
 pub struct Bundle {
     folder: PathBuf,
+    latest: Option<Latest>,
 }
 
 impl Bundle {
@@ -50,8 +49,31 @@ impl Bundle {
         let device = reports.join(device);
         let folder = fresh(&device, &format!("{begun}-{}", safe(run)))
             .map_err(|reason| BundleError::Write { path: device, reason })?;
-        point_at_latest(reports, &folder);
-        Ok(Self { folder })
+        let latest = Some(Latest::lead_to(reports, &folder));
+        Ok(Self { folder, latest })
+    }
+
+    /// Whether another run is going on below the same folder of reports, so that `latest` leads to neither.
+    #[must_use]
+    pub fn is_one_of_several(&self) -> bool {
+        self.latest.as_ref().is_some_and(Latest::is_shared)
+    }
+
+    /// The run could not begin: `latest` does not lead here, and a folder without evidence goes.
+    pub fn abandon(self) {
+        if let Some(latest) = &self.latest {
+            latest.lead_nowhere();
+        }
+        let is_empty = |path: &Path| std::fs::metadata(path).is_ok_and(|facts| facts.is_file() && facts.len() == 0);
+        let files = std::fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        for file in files.map(|entry| entry.path()).filter(|path| is_empty(path)) {
+            let _ = std::fs::remove_file(file);
+        }
+        // Only an empty folder goes, here and above.
+        let _ = std::fs::remove_dir(&self.folder);
+        if let Some(device) = self.folder.parent() {
+            let _ = std::fs::remove_dir(device);
+        }
     }
 
     /// A bundle that is there already.
@@ -59,6 +81,7 @@ impl Bundle {
     pub fn open(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
+            latest: None,
         }
     }
 
@@ -96,14 +119,36 @@ impl Bundle {
 
     /// Writes one file whole, so that nobody ever sees half of it.
     pub fn write(&self, name: &str, content: &[u8]) -> Result<(), BundleError> {
-        let path = self.folder.join(name);
-        let draft = self.folder.join(format!(".{name}.draft"));
-        let written = std::fs::write(&draft, content).and_then(|()| std::fs::rename(&draft, &path));
-        written.map_err(|reason| {
-            let _ = std::fs::remove_file(&draft);
-            BundleError::Write { path, reason }
-        })
+        write_whole(&self.folder.join(name), content)
     }
+}
+
+/// Writes a file whole, so that nobody ever sees half of it; its folder is made when it is not there.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), BundleError> {
+    let failed = |reason| BundleError::Write {
+        path: path.to_owned(),
+        reason,
+    };
+    let Some(name) = path.file_name() else {
+        return Err(failed(std::io::Error::other("this is no name of a file")));
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if !folder.as_os_str().is_empty() {
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
+    // What is no file, such as a terminal or a pipe, cannot be replaced.
+    if std::fs::metadata(path).is_ok_and(|facts| !facts.is_file() && !facts.is_dir()) {
+        return std::fs::write(path, content).map_err(failed);
+    }
+    let draft = folder.join(format!(".{}.draft", name.display()));
+    let written = std::fs::write(&draft, content).and_then(|()| std::fs::rename(&draft, path));
+    written.map_err(|reason| {
+        let _ = std::fs::remove_file(&draft);
+        failed(reason)
+    })
 }
 
 /// Makes a folder that was not there.
@@ -119,23 +164,6 @@ fn fresh(device: &Path, name: &str) -> std::io::Result<PathBuf> {
             Err(reason) if reason.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
             made => return made.map(|()| folder),
         }
-    }
-}
-
-/// Lets `reports/latest` lead to this run. It is a help for people and scripts: where there are no links, there is none.
-fn point_at_latest(reports: &Path, folder: &Path) {
-    let Ok(relative) = folder.strip_prefix(reports) else {
-        return;
-    };
-    let draft = reports.join(format!(".latest-{}", std::process::id()));
-    let _ = std::fs::remove_file(&draft);
-    #[cfg(unix)]
-    let linked = std::os::unix::fs::symlink(relative, &draft);
-    #[cfg(windows)]
-    let linked = std::os::windows::fs::symlink_dir(relative, &draft);
-    // A link is replaced in one step; a folder of that name is somebody else's, and stays.
-    if linked.is_ok() && std::fs::rename(&draft, reports.join(LATEST)).is_err() {
-        let _ = std::fs::remove_file(&draft);
     }
 }
 
@@ -155,22 +183,6 @@ fn safe(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    #[cfg(unix)]
-    fn the_latest_run_is_found_under_a_name_that_stays() {
-        let root = tempfile::tempdir().expect("folder");
-        for run in ["one", "two"] {
-            let bundle = Bundle::create(root.path(), "A", "1", jiff::Timestamp::UNIX_EPOCH, run).expect("bundle");
-            let latest = root.path().join(LATEST).canonicalize().expect("link");
-            assert_eq!(latest, bundle.folder().canonicalize().expect("bundle"));
-        }
-        let other = tempfile::tempdir().expect("folder");
-        let kept = other.path().join(LATEST).join("mine");
-        std::fs::create_dir_all(&kept).expect("folder");
-        Bundle::create(other.path(), "A", "1", jiff::Timestamp::UNIX_EPOCH, "r").expect("bundle");
-        assert!(kept.is_dir());
-    }
 
     #[test]
     fn two_runs_that_begin_in_one_second_have_a_folder_each() {

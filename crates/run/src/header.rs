@@ -1,5 +1,7 @@
 //! The first record of a journal: what the run is about.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Map, Value, json};
 
 use tck_journal::event::{MockVehicle, RunHeader, Setting};
@@ -39,6 +41,8 @@ pub struct HeaderParts<'a> {
     pub settings: Vec<Setting>,
     /// The command line.
     pub command: Vec<String>,
+    /// SHA-256 of the files that make the device what it is, by name.
+    pub files: BTreeMap<String, String>,
 }
 
 impl HeaderParts<'_> {
@@ -80,6 +84,7 @@ impl HeaderParts<'_> {
             modified: self.modified,
             bindings,
             settings: self.settings,
+            files: self.files,
             command: self
                 .command
                 .iter()

@@ -3,115 +3,21 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::process::Stdio;
 use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
-use tokio::process::{Child, Command};
 
+use super::device::{DeviceProcess, GOODBYE_LIMIT};
 use super::person::{Answer, Person, ask};
-use super::program::{ask_to_end, program};
+use super::program::program;
 use tck_engine::{HookOutcome, Operator};
 use tck_net::bench::web;
-use tck_profile::{Hook, HookAction, Secrets, show_duration};
+use tck_profile::{Hook, HookAction, Secrets, ends_the_device, show_duration};
 
 /// Answers of a device that has understood what is wanted, and does not do it: in conflict with what it does now, not
 /// to be processed, not implemented.
 const REFUSALS: [u16; 3] = [409, 422, 501];
-
-/// How long a device may take to end in good order.
-const GOODBYE_LIMIT: Duration = Duration::from_secs(20);
-
-/// A device that the harness starts itself (`device.command`).
-#[derive(Debug)]
-pub struct DeviceProcess {
-    command: Vec<String>,
-    folder: PathBuf,
-    log: Option<PathBuf>,
-    child: Option<Child>,
-}
-
-impl DeviceProcess {
-    /// A device to be started with this program and these arguments in this folder. What it prints goes
-    /// into `log`.
-    #[must_use]
-    pub fn new(command: Vec<String>, folder: PathBuf, log: Option<PathBuf>) -> Self {
-        Self {
-            command,
-            folder,
-            log,
-            child: None,
-        }
-    }
-
-    /// Starts it.
-    ///
-    /// # Errors
-    /// What the operating system says, with the command.
-    pub fn start(&mut self) -> std::io::Result<()> {
-        let Some((program, arguments)) = self.command.split_first() else {
-            return Err(std::io::Error::other("device.command is empty"));
-        };
-        let output = |log: &Option<PathBuf>| -> std::io::Result<Stdio> {
-            let Some(path) = log else { return Ok(Stdio::null()) };
-            Ok(std::fs::File::options().create(true).append(true).open(path)?.into())
-        };
-        let child = Command::new(program)
-            .args(arguments)
-            .current_dir(if self.folder.as_os_str().is_empty() {
-                ".".into()
-            } else {
-                self.folder.clone()
-            })
-            .stdin(Stdio::null())
-            .stdout(output(&self.log)?)
-            .stderr(output(&self.log)?)
-            .kill_on_drop(true)
-            .spawn()
-            .map_err(|error| std::io::Error::other(format!("cannot start the device with `{program}`: {error}")))?;
-        self.child = Some(child);
-        Ok(())
-    }
-
-    /// Kills it, if it still runs, and starts it again.
-    ///
-    /// # Errors
-    /// What the operating system says.
-    pub async fn restart(&mut self) -> std::io::Result<()> {
-        self.stop().await;
-        self.start()
-    }
-
-    /// Asks it to end in good order, and kills it when it does not. Says whether it ended by itself.
-    pub async fn end(&mut self) -> bool {
-        if !self.is_running() {
-            self.stop().await;
-            return true;
-        }
-        let Some(child) = &mut self.child else { return true };
-        if !ask_to_end(child) {
-            self.stop().await;
-            return false;
-        }
-        let ended = tokio::time::timeout(GOODBYE_LIMIT, child.wait()).await.is_ok();
-        self.stop().await;
-        ended
-    }
-
-    /// Whether it was started and not ended.
-    fn is_running(&mut self) -> bool {
-        let ended = self.child.as_mut().map(Child::try_wait);
-        matches!(ended, Some(Ok(None)))
-    }
-
-    /// Kills it.
-    pub async fn stop(&mut self) {
-        if let Some(mut child) = self.child.take() {
-            let _ = child.kill().await;
-        }
-    }
-}
 
 /// The hooks of a profile.
 #[derive(Debug)]
@@ -234,6 +140,12 @@ impl Operator for ProfileHooks {
         (hook.action == HookAction::NaturalTraffic).then_some(hook.timeout)
     }
 
+    async fn end(&mut self) {
+        if let Some(device) = &mut self.device {
+            device.stop("the end of the run").await;
+        }
+    }
+
     async fn run(&mut self, name: &str, parameters: Map<String, Value>) -> HookOutcome {
         let Some(hook) = self.hooks.get(name).cloned() else {
             return HookOutcome::Missing;
@@ -243,7 +155,15 @@ impl Operator for ProfileHooks {
             Value::String(text) => (name, text),
             other => (name, other.to_string()),
         }));
+        // However it is done: a device that a hook ends does not end by itself.
+        let ends = ends_the_device(name);
+        if let (true, Some(device)) = (ends, &mut self.device) {
+            device.is_asked(&format!("hook `{name}`"), hook.timeout).await;
+        }
         let outcome = self.carry_out(&hook, &values).await;
+        if let (true, Some(device)) = (ends, &mut self.device) {
+            device.was_asked();
+        }
         let shown = |text: String| self.means.secrets.out_of(&text);
         match outcome {
             HookOutcome::Done(text) => HookOutcome::Done(shown(text)),
@@ -315,6 +235,7 @@ fn answered(answer: Answer, within: Duration) -> HookOutcome {
 #[cfg(unix)]
 mod tests {
     use super::*;
+    use crate::device::Surroundings;
     use tck_base::diagnostic::{Source, Span};
 
     fn hook(action: HookAction) -> Hook {
@@ -332,8 +253,8 @@ mod tests {
         actions: &[HookAction],
     ) -> (Vec<HookOutcome>, ProfileHooks) {
         let command = ["sh", "-c", script].map(str::to_owned).to_vec();
-        let mut device = DeviceProcess::new(command, folder.to_owned(), None);
-        device.start().unwrap();
+        let mut device = DeviceProcess::new(command, folder.to_owned(), None, Surroundings::default());
+        device.start().await.unwrap();
         let mut hooks = ProfileHooks::new(
             BTreeMap::new(),
             BTreeMap::new(),

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
-use super::hooks::{DeviceProcess, Means, ProfileHooks};
+use super::device::{DeviceProcess, Surroundings};
+use super::hooks::{Means, ProfileHooks};
 use super::person::Person;
 use tck_engine::{HookOutcome, Operator};
 use tck_net::link::mqtt::BenchInfo;
@@ -15,10 +16,10 @@ use tck_profile::{self as profile, Profile};
 use tck_simulate::driver::RunningDevice;
 
 /// The hooks of a profile; starts the device if the profile says how.
-pub(super) fn hooks_of(
+pub(super) async fn hooks_of(
     profile: &Profile,
     info: &BenchInfo,
-    device_log: Option<PathBuf>,
+    (device_log, surroundings): (Option<PathBuf>, Surroundings),
     folder: PathBuf,
     (person, means): (Option<Arc<dyn Person>>, Means),
 ) -> std::io::Result<ProfileHooks> {
@@ -46,10 +47,10 @@ pub(super) fn hooks_of(
             .iter()
             .map(|word| profile::fill(word, &common, str::to_owned))
             .collect();
-        DeviceProcess::new(filled, folder.clone(), device_log)
+        DeviceProcess::new(filled, folder.clone(), device_log, surroundings)
     });
     if let Some(process) = &mut process {
-        process.start()?;
+        process.start().await?;
     }
     Ok(ProfileHooks::new(
         profile.hooks.clone(),

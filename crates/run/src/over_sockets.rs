@@ -7,11 +7,13 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use super::device::{Surroundings as Onlookers, Tell};
+use super::files::files;
 use super::hooks::Means;
 use super::operators::{Commands, hooks_of};
 use super::person::Person;
 use super::plan::{How, RunPlan};
-use super::session::{Finished, Progress, run};
+use super::session::{Finished, Patience, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
 use super::site::{Topics, bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
@@ -20,7 +22,7 @@ use tck_base::diagnostic::Diagnostic;
 use tck_engine::{Composer, Engine, EngineError, Operator, RecordError, Recorder};
 use tck_journal::Journal;
 use tck_journal::Vantage;
-use tck_journal::event::{Event, Occurrence};
+use tck_journal::event::{Event, Occurrence, Source as Seen};
 use tck_journal::file::JournalWriter;
 use tck_judge::Library;
 use tck_judge::RunJudge;
@@ -48,6 +50,19 @@ pub struct SocketRun {
     pub earlier: Option<Journal>,
     /// Where a device prints that the harness starts itself.
     pub device_log: Option<PathBuf>,
+    /// Who keeps hold of such a device, and who is told at once what becomes of it.
+    pub hold: Hold,
+    /// Turns true when nobody waits any more for the run to end in good order.
+    pub quit: Option<tokio::sync::watch::Receiver<bool>>,
+}
+
+/// What a device needs that the harness starts itself.
+#[derive(Clone, Default)]
+pub struct Hold {
+    /// The program that can be called as a [`super::supervisor`].
+    pub supervisor: Option<PathBuf>,
+    /// Who looks on.
+    pub tell: Option<Tell>,
 }
 
 /// Where the device comes from.
@@ -116,6 +131,8 @@ impl SocketRun {
             maps: Ok(()),
             earlier: None,
             device_log: None,
+            hold: Hold::default(),
+            quit: None,
         }
     }
 
@@ -132,7 +149,8 @@ impl SocketRun {
         place: Place,
     ) -> Result<Self, Vec<Diagnostic>> {
         let profile = &effective.profile;
-        let device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
+        let mut device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
+        device.files = files(effective, place.profile.as_deref(), &place.folder);
         let topics = Topics {
             device: device.published(pack),
             harness: device.told(pack),
@@ -159,6 +177,8 @@ impl SocketRun {
             maps,
             earlier: None,
             device_log: None,
+            hold: Hold::default(),
+            quit: None,
         })
     }
 
@@ -246,6 +266,7 @@ impl SocketRun {
             vantage,
             clock,
             earlier: self.earlier,
+            quit: self.quit,
         };
         match self.source {
             Source::BuiltIn { device, faults } => {
@@ -267,7 +288,15 @@ impl SocketRun {
                     authority: profile.bench.tls_ca.clone(),
                     secrets,
                 };
-                let operator = hooks_of(&profile, &info, self.device_log, folder, (person, means))?;
+                let onlookers = Onlookers {
+                    reporter: Some(link.reporter()),
+                    kin: link.kin(),
+                    tell: self.hold.tell,
+                    secrets: means.secrets.clone(),
+                    supervisor: self.hold.supervisor,
+                };
+                let log = (self.device_log, onlookers);
+                let operator = hooks_of(&profile, &info, log, folder, (person, means)).await?;
                 progress.expects_device(&info);
                 stage.run(link, &info, operator, progress, saved).await
             }
@@ -278,6 +307,8 @@ impl SocketRun {
 /// What belongs to a profile and does not stand in it.
 #[derive(Clone, Debug, Default)]
 pub struct Place {
+    /// The file, if there is one.
+    pub profile: Option<PathBuf>,
     /// Where its commands are run.
     pub folder: PathBuf,
     /// Who can be asked.
@@ -298,6 +329,7 @@ struct Stage<'a> {
     vantage: Vantage,
     clock: WallClock,
     earlier: Option<Journal>,
+    quit: Option<tokio::sync::watch::Receiver<bool>>,
 }
 
 impl Stage<'_> {
@@ -326,14 +358,27 @@ impl Stage<'_> {
             None => WithFleet::alone(operator),
             Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter()),
         };
+        // It is recorded when it comes, whatever the harness is doing then.
+        let (mut interrupted, reporter) = (self.interrupt.clone(), link.reporter());
+        let recorded = tokio::spawn(async move {
+            if interrupted.wait_for(|interrupted| *interrupted).await.is_ok() {
+                reporter.report(Seen::Operator, None, Event::Interrupted).await;
+            }
+        });
+        let patience = Patience {
+            interrupt: self.interrupt.clone(),
+            quit: self.quit,
+        };
         let mut engine = Engine::new(link, operator, recorder, composer, self.interrupt);
-        let end = run(&mut engine, setup, progress, saved).await;
+        let end = run(&mut engine, setup, progress, saved, patience.ends()).await;
+        recorded.abort();
         let Engine {
             link,
             recorder,
-            operator,
+            mut operator,
             ..
         } = engine;
+        operator.end().await;
         operator.stop().await;
         link.stop().await;
         Ok(Finished {

@@ -15,6 +15,9 @@ pub(super) enum Presence {
 
 impl Presence {
     pub(super) fn of(judge: &RunJudge, vantage: Vantage) -> Self {
+        if judge.program_is_down().is_some() {
+            return Self::Away;
+        }
         let there = match vantage {
             Vantage::Tap if judge.role() == Role::MasterControl => has_any_open_connection(judge),
             // A master control says nothing by itself, so nobody can tell.

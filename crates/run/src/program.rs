@@ -83,13 +83,13 @@ fn shown(bytes: &[u8]) -> String {
 }
 
 /// The process group of a program: killed when the program is given up.
-struct Group {
+pub(super) struct Group {
     #[cfg(unix)]
     leader: Option<rustix::process::Pid>,
 }
 
 impl Group {
-    fn of(child: &Child) -> Self {
+    pub(super) fn of(child: &Child) -> Self {
         #[cfg(not(unix))]
         let _ = child;
         Self {
@@ -103,6 +103,34 @@ impl Group {
         {
             self.leader = None;
         }
+    }
+
+    /// Lets it go on.
+    pub(super) fn forget(mut self) {
+        self.release();
+    }
+
+    /// Whether anybody is in it.
+    pub(super) fn is_there(&self) -> bool {
+        #[cfg(unix)]
+        {
+            self.leader
+                .is_some_and(|leader| rustix::process::test_kill_process_group(leader).is_ok())
+        }
+        #[cfg(not(unix))]
+        false
+    }
+
+    /// Asks all of it to end in good order.
+    pub(super) fn ask_to_end(&self) -> bool {
+        #[cfg(unix)]
+        {
+            let term = rustix::process::Signal::TERM;
+            self.leader
+                .is_some_and(|leader| rustix::process::kill_process_group(leader, term).is_ok())
+        }
+        #[cfg(not(unix))]
+        false
     }
 }
 
@@ -118,19 +146,6 @@ impl Drop for Group {
 #[cfg(unix)]
 fn pid(child: &Child) -> Option<rustix::process::Pid> {
     rustix::process::Pid::from_raw(i32::try_from(child.id()?).ok()?)
-}
-
-/// Asks a program to end in good order.
-pub(super) fn ask_to_end(child: &Child) -> bool {
-    #[cfg(unix)]
-    {
-        pid(child).is_some_and(|pid| rustix::process::kill_process(pid, rustix::process::Signal::TERM).is_ok())
-    }
-    #[cfg(not(unix))]
-    {
-        let _ = child;
-        false
-    }
 }
 
 #[cfg(test)]

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde_json::{Map, Value};
+use tokio::sync::watch;
 
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
@@ -71,6 +73,9 @@ pub enum End {
     NoDevice(String),
     /// Another device speaks than the one that was to be judged; the text says which. Nothing is judged.
     Stranger(String),
+    /// The run goes on with another one, and the device is not what it was then; the text says what differs. Nothing of it
+    /// is judged.
+    Changed(String),
     /// The device went away, and did not come back.
     Lost(String),
     /// The user stopped it.
@@ -97,25 +102,75 @@ pub trait Progress: Watcher {
     }
 }
 
-/// Carries out a run. `saved` is called after every test, so that a crash loses nothing.
+/// How long a run that somebody interrupts may take to end in good order: to call off what the device was given, and to bring
+/// it back.
+pub const ENDS_WITHIN: Duration = Duration::from_secs(60);
+
+/// How long is waited for a run that somebody has interrupted.
+pub struct Patience {
+    /// Turns true when somebody does.
+    pub interrupt: watch::Receiver<bool>,
+    /// Turns true when nobody waits any more.
+    pub quit: Option<watch::Receiver<bool>>,
+}
+
+impl Patience {
+    /// Ends when the run is not waited for any more.
+    pub async fn ends(mut self) {
+        let interrupted = async {
+            if self.interrupt.wait_for(|interrupted| *interrupted).await.is_err() {
+                std::future::pending::<()>().await;
+            }
+            tokio::time::sleep(ENDS_WITHIN).await;
+        };
+        let quit = async {
+            let quit = match &mut self.quit {
+                Some(quit) => quit.wait_for(|quit| *quit).await.is_ok(),
+                None => false,
+            };
+            if !quit {
+                std::future::pending::<()>().await;
+            }
+        };
+        tokio::select! {
+            () = interrupted => {}
+            () = quit => {}
+        }
+    }
+}
+
+/// Carries out a run. `saved` is called after every test, so that a crash loses nothing. When `given_up` ends, what the run
+/// still wants to do is left undone.
 pub async fn run<L: Link, O: Operator>(
     engine: &mut Engine<L, O>,
     mut setup: Setup,
     progress: &mut dyn Progress,
     saved: &mut dyn FnMut(&RunJudge),
+    given_up: impl Future<Output = ()>,
 ) -> End {
     engine.map_files = std::mem::take(&mut setup.maps);
-    let end = match Session::new(engine, setup, progress).carry_out(saved).await {
-        Ok(end) => end,
-        Err(error) => End::Broken(error),
+    let mut is_given_up = false;
+    let end = tokio::select! {
+        biased;
+        end = Session::new(engine, setup, progress).carry_out(saved) => end.unwrap_or_else(End::Broken),
+        () = given_up => {
+            is_given_up = true;
+            End::Interrupted
+        }
     };
+    if matches!(end, End::Interrupted) && !engine.recorder.judge().is_interrupted() {
+        let _ = engine.note(Event::Interrupted);
+    }
     let (partial, reason) = match &end {
         End::Completed => (false, None),
-        End::NoDevice(why) | End::Stranger(why) | End::Lost(why) | End::Flooded(why) => (true, Some(why.clone())),
+        End::NoDevice(why) | End::Stranger(why) | End::Changed(why) | End::Lost(why) | End::Flooded(why) => {
+            (true, Some(why.clone()))
+        }
+        End::Interrupted if is_given_up => (true, Some(GIVEN_UP.to_owned())),
         End::Interrupted => (true, Some("interrupted by the user".to_owned())),
         End::Broken(error) => (true, Some(error.to_string())),
     };
-    let stranger = matches!(end, End::Stranger(_));
+    let stranger = matches!(end, End::Stranger(_) | End::Changed(_));
     let recorded = engine.note(Event::RunEnded {
         partial,
         reason,
@@ -128,6 +183,10 @@ pub async fn run<L: Link, O: Operator>(
         (_, Err(error)) => End::Broken(error.into()),
     }
 }
+
+/// Why a run has ended whose end was not waited for.
+const GIVEN_UP: &str =
+    "interrupted by the user; what the device was given was not called off to the end, and it may go on with it";
 
 pub(super) struct Session<'a, L, O> {
     pub(super) engine: &'a mut Engine<L, O>,
@@ -178,10 +237,13 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let admitted = self.admit().await?;
         self.draw();
         if let Err(why) = admitted {
-            let end = self.stopped().unwrap_or_else(|| match self.somebody_else() {
-                Some(who) => End::Stranger(who),
-                None => End::NoDevice(why.clone()),
-            });
+            let end = self
+                .stopped()
+                .unwrap_or_else(|| match (self.is_another(), self.somebody_else()) {
+                    (Some(what), _) => End::Changed(what),
+                    (None, Some(who)) => End::Stranger(who),
+                    (None, None) => End::NoDevice(why.clone()),
+                });
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
                 gate: Gate::Unobservable(why.clone()),
@@ -335,6 +397,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 .and_then(Value::as_str)
                 .map(|name| name.chars().take(200).collect()),
             complete: self.setup.complete,
+            repeat: (self.setup.repeat > 1).then_some(self.setup.repeat),
         }
     }
 

@@ -43,6 +43,8 @@ pub struct Request {
     pub repeat: u32,
     /// Whether nothing is left to choose: the run is for a certificate.
     pub certifies: bool,
+    /// What restricts the statement because of what was asked for, one sentence each.
+    pub limits: Vec<String>,
 }
 
 impl Request {
@@ -58,6 +60,7 @@ impl Request {
             fail_fast: false,
             repeat: 1,
             certifies: false,
+            limits: Vec::new(),
         }
     }
 }
@@ -91,6 +94,8 @@ pub struct DeviceUnderTest {
     pub limits: Vec<String>,
     /// Effective settings, for the record.
     pub settings: Vec<Setting>,
+    /// SHA-256 of the files that make it what it is, by name.
+    pub files: BTreeMap<String, String>,
 }
 
 impl DeviceUnderTest {
@@ -111,6 +116,7 @@ impl DeviceUnderTest {
             deviations: BTreeMap::new(),
             limits: vec![device.limit(in_virtual_time)],
             settings: Vec::new(),
+            files: BTreeMap::new(),
         }
     }
 
@@ -148,6 +154,7 @@ impl DeviceUnderTest {
                 .collect(),
             limits: profile.time.contract().iter().map(ToString::to_string).collect(),
             settings: effective.settings.clone(),
+            files: BTreeMap::new(),
             subject,
             fleet,
         })
@@ -205,6 +212,7 @@ impl DeviceUnderTest {
             vehicles: mocks,
             fleet: self.fleet.as_ref().map_or_else(Vec::new, Fleet::bindings),
             settings: self.settings,
+            files: self.files,
             command: request.command,
         };
         let header = header.header();
@@ -234,7 +242,7 @@ impl DeviceUnderTest {
             vehicles,
             maps,
             deviations: self.deviations,
-            limits: [self.limits, bench.limits].concat(),
+            limits: [self.limits, bench.limits, request.limits].concat(),
             run: request.run,
             fail_fast: request.fail_fast,
             repeat: request.repeat.max(1),

@@ -63,6 +63,8 @@ pub struct VirtualRun {
     pub certifies: bool,
     /// Effective settings, for the record.
     pub settings: Vec<Setting>,
+    /// What restricts the statement because of what was asked for, one sentence each.
+    pub limits: Vec<String>,
 }
 
 impl VirtualRun {
@@ -96,6 +98,7 @@ impl VirtualRun {
             earlier: None,
             certifies: false,
             settings: Vec::new(),
+            limits: Vec::new(),
         }
     }
 }
@@ -184,13 +187,14 @@ pub async fn run_virtually(
         fail_fast: request.fail_fast,
         repeat: request.repeat,
         certifies: request.certifies,
+        limits: request.limits,
     };
     let (header, setup) = tested.on(bench, asked, library, pack);
     let header = Box::new(header);
     let first = Occurrence::harness(link.now(), Event::RunBegun { header });
     let recorder = Recorder::begin(&library.rules, writer, request.earlier, first)?;
     let mut engine = Engine::new(link, operator, recorder, composer, interrupt);
-    let end = run(&mut engine, setup, progress, saved).await;
+    let end = run(&mut engine, setup, progress, saved, std::future::pending()).await;
     let recorder = engine.recorder;
     Ok(Finished {
         result: recorder.judge().result(),

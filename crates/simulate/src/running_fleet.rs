@@ -63,6 +63,10 @@ impl<O: Operator> Operator for WithFleet<O> {
         self.operator.natural_traffic(hook)
     }
 
+    async fn end(&mut self) {
+        self.operator.end().await;
+    }
+
     fn usual_time(&self) -> Duration {
         self.operator.usual_time()
     }

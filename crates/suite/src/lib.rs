@@ -88,7 +88,7 @@ impl Suites {
         hooks: &[HookFacts],
     ) -> Result<Self, Vec<Diagnostic>> {
         let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
-        load::load(files(assets), &vocabulary, checks)
+        load::load(files(assets), &vocabulary, checks, &|path| assets.is_checked(path))
     }
 
     /// Loads tests given by path (`suites/agv/…`) and text. The states they use are those of `assets`.
@@ -106,7 +106,10 @@ impl Suites {
         let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
         let states = assets.under("suites/states/");
         let states = states.map(|file| (file.path.as_str(), file.text.as_str()));
-        load::load(states.chain(tests), &vocabulary, checks).map(|suites| suites.tests)
+        load::load(states.chain(tests), &vocabulary, checks, &|path| {
+            assets.is_checked(path)
+        })
+        .map(|suites| suites.tests)
     }
 
     /// The same with more tests.
@@ -156,7 +159,7 @@ impl Suites {
         vocabulary: &dyn Vocabulary,
         checks: &[CheckInfo],
     ) -> Result<Self, Vec<Diagnostic>> {
-        load::load(files, vocabulary, checks)
+        load::load(files, vocabulary, checks, &|_| false)
     }
 }
 

@@ -36,11 +36,13 @@ fn read_state(states: &mut States, name: &str, source: &Arc<Source>, problems: &
     states.insert(name, Some(steps.clone()));
 }
 
-/// Loads every file below `suites/`, given by path and text.
+/// Loads every file below `suites/`, given by path and text. What the linter says of a file that is checked is known:
+/// nothing, so it is not asked.
 pub(super) fn load<'a>(
     files: impl Iterator<Item = (&'a str, &'a str)>,
     vocabulary: &dyn Vocabulary,
     known: &[CheckInfo],
+    is_checked: &dyn Fn(&str) -> bool,
 ) -> Result<Suites, Vec<Diagnostic>> {
     let mut problems = Problems::default();
     let mut states = States::default();
@@ -69,11 +71,21 @@ pub(super) fn load<'a>(
     }
     let mut suites = Suites::default();
     for (source, role, name) in &tests {
-        let read = read_test(source, Some((name, *role)), &states, vocabulary, known, &mut problems);
+        let lint = !is_checked(&source.name);
+        let read = read_test(
+            source,
+            Some((name, *role)),
+            &states,
+            vocabulary,
+            known,
+            lint,
+            &mut problems,
+        );
         suites.tests.extend(read.into_iter().map(Arc::new));
     }
     for (source, name) in &monitors {
-        let read = read_monitor(source, Some(name), vocabulary, known, &mut problems);
+        let lint = !is_checked(&source.name);
+        let read = read_monitor(source, Some(name), vocabulary, known, lint, &mut problems);
         suites.monitors.extend(read.map(Arc::new));
     }
     for (source, role) in &exceptions {
@@ -167,7 +179,7 @@ pub(super) fn load_text<'a>(
     let first = parse(&source, &mut Problems::default());
     let is = |key: &str| first.as_ref().is_some_and(|root| root.get(key).is_some());
     if is("monitor") {
-        let read = read_monitor(&source, None, vocabulary, known, &mut problems);
+        let read = read_monitor(&source, None, vocabulary, known, true, &mut problems);
         suites.monitors.extend(read.map(Arc::new));
     } else if is("state") {
         let own = first
@@ -178,7 +190,7 @@ pub(super) fn load_text<'a>(
         read_state(&mut states, &own, &source, &mut problems);
         lint_state(&own, &source, &states, vocabulary, known, &mut problems);
     } else {
-        let read = read_test(&source, None, &states, vocabulary, known, &mut problems);
+        let read = read_test(&source, None, &states, vocabulary, known, true, &mut problems);
         suites.tests.extend(read.into_iter().map(Arc::new));
     }
     let problems = problems.into_sorted();

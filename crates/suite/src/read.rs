@@ -105,6 +105,7 @@ pub(super) fn read_test(
     states: &States,
     vocabulary: &dyn Vocabulary,
     known: &[CheckInfo],
+    lint: bool,
     problems: &mut Problems,
 ) -> Vec<Test> {
     let before = problems.len();
@@ -128,6 +129,7 @@ pub(super) fn read_test(
         vocabulary,
         known,
         role,
+        lint,
         before,
     };
     let nothing: &[(Node, Node)] = &[];
@@ -251,6 +253,8 @@ struct TestReader<'a> {
     vocabulary: &'a dyn Vocabulary,
     known: &'a [CheckInfo],
     role: Option<Role>,
+    /// Whether the tests of this file are linted.
+    lint: bool,
     /// How many problems there were before this file.
     before: usize,
 }
@@ -390,7 +394,7 @@ impl TestReader<'_> {
             drawn,
         };
         test.course = course_need(&test);
-        if !lint {
+        if !lint || !self.lint {
             return Some(test);
         }
         let value_place = |key: &str| fields.get(key, &mut Problems::default()).map(|node| node.span.clone());
@@ -413,6 +417,7 @@ pub(super) fn read_monitor(
     name: Option<&str>,
     vocabulary: &dyn Vocabulary,
     known: &[CheckInfo],
+    lint: bool,
     problems: &mut Problems,
 ) -> Option<Monitor> {
     let root = parse(source, problems)?;
@@ -452,6 +457,9 @@ pub(super) fn read_monitor(
             .collect(),
         source: Arc::clone(source),
     };
+    if !lint {
+        return Some(monitor);
+    }
     let places = HeaderPlaces {
         hides: hides.iter().map(|node| node.span.clone()).collect(),
         spec: fields

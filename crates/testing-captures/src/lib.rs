@@ -6,6 +6,7 @@
     clippy::expect_used,
     clippy::panic,
     clippy::must_use_candidate,
+    clippy::missing_panics_doc,
     reason = "only tests use it"
 )]
 

@@ -45,11 +45,11 @@ fn shown(watch: &mut Watch<'_>, (at, message): (Stamp, Message)) -> Vec<Notice> 
 #[test]
 fn a_finding_comes_with_the_message_that_shows_it() {
     let library = tck_testing::library();
-    let mut watch = watch(&library);
+    let mut watch = watch(library);
     let mut all = Vec::new();
     for number in 1..=12 {
         let state = json!({ "connectionState": if number == 1 { "ONLINE" } else { "AWAY" } });
-        all.extend(shown(&mut watch, message(&library, "connection", number, state)));
+        all.extend(shown(&mut watch, message(library, "connection", number, state)));
     }
     let fails: Vec<&Notice> = all
         .iter()
@@ -76,7 +76,7 @@ fn a_finding_comes_with_the_message_that_shows_it() {
 #[test]
 fn what_a_vehicle_does_and_how_fast_is_known_at_a_glance() {
     let library = tck_testing::library();
-    let mut watch = watch(&library);
+    let mut watch = watch(library);
     let order = json!({ "orderId": "o", "orderUpdateId": 1 });
     let state = |update: u64| {
         json!({ "orderId": "o", "orderUpdateId": update, "operatingMode": "AUTOMATIC", "lastNodeId": "n",
@@ -86,10 +86,10 @@ fn what_a_vehicle_does_and_how_fast_is_known_at_a_glance() {
     };
     let actions = json!({ "actions": [{ "actionId": "a" }, { "actionId": "b" }] });
     for one in [
-        message(&library, "order", 1, order),
-        message(&library, "state", 2, state(0)),
-        message(&library, "instantActions", 3, actions),
-        message(&library, "state", 4, state(1)),
+        message(library, "order", 1, order),
+        message(library, "state", 2, state(0)),
+        message(library, "instantActions", 3, actions),
+        message(library, "state", 4, state(1)),
     ] {
         shown(&mut watch, one);
     }

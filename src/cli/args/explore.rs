@@ -54,6 +54,9 @@ pub struct Explore {
     /// Show what may be said in which situation, and end
     #[arg(long)]
     pub stimuli: bool,
+    /// Explore the built-in device, and none of yours: has to be said where `CI` is set or a device.toml is beside it
+    #[arg(long, help_heading = "Built-in device", conflicts_with = "profile")]
+    pub reference: bool,
     /// In virtual time, against the built-in device
     #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with = "profile")]
     pub in_virtual_time: bool,

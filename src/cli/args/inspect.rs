@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::rendering::{self, RenderedTo};
 use super::{Format, InconclusiveArg, SuiteArgs};
 use tck_pack::Role;
 
@@ -127,9 +128,12 @@ Examples:
   vda5050-tck report --verify --root sha256:HASH DIR    is it the bundle that a certificate names?
   vda5050-tck report --certificate DIR > paper.html     two to four pages of A4 for a run of `certify`
   vda5050-tck report --attestation DIR > attestation.json   for a signer, such as cosign
-  vda5050-tck report --as code-quality DIR > quality.json   for a pipeline; see docs/ci.md
-  vda5050-tck report --compare BEFORE AFTER             what became better or worse
-  vda5050-tck report --compare A B C --page > runs.html a page: requirement by run";
+  vda5050-tck report --as code-quality DIR > quality.json   for a pipeline; `run --as` writes it in every case
+  vda5050-tck report --compare BEFORE AFTER             what became better or worse, or is lost
+  vda5050-tck report --compare A B C --page > runs.html a page: requirement by run
+
+Exit codes of --compare: 0 nothing became worse · 1 something became worse, or is not decided any more
+  3 nothing became worse, but a run is partial or undecided, or a failure cannot be seen any more";
 
 /// `report`.
 #[derive(Clone, Debug, Args)]
@@ -153,9 +157,11 @@ pub struct Report {
     /// Print an in-toto statement about the bundle, ready to be signed
     #[arg(long, conflicts_with_all = ["verify", "rejudge", "certificate"])]
     pub attestation: bool,
-    /// Print it for a pipeline
-    #[arg(long = "as", value_name = "WHAT", value_enum, conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare"])]
-    pub rendering: Option<Rendering>,
+    /// Print it for a pipeline, or write it into a file, as junit, junit-requirements, markdown, code-quality or sarif; may be
+    /// repeated
+    #[arg(long = "as", value_name = "KIND[=FILE]", value_parser = rendering::to_file_or_stdout,
+        conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare"])]
+    pub renderings: Vec<RenderedTo>,
     /// How JUnit XML shows what was not decided
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub inconclusive: InconclusiveArg,
@@ -178,21 +184,6 @@ pub(super) fn parse_role(text: &str) -> Result<Role, String> {
         .into_iter()
         .find(|role| role.word() == text)
         .ok_or_else(|| format!("a role is `{}` or `{}`", Role::Agv, Role::MasterControl))
-}
-
-/// What a finished run is printed as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Rendering {
-    /// JUnit XML with a case for each test and monitor
-    Junit,
-    /// JUnit XML with a case for each requirement
-    JunitRequirements,
-    /// Markdown, such as for the summary page of a step
-    Markdown,
-    /// Code quality of GitLab
-    CodeQuality,
-    /// SARIF 2.1.0
-    Sarif,
 }
 
 /// A root hash as it is printed, without `sha256:`.

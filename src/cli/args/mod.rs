@@ -7,6 +7,7 @@ mod audit;
 mod discover;
 mod explore;
 mod inspect;
+mod rendering;
 mod run;
 mod selection;
 mod shell;
@@ -26,7 +27,9 @@ use tck_report::junit::Inconclusive;
 pub use audit::Audit;
 pub use discover::{BrokerArgs, Discover, Init, ListenArgs};
 pub use explore::Explore;
-pub use inspect::{Explain, List, Listing, Rendering, Report, Validate};
+pub use inspect::{Explain, List, Listing, Report, Validate};
+pub(super) use rendering::to_file;
+pub use rendering::{RenderedTo, Rendering};
 pub use run::{CertificateArgs, Certify, Qualify, Run, Shard};
 pub use selection::SelectionArgs;
 pub use shell::{Completions, Man};
@@ -37,9 +40,9 @@ pub use watch::Watch;
 
 const AFTER_HELP: &str = "\
 Examples:
-  vda5050-tck run                              test the built-in reference AGV: see how it works
+  vda5050-tck run --reference                  test the built-in reference AGV: see how it works
   vda5050-tck run --profile device.toml        test your device, as the profile describes it
-  vda5050-tck run 'order-rejection/*' -v       only some tests, with every effective setting
+  vda5050-tck run --virtual 'maps/*' -v        only some tests, with every effective setting
   vda5050-tck explain ORD-REJ-03               what a requirement asks, and what decides it
   vda5050-tck certify --profile device.toml    everything that applies, with nothing left to choose
 
@@ -71,7 +74,7 @@ pub struct Cli {
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Test a device; without a profile, the built-in reference AGV
+    /// Test the device of a profile, or the built-in reference AGV
     Run(Run),
     /// Test a device with nothing left to choose: all applicable tests, default timings, built-in suites
     Certify(Certify),
@@ -202,6 +205,9 @@ impl DeviceArgs {
     }
 }
 
+/// The folder of reports, unless another one is given.
+pub const REPORTS: &str = "reports";
+
 /// Where results go and how they are shown.
 #[derive(Clone, Debug, Default, Args)]
 pub struct OutputArgs {
@@ -209,7 +215,7 @@ pub struct OutputArgs {
     #[arg(
         long,
         value_name = "DIR",
-        default_value = "reports",
+        default_value = REPORTS,
         env = "VDA5050_TCK_OUT",
         hide_env_values = true
     )]
@@ -252,6 +258,15 @@ impl OutputArgs {
     pub fn speaks_events(&self) -> bool {
         self.events.as_deref().is_some_and(|path| path.as_os_str() == "-")
     }
+}
+
+/// What a pipeline reads.
+#[derive(Clone, Debug, Default, Args)]
+pub struct PipelineArgs {
+    /// Write a file for a pipeline, whatever becomes of the run: junit, junit-requirements, markdown, code-quality or sarif;
+    /// may be repeated (docs/ci.md)
+    #[arg(long = "as", value_name = "KIND=FILE", value_parser = rendering::to_file)]
+    pub renderings: Vec<RenderedTo>,
 }
 
 /// The format of standard output.

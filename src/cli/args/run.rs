@@ -5,11 +5,11 @@ use std::str::FromStr;
 
 use clap::Args;
 
-use super::{DeviceArgs, Format, OutputArgs, SelectionArgs, SuiteArgs};
+use super::{DeviceArgs, Format, OutputArgs, PipelineArgs, SelectionArgs, SuiteArgs};
 
 const RUN_HELP: &str = "\
 Examples:
-  vda5050-tck run                                    the built-in reference AGV
+  vda5050-tck run --reference                        the built-in reference AGV
   vda5050-tck run --virtual                          the same in virtual time, in seconds
   vda5050-tck run --virtual --fault outdated-update-taken-over   see a test fail
   vda5050-tck run --profile device.toml --no-motion  nothing drives
@@ -20,6 +20,7 @@ Examples:
   vda5050-tck run --profile device.toml --repeat 5 order-update   is it the same five times?
   vda5050-tck run --profile device.toml --resume reports/latest   go on after an interruption
   vda5050-tck run --profile device.toml --shard 2/4  the second quarter of the tests
+  vda5050-tck run --profile device.toml --as junit=junit.xml   for a pipeline, whatever becomes of the run
 
 A test is named by its id, and `*` stands for anything: `order-rejection/*`, `*map*`. See `list tests`.
 Results go to standard output, progress to standard error; the report to --out.";
@@ -40,9 +41,15 @@ pub struct Run {
     /// Where results go.
     #[command(flatten)]
     pub output: OutputArgs,
+    /// What a pipeline reads.
+    #[command(flatten)]
+    pub pipeline: PipelineArgs,
     /// Which suites.
     #[command(flatten)]
     pub suites: SuiteArgs,
+    /// Test the built-in device, and none of yours: has to be said where `CI` is set or a device.toml is beside it
+    #[arg(long, help_heading = "Built-in device", conflicts_with = "profile")]
+    pub reference: bool,
     /// Give the built-in device a defect, to see a test fail; may be repeated (see `list faults`)
     #[arg(
         long,
@@ -180,6 +187,9 @@ pub struct Certify {
     /// Where results go.
     #[command(flatten)]
     pub output: OutputArgs,
+    /// What a pipeline reads.
+    #[command(flatten)]
+    pub pipeline: PipelineArgs,
 }
 
 const QUALIFY_HELP: &str = "\

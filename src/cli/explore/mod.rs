@@ -11,6 +11,7 @@ use super::args::Explore;
 use super::device::{check_faults, pack_of};
 use super::exit::Exit;
 use super::problem::Problem;
+use super::reference::{self, Asked};
 use stage::{Device, OnStage};
 use tck_base::diagnostic::Diagnostic;
 use tck_base::verdict::Verdict;
@@ -28,6 +29,9 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         &arguments.device.settings(),
         &surroundings,
     )?;
+    if !arguments.stimuli {
+        reference::is_tested(&Asked::of_explore(arguments), &effective, &surroundings)?;
+    }
     let library = crate::assets::library(arguments.suites.own())?;
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;

@@ -9,8 +9,9 @@ use tokio::sync::watch;
 
 use crate::cli::args::Explore;
 use crate::cli::device::tolerate;
+use crate::cli::ending::stop;
 use crate::cli::problem::Problem;
-use crate::cli::run::{person, stop};
+use crate::cli::run::{hold, person};
 use crate::ui::Desk;
 use tck_base::clock::WallClock;
 use tck_explore::{ConversationFile, Explored, Purpose, Stage};
@@ -156,6 +157,7 @@ impl OnStage {
             fail_fast: false,
             repeat: 1,
             certifies: false,
+            limits: Vec::new(),
         }
     }
 
@@ -219,6 +221,7 @@ impl OnStage {
                 still,
             } => {
                 let place = Place {
+                    profile: None,
                     folder: folder.clone(),
                     person: person(&self.desk),
                     vehicles: None,
@@ -240,6 +243,7 @@ impl OnStage {
         interrupt: watch::Receiver<bool>,
     ) -> Result<Finished, Problem> {
         run.request = request;
+        run.hold = hold(&self.desk);
         let (library, pack) = (&self.library, &self.pack);
         let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
         let run = run.carry_out(library, pack, writer, interrupt, &mut nobody, &mut nowhere);

@@ -4,12 +4,13 @@ use super::Job;
 use crate::cli::args;
 use crate::cli::events::Followed;
 use crate::cli::exit::Exit;
+use crate::cli::gate::Gate;
+use crate::cli::outputs::{Outputs, Shown};
 use crate::cli::problem::Problem;
 
 use tck_base::diagnostic::Diagnostic;
 use tck_base::verdict::Verdict;
 use tck_engine::Recorder;
-use tck_report::known::measure;
 use tck_report::sources::Sources;
 use tck_report::text::Color;
 use tck_report::{overview, text};
@@ -18,7 +19,13 @@ use tck_run::{Bundle, End, Finished, sources, write_all};
 
 impl Job {
     /// Writes the bundle and says the verdict.
-    pub(super) fn conclude(self, bundle: &Bundle, finished: Finished, mut terminal: Followed) -> Result<Exit, Problem> {
+    pub(super) fn conclude(
+        self,
+        bundle: &Bundle,
+        finished: Finished,
+        mut terminal: Followed,
+        outputs: &Outputs<'_>,
+    ) -> Result<Exit, Problem> {
         let Finished {
             end,
             mut result,
@@ -44,6 +51,16 @@ impl Job {
                 None
             }
         };
+        let asked = outputs.write(&Shown {
+            result: &result,
+            sources: &quoted,
+            inconclusive: self.output.inconclusive,
+            root: root.as_deref(),
+            folder: bundle.folder(),
+        });
+        if let Err(why) = asked {
+            unwritten = Some(why);
+        }
         terminal.screen.finish();
         let shown = bundle.folder().display().to_string();
         crate::cli::pipeline::tell(&result, &quoted, &shown);
@@ -79,36 +96,76 @@ impl Job {
         if self.output.open && root.is_some() {
             crate::cli::browser::open(&bundle.folder().join("report.html"));
         }
-        let outcome = match unwritten {
-            None => self.outcome(end, &result, &shown),
-            // What was found is not lost with the paper it should stand on.
-            Some(why) => {
-                let problem = Problem::Environment(format!("{why}; the journal is in {shown}, and `report` reads it"));
-                eprintln!("{}", problem.render(console::colors_enabled_stderr()));
-                Ok(Exit::of_partial(result.verdict, matches!(end, End::Interrupted)))
-            }
+        let gate = Gate {
+            end: &end,
+            result: &result,
+            known: if self.certifies {
+                &[]
+            } else {
+                &self.effective.profile.known
+            },
+            written: unwritten.is_none(),
         };
-        let exit = outcome.as_ref().map_or_else(Problem::exit, |exit| *exit);
+        self.tell_known(&gate)?;
+        let exit = gate.exit();
+        // What was found is not lost with the paper it should stand on.
+        let problem = match unwritten {
+            Some(why) => Some(Problem::Environment(format!(
+                "{why}; the journal is in {shown}, and `report` reads it"
+            ))),
+            None => why_not(&end, &result, exit, &shown),
+        };
         terminal.ended(&result, root.as_deref(), exit.code());
-        outcome
+        if let Some(problem) = problem {
+            match self.output.format {
+                args::Format::Json => eprintln!("{}", problem.to_json()),
+                args::Format::Text => eprintln!("{}", problem.render(console::colors_enabled_stderr())),
+            }
+        }
+        Ok(exit)
     }
 
-    /// What the end of a run means for whoever started it.
-    fn outcome(&self, end: End, result: &RunResult, shown: &str) -> Result<Exit, Problem> {
-        match end {
-            End::Completed => match result.tests.iter().find_map(|test| test.not_applicable.as_deref()) {
-                Some(why) if result.verdict.is_none() => Err(Problem::NothingToDo(format!(
-                    "no selected test applies to the device: {why}"
-                ))),
-                _ => self.exit(result),
-            },
-            End::Interrupted => Ok(Exit::of_partial(result.verdict, true)),
-            End::Stranger(why) => Err(Diagnostic::whole("another-device", why)
-                .hint("set manufacturer, serial-number, protocol-version or topic-template in the section [device] of the profile")
-                .into()),
-            End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Ok(broken_off(&why, shown, result)),
-            End::Broken(error) => Ok(broken_off(&error.to_string(), shown, result)),
+    /// Says which failures the profile bears, where a run came to its end.
+    fn tell_known(&self, gate: &Gate<'_>) -> Result<(), Problem> {
+        let Some(measured) = gate
+            .measured()
+            .filter(|_| matches!(gate.end, End::Completed) && gate.written)
+        else {
+            return Ok(());
+        };
+        match self.output.format {
+            args::Format::Text if !self.output.speaks_events() => {
+                crate::cli::print(&format!("\n{}", measured.text()))?;
+            }
+            _ => eprint!("{}", measured.text()),
         }
+        Ok(())
+    }
+}
+
+/// Why a run says nothing, or less than it should.
+fn why_not(end: &End, result: &RunResult, exit: Exit, shown: &str) -> Option<Problem> {
+    let broken_off = |why: &str| Problem::Environment(format!("{why}; the partial report is in {shown}"));
+    match end {
+        End::Completed if exit == Exit::NothingToDo => {
+            let why = result.tests.iter().find_map(|test| test.not_applicable.as_deref())?;
+            Some(Problem::NothingToDo(format!(
+                "no selected test applies to the device: {why}"
+            )))
+        }
+        End::Completed | End::Interrupted => None,
+        End::Stranger(why) => {
+            let hint = "set manufacturer, serial-number, protocol-version or topic-template in the section [device] of the \
+                        profile";
+            Some(Diagnostic::whole("another-device", why.as_str()).hint(hint).into())
+        }
+        End::Changed(why) => Some(
+            Diagnostic::whole("resume", why.as_str())
+                .hint(super::resume::ONE_THING)
+                .into(),
+        ),
+        End::NoDevice(why) | End::Lost(why) | End::Flooded(why) => Some(broken_off(why)),
+        End::Broken(error) => Some(broken_off(&error.to_string())),
     }
 }
 
@@ -134,33 +191,4 @@ impl Job {
         }
         page
     }
-}
-
-impl Job {
-    /// The exit of a run that came to its end. Failures that the profile lists as known do not count; the verdict stays.
-    fn exit(&self, result: &RunResult) -> Result<Exit, Problem> {
-        let known = &self.effective.profile.known;
-        if known.is_empty() || self.certifies {
-            return Ok(Exit::of(result.verdict));
-        }
-        let measured = measure(result, known);
-        match self.output.format {
-            args::Format::Text if !self.output.speaks_events() => crate::cli::print(&format!("\n{}", measured.text()))?,
-            _ => {
-                eprint!("{}", measured.text());
-                Exit::Conforms
-            }
-        };
-        Ok(match result.verdict {
-            Some(Verdict::Fail) => Exit::of(measured.rest),
-            verdict => Exit::of(verdict),
-        })
-    }
-}
-
-/// Says why a run broke off. A failure that was found before stands on its evidence.
-fn broken_off(why: &str, report: &str, result: &RunResult) -> Exit {
-    let problem = Problem::Environment(format!("{why}; the partial report is in {report}"));
-    eprintln!("{}", problem.render(console::colors_enabled_stderr()));
-    Exit::of_partial(result.verdict, false)
 }

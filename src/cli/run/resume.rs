@@ -1,12 +1,13 @@
 //! `run --resume`: goes on with a run that broke off.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::cli::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::Journal;
-use tck_journal::event::{Event, RunHeader};
+use tck_journal::event::{Event, RunHeader, Setting};
 use tck_journal::file::{self, Recording};
 use tck_judge as judge;
 use tck_judge::Library;
@@ -28,12 +29,31 @@ pub(super) struct Earlier {
     pub complete: bool,
     /// How many tests are kept.
     pub kept: usize,
+    /// How often each of its tests was to be run.
+    pub repeat: u32,
+}
+
+/// What to do about a run that is about something else.
+pub(super) const ONE_THING: &str =
+    "give the flags and the profile of that run, for the same device; what is joined has to be about one thing";
+
+/// Where the device connects may change.
+const WHERE: &str = "bench.listen";
+
+/// What a run is about, beside its suites.
+pub(super) struct AboutRun<'a> {
+    pub(super) subject: &'a Participant,
+    pub(super) vantage: &'a str,
+    pub(super) settings: &'a [Setting],
+    pub(super) files: &'a BTreeMap<String, String>,
 }
 
 impl Earlier {
     /// Reads a bundle.
     pub(super) fn read(folder: &Path, all: &[Arc<Test>], library: &Library) -> Result<Self, Problem> {
         let wrong = |title: String| Problem::from(Diagnostic::whole("resume", title));
+        // `latest` leads elsewhere once the next run begins.
+        let folder = &folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let path = file::find(folder);
         let Recording { journal, torn } = file::read(&path).map_err(|error| wrong(error.to_string()))?;
         if torn {
@@ -53,7 +73,7 @@ impl Earlier {
             let title = format!("{}: the run broke off before it had a plan", folder.display());
             return Err(Diagnostic::whole("resume", title).hint("run it anew").into());
         };
-        let complete = plan.complete;
+        let (complete, repeat) = (plan.complete, plan.repeat.unwrap_or(1));
         let judged = judge::judged(&library.rules, journal.entries());
         let judged = judged.map_err(|error| wrong(format!("{}: {error}", folder.display())))?;
         let result = judged.result();
@@ -75,32 +95,70 @@ impl Earlier {
             header,
             tests,
             complete,
+            repeat,
         })
     }
 
     /// Refuses to join what is about something else.
-    pub(super) fn is_about(
-        &self,
-        subject: &Participant,
-        pack: &Pack,
-        library: &Library,
-        vantage: &str,
-    ) -> Result<(), Problem> {
+    pub(super) fn is_about(&self, now: &AboutRun<'_>, pack: &Pack, library: &Library) -> Result<(), Problem> {
         let header = &self.header;
-        let now = [
-            ("manufacturer", &header.manufacturer, &subject.manufacturer),
-            ("serial number", &header.serial_number, &subject.serial_number),
-            ("role", &header.role, &subject.role.word().to_owned()),
+        let facts = [
+            ("manufacturer", &header.manufacturer, &now.subject.manufacturer),
+            ("serial number", &header.serial_number, &now.subject.serial_number),
+            ("role", &header.role, &now.subject.role.word().to_owned()),
             ("protocol version", &header.protocol, &pack.version.to_string()),
-            ("vantage", &header.vantage, &vantage.to_owned()),
+            ("vantage", &header.vantage, &now.vantage.to_owned()),
             ("hash of the suites", &header.suites, &library.rules.sha256),
         ];
-        let differs = now.into_iter().find(|(_, before, now)| before != now);
-        let Some((what, before, now)) = differs else {
-            return Ok(());
-        };
-        let title = format!("the run cannot be resumed: its {what} was `{before}`, and is `{now}` now");
-        let hint = "give the flags and the profile of that run; what is joined has to be about one thing";
-        Err(Diagnostic::whole("resume", title).hint(hint).into())
+        let differs = facts.into_iter().find(|(_, before, now)| before != now);
+        if let Some((what, before, now)) = differs {
+            return Err(refused(format!("its {what} was `{before}`, and is `{now}` now")));
+        }
+        if let Some((name, before, now)) = setting(&header.settings, now.settings) {
+            let shown = |value: Option<&str>| value.map_or("not set".to_owned(), |value| format!("`{value}`"));
+            let what = format!("the setting {name} was {}, and is {} now", shown(before), shown(now));
+            return Err(refused(what));
+        }
+        let names = header.files.keys().chain(now.files.keys());
+        // A journal of an older tool names no files.
+        let mut names = names.filter(|_| !header.files.is_empty());
+        match names.find(|name| header.files.get(*name) != now.files.get(*name)) {
+            Some(name) => Err(refused(format!("the {name} is not the file that it was"))),
+            None => Ok(()),
+        }
     }
+
+    /// What nobody can say of a device that the harness does not start, and of which no version is named.
+    pub(super) fn limit(now: &AboutRun<'_>) -> Option<String> {
+        let says = |name: &str| {
+            now.settings
+                .iter()
+                .any(|setting| setting.name == name && !setting.value.is_empty())
+        };
+        let is_known = says("device.command") || says("certificate.firmware-version");
+        let is_foreign = says("device.serial-number");
+        (is_foreign && !is_known).then(|| {
+            "Whether the device is of the same firmware as before the interruption is not known: the profile names neither \
+             its program (device.command) nor its version (certificate.firmware-version)."
+                .to_owned()
+        })
+    }
+}
+
+fn refused(what: String) -> Problem {
+    let title = format!("the run cannot be resumed: {what}");
+    Diagnostic::whole("resume", title).hint(ONE_THING).into()
+}
+
+/// The first setting that is another one than it was.
+fn setting<'a>(before: &'a [Setting], now: &'a [Setting]) -> Option<(&'a str, Option<&'a str>, Option<&'a str>)> {
+    let value = |all: &'a [Setting], name: &str| {
+        let found = all.iter().find(|setting| setting.name == name);
+        found.map(|setting| setting.value.as_str())
+    };
+    let mut names = before.iter().chain(now).map(|setting| setting.name.as_str());
+    names.find_map(|name| {
+        let (before, now) = (value(before, name), value(now, name));
+        (before != now && name != WHERE).then_some((name, before, now))
+    })
 }

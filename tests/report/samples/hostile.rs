@@ -9,7 +9,7 @@ use vda5050_tck::pack::Role;
 use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use vda5050_tck::result::{
     Answers, Capability, Decision, DeviceIdentity, ExplorationResult, MemberResult, MonitorFinding, MonitorResult,
-    NearestMiss, RequirementResult, RunResult, SaidResult, StepResult, TestResult, Waited,
+    NearestMiss, ProgramEnd, ProgramResult, RequirementResult, RunResult, SaidResult, StepResult, TestResult, Waited,
 };
 use vda5050_tck::verdict::Verdict;
 
@@ -200,6 +200,20 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             source: evil(),
         }],
         exploration: Some(explored()),
+        program: Some(ProgramResult {
+            starts: 2,
+            ends: u64::MAX,
+            excused: 1,
+            shown: vec![ProgramEnd {
+                how: evil(),
+                seq: witness,
+                seconds: f64::MAX,
+                sent: Some(u64::MAX),
+                words: evil(),
+                excuse: None,
+            }],
+        }),
+        mixed: Some(evil()),
         limits: vec![evil()],
         deviations: BTreeMap::from([(evil(), evil())]),
         settings: vec![setting(HOSTILE, HOSTILE, HOSTILE)],

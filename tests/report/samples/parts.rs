@@ -140,6 +140,8 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
         partial: false,
         partial_reason: None,
         verdict,
+        program: None,
+        mixed: None,
         device: DeviceIdentity {
             manufacturer: "Lindner".to_owned(),
             serial_number: "TX-0042".to_owned(),

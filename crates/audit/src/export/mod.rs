@@ -156,13 +156,7 @@ mod tests {
     fn every_topic_is_a_table_and_so_are_the_findings() {
         let library = tck_testing::library();
         let pack = library.rules.packs.latest();
-        let messages = traffic(
-            &library,
-            pack,
-            Role::Agv,
-            "order-acceptance/",
-            &["horizon-not-reported"],
-        );
+        let messages = traffic(library, pack, Role::Agv, "order-acceptance/", &["horizon-not-reported"]);
         let folder = tempfile::tempdir().expect("folder");
         let mut export = Export::begin(folder.path()).expect("begun");
         let mut audit = Audit::new(&library.rules, Options::default()).expect("options");

@@ -2,11 +2,11 @@
 
 use serde_json::Value;
 
-use super::sheet::{Offered, Sheet, Sheets};
 use super::{Command, ELEMENTS, Each, Found, parameter};
-use crate::traffic::{Traffic, elements, quote, show, text};
+use crate::finding::{quote, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Factsheet, Listen, Observation, Offered, Topic};
 
 /// `commands/scopes`.
 pub(crate) const SCOPES: Check = Check {
@@ -15,6 +15,11 @@ pub(crate) const SCOPES: Check = Check {
     doc: "Predefined actions stand only where their table allows it: as instant action, on a node or on an edge. An \
           instant finePositioning is a warning.",
     arguments: &[],
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[],
     start: |_| Each::start(scopes),
 };
 
@@ -27,7 +32,12 @@ pub(crate) const IN_FACTSHEET: Check = Check {
           list is a warning. A factsheet that lists no action at all, and requests the protocol itself answers, are \
           not judged.",
     arguments: &[],
-    start: |_| Box::new(InFactsheet::default()),
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(InFactsheet),
 };
 
 /// `commands/load-device`.
@@ -36,7 +46,12 @@ pub(crate) const LOAD_DEVICE: Check = Check {
     decides: &["ACT-32"],
     doc: "A pick for a vehicle whose factsheet has several loadPositions names one of them as lhd.",
     arguments: &[],
-    start: |_| Box::new(LoadDevice::default()),
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(LoadDevice),
 };
 
 /// Where a predefined action may stand.
@@ -65,24 +80,23 @@ fn scopes(command: Command<'_>, context: &CheckContext<'_>, found: &mut Found<'_
     judged
 }
 
-#[derive(Default)]
-struct InFactsheet {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct InFactsheet;
 
 impl Running for InFactsheet {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let sheets = self.sheets.valid(entry, context);
+        let sheets = context.world.factsheets().valid(record, context);
         if sheets.is_empty() || sheets.iter().any(|sheet| sheet.actions.is_none()) {
             return false;
         }
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for (scope, action) in command.actions() {
             // Without a type there is nothing to look up.
@@ -115,7 +129,7 @@ impl Running for InFactsheet {
 const ALWAYS: [&str; 3] = ["cancelOrder", "stateRequest", "factsheetRequest"];
 
 /// How an action deviates from a factsheet: whether that is certainly wrong, and in words.
-fn deviation(sheet: &Sheet, scope: &str, action: &Value, context: &CheckContext<'_>) -> Option<(bool, String)> {
+fn deviation(sheet: &Factsheet, scope: &str, action: &Value, context: &CheckContext<'_>) -> Option<(bool, String)> {
     let kind = text(action, "actionType");
     let name = quote(kind);
     let Some(offered) = sheet.actions.as_ref()?.get(kind) else {
@@ -157,24 +171,23 @@ fn of_parameters(offered: &Offered, action: &Value, context: &CheckContext<'_>) 
     Some((known.is_none() && !further.is_empty(), message))
 }
 
-#[derive(Default)]
-struct LoadDevice {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct LoadDevice;
 
 impl Running for LoadDevice {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let sheets = self.sheets.valid(entry, context);
+        let sheets = context.world.factsheets().valid(record, context);
         if sheets.is_empty() || sheets.iter().any(|sheet| sheet.load_positions.len() < 2) {
             return false;
         }
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         let picks = command.actions().into_iter().map(|(_, action)| action);
         for pick in picks.filter(|action| text(action, "actionType") == "pick") {
@@ -182,7 +195,7 @@ impl Running for LoadDevice {
             match parameter(pick, "lhd") {
                 None => found.broken("ACT-32", "a pick for a vehicle with several load positions has no lhd"),
                 Some(lhd) => {
-                    let names = |sheet: &Sheet| {
+                    let names = |sheet: &Factsheet| {
                         sheet
                             .load_positions
                             .iter()

@@ -3,9 +3,10 @@
 use serde_json::Value;
 
 use super::{Command, Found};
-use crate::traffic::{Traffic, quote, text};
+use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::text;
+use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
 pub(crate) const NOT_ASKED: Check = Check {
@@ -16,13 +17,14 @@ pub(crate) const NOT_ASKED: Check = Check {
     doc: "No instant action of the `types` is sent, or none but those of `except`. Without an \
           array `actions` they are looked for in `instantActions`, as older versions called it: there they are as wrong.",
     arguments: &["types", "except"],
+    listens: &[Listen::Delivered(Topic::InstantActions)],
+    reads: &[],
     start: |context| {
         let list = |name: &str| -> Option<Vec<String>> {
             let list = context.with.get(name)?.as_array()?;
             Some(list.iter().filter_map(Value::as_str).map(str::to_owned).collect())
         };
         Box::new(NotAsked {
-            traffic: Traffic::default(),
             types: list("types"),
             except: list("except"),
         })
@@ -30,7 +32,6 @@ pub(crate) const NOT_ASKED: Check = Check {
 };
 
 struct NotAsked {
-    traffic: Traffic,
     /// What must not come; everything but the exceptions, if there are only those.
     types: Option<Vec<String>>,
     /// What may come all the same.
@@ -49,20 +50,19 @@ impl NotAsked {
 }
 
 impl Running for NotAsked {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let command = Command::read(self.traffic, entry, context);
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let command = Command::read(record);
         let Some(command) = command.filter(|command| command.order().is_none()) else {
             return false;
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         for (_, action) in command.actions() {
             let kind = text(action, "actionType");
             if self.forbids(kind) {
                 found.push(CheckFinding {
                     requirement: None,
                     verdict: None,
-                    seq: entry.seq(),
+                    seq: record.seq(),
                     message: format!("the instant action {} comes", quote(kind)),
                 });
             }

@@ -1,12 +1,12 @@
 //! Nothing is sent to a vehicle that is known to be gone.
 
-use super::sheet::grace;
-use super::{Command, Found, said};
-use crate::traffic::{Traffic, says_broken, text};
+use super::{Command, Found};
+use crate::finding::says_broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
+use tck_world::members::text;
+use tck_world::{Listen, Observation, Topic};
 
 /// `commands/while-away`.
 pub(crate) const AWAY: Check = Check {
@@ -16,21 +16,33 @@ pub(crate) const AWAY: Check = Check {
           request for a message is sent to it. What comes within the time a message may take is not judged. A warning: \
           nothing forbids it.",
     arguments: &[],
+    listens: &[
+        Listen::Fault,
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Sent(Topic::Connection),
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[],
     start: |_| Box::new(Away::default()),
 };
 
 #[derive(Default)]
 struct Away {
-    traffic: Traffic,
     /// Since when the master control may know that the vehicle is gone, and the word.
     since: Option<(Moment, String)>,
 }
 
 impl Running for Away {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let now = entry.at().moment;
-        match entry.event() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let now = record.at().moment;
+        match record.event() {
             // A master control that was away itself has to hear it first.
             Event::Fault { .. }
             | Event::Packet {
@@ -40,17 +52,17 @@ impl Running for Away {
             Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => self.delay(now),
             _ => {}
         }
-        if let Some(message) = said("connection", entry, context) {
+        if let Some(message) = record.said(Topic::Connection) {
             let state = text(message, "connectionState");
             let gone = says_broken(message) || Some(state) == context.pack.word("connection.offline");
             self.since = gone.then(|| (now, state.chars().take(64).collect()));
             return gone;
         }
         let Some((since, word)) = &self.since else { return false };
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        if self.traffic.disturbed || now.since(*since) < grace(context) {
+        if record.link.disturbed || now.since(*since) < context.time.notice {
             return false;
         }
         let asks = |kind: &str| matches!(kind, "stateRequest" | "factsheetRequest");
@@ -63,7 +75,7 @@ impl Running for Away {
             Command::Instant(_) if kinds.all(asks) => return true,
             Command::Instant(_) => "an instant action",
         };
-        Found::new(entry, findings).remark("CONN-12", format!("{what} is sent to a vehicle that is {word}"));
+        Found::new(record, findings).remark("CONN-12", format!("{what} is sent to a vehicle that is {word}"));
         true
     }
 }

@@ -1,10 +1,10 @@
 //! Coordinates of orders against those of a vehicle that stands where it was put.
 
-use super::vehicle::Vehicle;
 use super::{Command, Found, in_sequence, place_of};
-use crate::traffic::{Traffic, quote, text};
+use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::text;
+use tck_world::{Fact, Listen, Observation, Outside, Topic};
 
 /// `commands/axes`.
 pub(crate) const AXES: Check = Check {
@@ -13,6 +13,14 @@ pub(crate) const AXES: Check = Check {
     doc: "The node a vehicle stands on has the position in orders that the vehicle reports, and not a mirror image of it \
           or a thousandfold one. A position that is like neither is not judged.",
     arguments: &[],
+    listens: &[
+        Listen::Vehicle,
+        Listen::Fault,
+        Listen::Hook,
+        Listen::Sent(Topic::State),
+        Listen::Delivered(Topic::Order),
+    ],
+    reads: &[Fact::Mock],
     start: |_| Box::new(Axes::default()),
 };
 
@@ -21,25 +29,27 @@ const NEAR: f64 = 0.5;
 
 #[derive(Default)]
 struct Axes {
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// Whether the vehicle has followed an order since it was put somewhere: then its position is that of the order.
     driven: bool,
 }
 
 impl Running for Axes {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if self.vehicle.note(entry, context) != super::vehicle::Outside::No {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.mock().now(record) != Outside::No {
             self.driven = false;
         }
-        self.driven |= self.vehicle.last().is_some_and(|seen| seen.driving);
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
-        let (Some(order), Some(seen)) = (order, self.vehicle.last()) else {
+        self.driven |= context.world.mock().last().is_some_and(|seen| seen.driving);
+        let order = Command::read(record).and_then(Command::order);
+        let (Some(order), Some(seen)) = (order, context.world.mock().last()) else {
             return false;
         };
         let Some((x, y, on)) = &seen.pose else { return false };
-        if self.driven || self.vehicle.unsettled(entry, context) {
+        if self.driven || context.world.mock().unsettled(record, context) {
             return false;
         }
         let nodes = in_sequence(order, "nodes");
@@ -56,7 +66,7 @@ impl Running for Axes {
             return x.abs() > NEAR && y.abs() > NEAR;
         }
         let shown = quote(&seen.last_node);
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let images = [
             ((*x, -y), "y mirrored"),
             ((-x, *y), "x mirrored"),

@@ -6,13 +6,12 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::graph::is_counted;
-use super::vehicle::{Outside, Seen, Vehicle};
 use super::{Command, ELEMENTS, Found, released, short};
-use crate::orders::number;
-use crate::traffic::{Traffic, elements, quote, text};
+use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, number, text};
+use tck_world::{Fact, Listen, Observation, Outside, ShownState};
 
 /// See the module.
 pub(crate) const BASE_KEPT: Check = Check {
@@ -24,6 +23,8 @@ pub(crate) const BASE_KEPT: Check = Check {
           running action, is a warning, and so is an update after cancelOrder, unless that has FAILED. A vehicle that may have given its order up by itself is not judged; where an \
           action has failed, what is left tells.",
     arguments: &[],
+    listens: &[Listen::Everything],
+    reads: &[Fact::Mock],
     start: |_| Box::new(BaseKept::default()),
 };
 
@@ -34,8 +35,6 @@ const CROSSING: Duration = Duration::from_millis(100);
 
 #[derive(Default)]
 struct BaseKept {
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// The order sent last, its released elements by sequenceId, and whether the vehicle took it over.
     order: String,
     base: std::collections::BTreeMap<u64, String>,
@@ -54,8 +53,10 @@ struct BaseKept {
 
 impl BaseKept {
     /// Whether the vehicle has an order in hand that has not been called off.
-    fn is_busy(&self) -> bool {
-        let Some(seen) = self.vehicle.last() else { return false };
+    fn is_busy(&self, context: &CheckContext<'_>) -> bool {
+        let Some(seen) = context.world.mock().last() else {
+            return false;
+        };
         if self.free || !self.taken || seen.order != self.order {
             return false;
         }
@@ -67,22 +68,22 @@ impl BaseKept {
     }
 
     /// Whether an action of the order is listed and has not ended.
-    fn is_at_work(&self, seen: &Seen) -> bool {
+    fn is_at_work(&self, seen: &ShownState) -> bool {
         let mut open = seen.actions.iter().filter(|(_, status)| !is_over(status));
         open.any(|(id, _)| self.actions.contains(id))
     }
 
     /// An update of an order that was called off.
-    fn continued(&self, update: u64, now: Moment, found: &mut Found<'_>) -> bool {
+    fn continued(&self, update: u64, now: Moment, context: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
         let Some((id, since)) = &self.cancel else { return false };
-        let seen = self.vehicle.last();
-        let failed = self
-            .vehicle
-            .states
-            .iter()
+        let seen = context.world.mock().last();
+        let failed = context
+            .world
+            .mock()
+            .states()
             .any(|seen| status(seen, id) == Some("FAILED"));
         // Where the vehicle never heard of cancelOrder, this is not the mistake to speak of.
-        let heard = self.vehicle.states.iter().any(|seen| status(seen, id).is_some());
+        let heard = context.world.mock().states().any(|seen| status(seen, id).is_some());
         let taken = heard && self.taken && !self.free && seen.is_some_and(|seen| seen.order == self.order);
         if failed || !taken || self.newest.is_none_or(|newest| update <= newest) || now.since(*since) < CROSSING {
             return false;
@@ -110,25 +111,29 @@ impl BaseKept {
 }
 
 impl Running for BaseKept {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        match self.vehicle.note(entry, context) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        match context.world.mock().now(record) {
             Outside::No => {}
             Outside::Deviates => self.free = true,
             Outside::Moved | Outside::Lost => self.forget(),
         }
-        if let Some(seen) = self.vehicle.last() {
+        if let Some(seen) = context.world.mock().last() {
             self.taken |= seen.order == self.order;
             self.free |= self.taken && seen.taken_out && self.cancel.is_none();
         }
-        let command = Command::read(self.traffic, entry, context);
-        let Some(command) = command.filter(|_| !self.traffic.disturbed) else {
+        let command = Command::read(record);
+        let Some(command) = command.filter(|_| !record.link.disturbed) else {
             return false;
         };
         let Command::Order(order) = command else {
             for (_, action) in command.actions() {
                 if text(action, "actionType") == "cancelOrder" {
-                    self.cancel = short(action, "actionId").map(|id| (id, entry.at().moment));
+                    self.cancel = short(action, "actionId").map(|id| (id, record.at().moment));
                 }
             }
             return false;
@@ -136,17 +141,17 @@ impl Running for BaseKept {
         let Some(id) = short(order, "orderId") else {
             return false;
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         if id != self.order {
             // An older order that comes again was not meant to replace anything.
             if self.before.contains(&id) {
                 return false;
             }
-            if self.is_busy() {
+            if self.is_busy(context) {
                 let (new, old) = (quote(&id), quote(&self.order));
                 let comes = format!("order {new} comes while order {old} is driven");
-                let on_its_way = self.vehicle.last().is_some_and(|seen| seen.base > 0);
+                let on_its_way = context.world.mock().last().is_some_and(|seen| seen.base > 0);
                 match (self.cancel.is_some(), on_its_way) {
                     (true, _) => found.remark("ORD-CANCEL-01", format!("{comes}: cancelOrder is not done")),
                     (_, true) => found.broken("ORD-CANCEL-01", format!("{comes}: it was not called off")),
@@ -157,10 +162,10 @@ impl Running for BaseKept {
             judged |= self.cancel.is_some();
             self.forget();
             self.order = id;
-        } else if self.cancel.is_none() && self.is_busy() {
+        } else if self.cancel.is_none() && self.is_busy(context) {
             judged = self.replaced(order, &mut found);
         } else if let Some(update) = number(order, "orderUpdateId") {
-            judged = self.continued(update, entry.at().moment, &mut found);
+            judged = self.continued(update, record.at().moment, context, &mut found);
         }
         self.newest = self.newest.max(number(order, "orderUpdateId"));
         for (_, action) in command.actions() {
@@ -216,7 +221,7 @@ fn is_over(status: &str) -> bool {
 }
 
 /// How far an action is.
-fn status<'s>(seen: &'s Seen, id: &str) -> Option<&'s str> {
+fn status<'s>(seen: &'s ShownState, id: &str) -> Option<&'s str> {
     let mut all = seen.actions.iter();
     all.find(|(action, _)| action == id).map(|(_, status)| status.as_str())
 }

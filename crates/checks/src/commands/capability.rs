@@ -2,11 +2,11 @@
 
 use serde_json::Value;
 
-use super::sheet::{Sheet, Sheets};
 use super::{Command, ELEMENTS, Found};
-use crate::traffic::{Traffic, elements, quote};
+use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::elements;
+use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/optional-fields`.
 pub(crate) const OPTIONAL: Check = Check {
@@ -16,7 +16,9 @@ pub(crate) const OPTIONAL: Check = Check {
           counts as listed. nodePosition and actionParameters are left to other requirements. Descriptions that are not \
           listed are a warning.",
     arguments: &[],
-    start: |_| Box::new(Optional::default()),
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(Optional),
 };
 
 /// `commands/required-fields`.
@@ -26,7 +28,9 @@ pub(crate) const REQUIRED: Check = Check {
     doc: "Orders hold every optional field that the factsheet marks as REQUIRED, wherever there is something it could be \
           a field of.",
     arguments: &[],
-    start: |_| Box::new(Required::default()),
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(Required),
 };
 
 /// Optional fields by the list they belong to.
@@ -80,7 +84,7 @@ fn present(order: &Value) -> Vec<String> {
 }
 
 /// Whether a factsheet lists a field: under its full name, under the end of it, or with what it belongs to.
-fn lists(sheet: &Sheet, field: &str) -> bool {
+fn lists(sheet: &Factsheet, field: &str) -> bool {
     let last = field.rsplit('.').next().unwrap_or_default();
     let position = field.contains(".nodePosition.");
     sheet.supported.iter().flatten().any(|listed| {
@@ -89,23 +93,22 @@ fn lists(sheet: &Sheet, field: &str) -> bool {
     })
 }
 
-#[derive(Default)]
-struct Optional {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct Optional;
 
 impl Running for Optional {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
-        let sheets = self.sheets.valid(entry, context);
+        let sheets = context.world.factsheets().valid(record, context);
         if sheets.is_empty() || sheets.iter().any(|sheet| sheet.supported.is_none()) {
             return false;
         }
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         for field in present(order) {
             if sheets.iter().any(|sheet| lists(sheet, &field)) {
                 continue;
@@ -121,23 +124,22 @@ impl Running for Optional {
     }
 }
 
-#[derive(Default)]
-struct Required {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct Required;
 
 impl Running for Required {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
-        let sheets = self.sheets.valid(entry, context);
+        let sheets = context.world.factsheets().valid(record, context);
         let Some((first, others)) = sheets.split_first() else {
             return false;
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for name in first.required.iter().take(ELEMENTS) {
             if !others.iter().all(|sheet| sheet.required.contains(name)) {

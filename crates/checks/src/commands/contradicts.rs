@@ -1,12 +1,11 @@
 //! Instant actions that contradict the order the vehicle is driving.
 
-use super::sheet::grace;
-use super::vehicle::{Outside, Vehicle};
 use super::{Command, Found};
-use crate::traffic::{Traffic, quote, text};
+use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::text;
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/contradicts`.
 pub(crate) const CONTRADICTS: Check = Check {
@@ -16,28 +15,38 @@ pub(crate) const CONTRADICTS: Check = Check {
           as an instant action to a vehicle that knows where it is; otherwise it is a warning. What comes within the time a \
           message may take is not judged.",
     arguments: &[],
+    listens: &[
+        Listen::Vehicle,
+        Listen::Fault,
+        Listen::Hook,
+        Listen::Sent(Topic::State),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Mock],
     start: |_| Box::new(Contradicts::default()),
 };
 
 #[derive(Default)]
 struct Contradicts {
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// Since when the vehicle shows an order to be driven.
     since: Option<Moment>,
 }
 
 impl Running for Contradicts {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.mock().is_lost(record) {
             self.since = None;
         }
-        if super::said("state", entry, context).is_some() {
-            let busy = self.vehicle.last().filter(|seen| seen.base > 0);
+        if record.said(Topic::State).is_some() {
+            let busy = context.world.mock().last().filter(|seen| seen.base > 0);
             self.since = busy.map(|seen| self.since.unwrap_or(seen.at));
         }
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+        let Some(command) = Command::read(record) else {
             return false;
         };
         let actions = command.actions().into_iter().filter(|(scope, _)| *scope == "INSTANT");
@@ -45,14 +54,14 @@ impl Running for Contradicts {
         if kinds.contains(&"cancelOrder") {
             self.since = None;
         }
-        let Some(since) = self.since.filter(|_| !self.traffic.disturbed) else {
+        let Some(since) = self.since.filter(|_| !record.link.disturbed) else {
             return false;
         };
-        if kinds.is_empty() || entry.at().moment.since(since) < grace(context) {
+        if kinds.is_empty() || record.at().moment.since(since) < context.time.notice {
             return false;
         }
-        let placed = self.vehicle.last().is_some_and(|seen| seen.pose.is_some());
-        let mut found = Found::new(entry, findings);
+        let placed = context.world.mock().last().is_some_and(|seen| seen.pose.is_some());
+        let mut found = Found::new(record, findings);
         for kind in kinds {
             if kind == "initPosition" && placed {
                 let text = format!(

@@ -2,12 +2,12 @@
 
 use serde_json::Value;
 
-use super::sheet::Sheets;
-use super::{Command, Found, in_sequence, place_of, said};
-use crate::traffic::{Traffic, elements, quote, show, text};
+use super::{Command, Found, in_sequence, place_of};
+use crate::finding::{quote, show};
 use tck_base::nurbs::{Curve, Path};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/corridors`.
 pub(crate) const CORRIDORS: Check = Check {
@@ -19,6 +19,8 @@ pub(crate) const CORRIDORS: Check = Check {
           deviation than the second corridor, or than both sides of it together, is a warning, and so is one at the first node; so are two corridors \
           of which one lies to the left only and the other to the right only.",
     arguments: &[],
+    listens: &[Listen::Sent(Topic::State), Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Factsheets],
     start: |_| Box::new(Corridors::default()),
 };
 
@@ -27,8 +29,6 @@ const ROUNDING: f64 = 0.05;
 
 #[derive(Default)]
 struct Corridors {
-    traffic: Traffic,
-    sheets: Sheets,
     /// Whether the vehicle ever reported a trajectory of its own.
     plans: bool,
 }
@@ -57,20 +57,23 @@ fn path(edge: &Value, from: &Value, to: &Value) -> Option<Path> {
 }
 
 impl Running for Corridors {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        if let Some(state) = said("state", entry, context) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if let Some(state) = record.said(Topic::State) {
             self.plans |= elements(state, "edgeStates").any(|edge| edge.get("trajectory").is_some());
         }
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+        let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
         let edges = in_sequence(order, "edges");
         if !edges.iter().any(|edge| corridor(edge).is_some()) {
             return false;
         }
-        let mut found = Found::new(entry, findings);
-        let sheets = self.sheets.valid(entry, context);
+        let mut found = Found::new(record, findings);
+        let sheets = context.world.factsheets().valid(record, context);
         let bound = self.plans || sheets.is_empty() || sheets.iter().any(|sheet| sheet.line_guided);
         for edge in &edges {
             let Some(corridor) = corridor(edge) else { continue };

@@ -6,11 +6,11 @@ use std::sync::LazyLock;
 use regex::Regex;
 use serde_json::Value;
 
-use super::sheet::{Sheet, Sheets};
 use super::{Command, ELEMENTS, Each, Found, in_sequence};
-use crate::traffic::{Traffic, elements, quote, show, text};
+use crate::finding::{quote, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/arrays`.
 pub(crate) const ARRAYS: Check = Check {
@@ -18,6 +18,8 @@ pub(crate) const ARRAYS: Check = Check {
     decides: &["ORD-MSG-06"],
     doc: "edges, and the actions of every node and edge, are sent as empty arrays where there are none.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Each::start(arrays),
 };
 
@@ -28,6 +30,8 @@ pub(crate) const POSITION_RANGE: Check = Check {
     doc: "theta of a node lies between minus pi and pi, allowedDeviationXY is not below 0, allowedDeviationTheta lies \
           between 0 and pi. Coordinates that are far too big for metres are a warning.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Each::start(position_range),
 };
 
@@ -38,7 +42,9 @@ pub(crate) const ZONE_SET: Check = Check {
     doc: "zoneSetId is left out or names a zone set; it is neither null nor empty. A word for nothing, such as none, is \
           a warning, and fails where the factsheet of the vehicle does not support the field.",
     arguments: &[],
-    start: |_| Box::new(ZoneSet::default()),
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(ZoneSet),
 };
 
 /// `commands/identifiers`.
@@ -47,6 +53,11 @@ pub(crate) const IDENTIFIERS: Check = Check {
     decides: &["JSON-04"],
     doc: "The identifiers in orders and instant actions keep to the recommended characters.",
     arguments: &[],
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[],
     start: |_| Each::start(identifiers),
 };
 
@@ -57,6 +68,11 @@ pub(crate) const TOPICS: Check = Check {
     doc: "What comes on the order topic is an order, what comes on the instantActions topic is a list of actions, and \
           not the other way round.",
     arguments: &[],
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[],
     start: |_| Each::start(topics),
 };
 
@@ -67,7 +83,9 @@ pub(crate) const POSITION: Check = Check {
     doc: "Every node has a nodePosition, unless the vehicle is bound to lines. A missing one is a warning where the \
           factsheet does not require it; a factsheet that lists optional parameters, and not this one, has no use for it.",
     arguments: &[],
-    start: |_| Box::new(Position::default()),
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(Position),
 };
 
 /// What rounding may add to pi.
@@ -140,25 +158,24 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
 /// Words that say that there is nothing, where nothing should be said.
 const NOTHING: [&str; 7] = ["none", "null", "nil", "undefined", "n/a", "na", "-"];
 
-#[derive(Default)]
-struct ZoneSet {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct ZoneSet;
 
 impl Running for ZoneSet {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         match order.get("zoneSetId") {
             Some(Value::Null) => found.broken("ORD-MSG-03", "zoneSetId is null"),
             Some(Value::String(text)) if text.is_empty() => found.broken("ORD-MSG-03", "zoneSetId is empty"),
             Some(Value::String(text)) if NOTHING.contains(&text.to_ascii_lowercase().trim()) => {
-                let sheets = self.sheets.valid(entry, context);
-                let unlisted = |sheet: &Sheet| {
+                let sheets = context.world.factsheets().valid(record, context);
+                let unlisted = |sheet: &Factsheet| {
                     let listed = sheet.supported.as_ref();
                     listed.is_some_and(|listed| !listed.iter().any(|one| one.ends_with("zoneSetId")))
                 };
@@ -238,21 +255,20 @@ fn names_position(parameter: &str) -> bool {
     parameter.split('.').any(|level| level == "nodePosition")
 }
 
-#[derive(Default)]
-struct Position {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct Position;
 
 impl Running for Position {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
-        let sheets = self.sheets.valid(entry, context);
+        let sheets = context.world.factsheets().valid(record, context);
         // A vehicle nobody has described may be of any kind.
-        let unlisted = |sheet: &Sheet| {
+        let unlisted = |sheet: &Factsheet| {
             sheet
                 .supported
                 .as_ref()
@@ -261,7 +277,7 @@ impl Running for Position {
         if sheets.is_empty() || sheets.iter().any(|sheet| sheet.line_guided || unlisted(sheet)) {
             return false;
         }
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for node in in_sequence(order, "nodes") {
             judged = true;

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use super::{Command, Each, Found, in_sequence, released, short};
-use crate::orders::number;
-use crate::traffic::{Traffic, elements, quote, text};
+use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, number, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// `commands/nodes-and-edges`.
 pub(crate) const NODES_AND_EDGES: Check = Check {
@@ -16,6 +16,8 @@ pub(crate) const NODES_AND_EDGES: Check = Check {
     decides: &["ORD-02"],
     doc: "Every order has at least one node and exactly one edge fewer than nodes.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Each::start(nodes_and_edges),
 };
 
@@ -26,6 +28,8 @@ pub(crate) const RELEASED: Check = Check {
     doc: "No released edge touches a node that is not released, and behind the first element that is not released \
           none is. An order that releases nothing at all is a warning.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Each::start(base_and_horizon),
 };
 
@@ -36,6 +40,8 @@ pub(crate) const EDGE_ENDS: Check = Check {
     doc: "startNodeId and endNodeId of every edge name the nodes directly before and behind it. Judged where there is \
           one edge fewer than nodes.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Each::start(edge_ends),
 };
 
@@ -46,6 +52,8 @@ pub(crate) const SEQUENCE: Check = Check {
     doc: "The sequenceIds of nodes and edges together alternate and count up by one, and a new orderId begins with 0. \
           Where an update begins is left to commands/updates.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Box::new(Sequence::default()),
 };
 
@@ -159,15 +167,13 @@ fn edge_ends(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) 
 
 #[derive(Default)]
 struct Sequence {
-    traffic: Traffic,
     /// Orders that were begun before.
     known: BTreeSet<String>,
 }
 
 impl Running for Sequence {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
         let is_known = short(order, "orderId").is_none_or(|id| {
             if self.known.len() == ORDERS {
@@ -184,7 +190,7 @@ impl Running for Sequence {
                 let Some(sequence) = number(element, "sequenceId") else {
                     if written.is_number() {
                         let text = format!("sequenceId {written} is no whole number");
-                        Found::new(entry, findings).broken("ORD-UPD-11", text);
+                        Found::new(record, findings).broken("ORD-UPD-11", text);
                     }
                     return written.is_number();
                 };
@@ -195,7 +201,7 @@ impl Running for Sequence {
         let Some((first, begins_with_edge)) = all.first().copied() else {
             return false;
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let begins = !is_known && number(order, "orderUpdateId").is_none_or(|update| update == 0);
         if begins && first != 0 {
             found.broken(

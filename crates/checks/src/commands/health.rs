@@ -8,13 +8,13 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::sheet::grace;
-use super::{Command, ELEMENTS, released, said, short};
-use crate::traffic::{Traffic, elements, quote, text};
+use super::{Command, ELEMENTS, released, short};
+use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::Event;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
 pub(crate) const HEALTH: Check = Check {
@@ -23,6 +23,13 @@ pub(crate) const HEALTH: Check = Check {
     doc: "An order that was kept back because the states of the vehicle show a FATAL error, or another order, does not \
           come because the vehicle is ONLINE again, with the same states as before.",
     arguments: &[],
+    listens: &[
+        Listen::Hook,
+        Listen::Sent(Topic::State),
+        Listen::Sent(Topic::Connection),
+        Listen::Delivered(Topic::Order),
+    ],
+    reads: &[],
     start: |_| Box::new(Health::default()),
 };
 
@@ -31,7 +38,6 @@ const KEPT: usize = 1024;
 
 #[derive(Default)]
 struct Health {
-    traffic: Traffic,
     orders: BTreeSet<String>,
     /// Why no order can be begun, by the states: the error, or the order the vehicle has.
     reason: Option<String>,
@@ -53,29 +59,33 @@ fn reason(state: &Value) -> Option<String> {
 }
 
 impl Running for Health {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let now = entry.at().moment;
-        if let Event::Hook { hook, ok: true, .. } = entry.event()
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let now = record.at().moment;
+        if let Event::Hook { hook, ok: true, .. } = record.event()
             && hook == "dispatch"
             && self.reason.is_some()
         {
             self.waits.get_or_insert(now);
         }
-        if let Some(state) = said("state", entry, context) {
+        if let Some(state) = record.said(Topic::State) {
             let reason = reason(state);
             if reason != self.reason {
                 (self.waits, self.online) = (None, false);
                 self.reason = reason;
             }
         }
-        if let Some(connection) = said("connection", entry, context)
+        if let Some(connection) = record.said(Topic::Connection)
             && Some(text(connection, "connectionState")) == context.pack.word("connection.online")
-            && self.waits.is_some_and(|since| now.since(since) >= grace(context))
+            && self.waits.is_some_and(|since| now.since(since) >= context.time.notice)
         {
             self.online = true;
         }
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+        let order = Command::read(record).and_then(Command::order);
         let Some(id) = order.and_then(|order| short(order, "orderId")) else {
             return false;
         };
@@ -92,7 +102,7 @@ impl Running for Health {
                 "order {} was kept back for {reason}, and comes because the vehicle is ONLINE again",
                 quote(&id)
             );
-            super::Found::new(entry, findings).broken("CONN-14", text);
+            super::Found::new(record, findings).broken("CONN-14", text);
         }
         true
     }

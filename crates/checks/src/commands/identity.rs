@@ -5,13 +5,12 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::graph::is_counted;
-use super::vehicle::Vehicle;
-use super::{Command, ELEMENTS, Found, fingerprint, in_sequence, place_of, short};
-use crate::orders::number;
-use crate::traffic::{Traffic, elements, quote, text, unclear};
+use super::{Command, ELEMENTS, Found, in_sequence, place_of, short};
+use crate::finding::{quote, unclear};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::Event;
+use tck_world::members::{elements, number, text};
+use tck_world::{Fact, Listen, Observation, Topic, print};
 
 /// `commands/node-ids`.
 pub(crate) const NODE_IDS: Check = Check {
@@ -20,6 +19,8 @@ pub(crate) const NODE_IDS: Check = Check {
     doc: "A nodeId always comes with the same map and position. A position that has moved by less than half a metre may \
           have been corrected by somebody, which is inconclusive, unless it has moved to where the vehicle stands.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Mock],
     start: |_| Box::new(NodeIds::default()),
 };
 
@@ -31,6 +32,13 @@ pub(crate) const ACTION_IDS: Check = Check {
           action stands in the same place: in a stitching node, or in a message that is sent again. Ids are forgotten \
           when the master control is started anew.",
     arguments: &[],
+    listens: &[
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[],
     start: |_| Box::new(ActionIds::default()),
 };
 
@@ -43,24 +51,26 @@ const CORRECTED: f64 = 0.5;
 
 #[derive(Default)]
 struct NodeIds {
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// Place of each node.
     known: BTreeMap<String, (f64, f64, String)>,
 }
 
 impl Running for NodeIds {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.vehicle.note(entry, context);
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let order = Command::read(record).and_then(Command::order);
         let Some(order) = order else { return false };
-        let stands: Vec<(f64, f64)> = self
-            .vehicle
-            .recent(entry, context)
+        let stands: Vec<(f64, f64)> = context
+            .world
+            .mock()
+            .recent(record, context)
             .filter_map(|seen| seen.pose.as_ref().map(|(x, y, _)| (*x, *y)))
             .collect();
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for node in in_sequence(order, "nodes") {
             let (Some(id), Some((x, y, map))) = (short(node, "nodeId"), place_of(node)) else {
@@ -86,7 +96,7 @@ impl Running for NodeIds {
                 found.broken("ORD-MSG-07", text);
             } else if apart > SAME {
                 let text = format!("node {shown} is {apart:.3} m from where it was, as after a correction");
-                found.push(unclear("ORD-MSG-07", entry.seq(), text));
+                found.push(unclear("ORD-MSG-07", record.seq(), text));
             }
             // One change is worth one finding.
             (*was_x, *was_y) = (x, y);
@@ -98,9 +108,8 @@ impl Running for NodeIds {
 
 #[derive(Default)]
 struct ActionIds {
-    traffic: Traffic,
     /// Where each action stands, and what it is.
-    known: BTreeMap<String, (String, u64)>,
+    known: BTreeMap<String, (String, Option<u64>)>,
 }
 
 /// Every action of a message with a name for the place where it stands.
@@ -127,17 +136,16 @@ fn placed(command: Command<'_>) -> Vec<(String, &Value)> {
 }
 
 impl Running for ActionIds {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        match entry.event() {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        match record.event() {
             Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown") => self.known.clear(),
             Event::Answer { .. } => self.known.clear(),
             _ => {}
         }
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         let counted = command.order().is_none_or(is_counted);
         let mut here: BTreeMap<&str, ()> = BTreeMap::new();
@@ -147,7 +155,8 @@ impl Running for ActionIds {
             };
             judged = true;
             let twice = here.insert(text(action, "actionId"), ()).is_some();
-            let print = fingerprint(action);
+            // A stitching node that was changed is the business of another requirement.
+            let print = matches!(command, Command::Instant(_)).then(|| print::of(action));
             if twice {
                 found.broken(
                     "ORD-MSG-17",
@@ -162,8 +171,7 @@ impl Running for ActionIds {
                 if *known_place != place {
                     let text = format!("actionId {} stands in {place} and stood in {known_place}", quote(&id));
                     found.broken("ORD-MSG-17", text);
-                } else if *known_print != print && matches!(command, Command::Instant(_)) {
-                    // A stitching node that was changed is the business of another requirement.
+                } else if *known_print != print {
                     let text = format!("actionId {} stands for another instant action than before", quote(&id));
                     found.broken("ORD-MSG-17", text);
                 }

@@ -6,11 +6,12 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::{Command, ELEMENTS, Found, said};
-use crate::traffic::{Traffic, elements, quote, text};
+use super::{Command, ELEMENTS, Found};
+use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
 pub(crate) const ON_INFORMATION: Check = Check {
@@ -19,6 +20,8 @@ pub(crate) const ON_INFORMATION: Check = Check {
     doc: "No instant action of one type comes within a second each time the vehicle begins to give information entries, \
           three times at least, and never otherwise.",
     arguments: &[],
+    listens: &[Listen::Sent(Topic::State), Listen::Delivered(Topic::InstantActions)],
+    reads: &[],
     start: |_| Box::new(OnInformation::default()),
 };
 
@@ -31,7 +34,6 @@ const KINDS: usize = 64;
 
 #[derive(Default)]
 struct OnInformation {
-    traffic: Traffic,
     informs: bool,
     /// When it began last to give information, and how often it has.
     since: Option<Moment>,
@@ -41,10 +43,9 @@ struct OnInformation {
 }
 
 impl Running for OnInformation {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let now = entry.at().moment;
-        if let Some(state) = said("state", entry, context) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let now = record.at().moment;
+        if let Some(state) = record.said(Topic::State) {
             let informs = elements(state, "information").next().is_some();
             if informs && !self.informs {
                 self.since = Some(now);
@@ -52,12 +53,12 @@ impl Running for OnInformation {
             }
             self.informs = informs;
         }
-        let command = Command::read(self.traffic, entry, context);
+        let command = Command::read(record);
         let Some(command) = command.filter(|command| command.order().is_none()) else {
             return false;
         };
         let at_once = self.since.is_some_and(|since| now.since(since) <= AT_ONCE);
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         for (_, action) in command.actions().into_iter().take(ELEMENTS) {
             let kind: String = text(action, "actionType").chars().take(256).collect();
             if self.came.len() == KINDS && !self.came.contains_key(&kind) {

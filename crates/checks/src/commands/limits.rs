@@ -3,13 +3,13 @@
 use serde_json::Value;
 
 use super::fields::ids;
-use super::sheet::{Sheet, Sheets};
 use super::{Command, ELEMENTS, Found, parameter};
-use crate::traffic::{Traffic, elements, quote, text};
+use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Event, LinkFault};
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/limits`.
 pub(crate) const SIZES: Check = Check {
@@ -18,7 +18,12 @@ pub(crate) const SIZES: Check = Check {
     doc: "Orders and instant actions keep the lengths of arrays, ids, enumerations and whole messages that the factsheet \
           of the vehicle states, and its wish for ids of digits only. 0 and a missing limit are none.",
     arguments: &[],
-    start: |_| Box::new(Sizes::default()),
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(Sizes),
 };
 
 /// `commands/order-interval`.
@@ -29,32 +34,33 @@ pub(crate) const ORDER_INTERVAL: Check = Check {
           50 ms. Judged only while the link is not disturbed; the first order behind a link that was cut counts from the \
           last one before.",
     arguments: &[],
+    listens: &[Listen::Fault, Listen::Hook, Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Factsheets],
     start: |_| Box::new(Interval::default()),
 };
 
-#[derive(Default)]
-struct Sizes {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct Sizes;
 
 impl Running for Sizes {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let sheets = self.sheets.valid(entry, context);
-        let limited = |sheet: &Sheet| !sheet.strings.is_empty() || !sheet.arrays.is_empty() || sheet.numerical;
+        let sheets = context.world.factsheets().valid(record, context);
+        let limited = |sheet: &Factsheet| !sheet.strings.is_empty() || !sheet.arrays.is_empty() || sheet.numerical;
         if sheets.is_empty() || !sheets.iter().all(|sheet| limited(sheet)) {
             return false;
         }
-        let length = entry.payload().map_or(0, tck_journal::Payload::len);
+        let length = record.payload().map_or(0, tck_journal::Payload::len);
         let all: Vec<Vec<String>> = sheets.iter().map(|sheet| excesses(sheet, command, length)).collect();
         // Wrong is what no factsheet that counts allows.
         if all.iter().all(|excesses| !excesses.is_empty()) {
-            let mut found = Found::new(entry, findings);
+            let mut found = Found::new(record, findings);
             for text in all.into_iter().next().unwrap_or_default() {
                 found.broken("FACT-12", text);
             }
@@ -89,7 +95,7 @@ fn arrays(command: Command<'_>) -> Vec<(&'static str, usize)> {
     all
 }
 
-fn excesses(sheet: &Sheet, command: Command<'_>, length: u64) -> Vec<String> {
+fn excesses(sheet: &Factsheet, command: Command<'_>, length: u64) -> Vec<String> {
     let string = |name: &str| sheet.strings.get(name).copied().unwrap_or(u64::MAX);
     let chars = |text: &str| text.chars().count() as u64;
     let mut all = Vec::new();
@@ -127,18 +133,19 @@ fn excesses(sheet: &Sheet, command: Command<'_>, length: u64) -> Vec<String> {
 
 #[derive(Default)]
 struct Interval {
-    traffic: Traffic,
-    sheets: Sheets,
     last: Option<Moment>,
     /// The link was cut since the last order.
     cut: bool,
 }
 
 impl Running for Interval {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        match entry.event() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        match record.event() {
             Event::Fault {
                 fault: LinkFault::Cut { .. },
             } => self.cut = true,
@@ -150,11 +157,11 @@ impl Running for Interval {
             Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown") => self.last = None,
             _ => {}
         }
-        let order = Command::read(self.traffic, entry, context).and_then(Command::order);
-        if order.is_none() || self.traffic.disturbed {
+        let order = Command::read(record).and_then(Command::order);
+        if order.is_none() || record.link.disturbed {
             return false;
         }
-        let now = entry.at().moment;
+        let now = record.at().moment;
         let before = self.last.replace(now);
         if std::mem::take(&mut self.cut) {
             // What was sent while the link was down may come all at once. It is never earlier than it was sent.
@@ -163,7 +170,7 @@ impl Running for Interval {
         let Some(before) = before else {
             return false;
         };
-        let sheets = self.sheets.valid(entry, context);
+        let sheets = context.world.factsheets().valid(record, context);
         let Some(interval) = sheets.iter().map(|sheet| sheet.interval).reduce(f64::min) else {
             return false;
         };
@@ -173,7 +180,7 @@ impl Running for Interval {
         let gap = now.since(before).as_secs_f64();
         if gap < interval * 0.9 - 0.05 {
             let text = format!("two orders come {gap:.2} s apart, minOrderInterval is {interval} s");
-            Found::new(entry, findings).broken("FACT-13", text);
+            Found::new(record, findings).broken("FACT-13", text);
         }
         true
     }

@@ -3,22 +3,23 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use super::said;
-use crate::traffic::{Traffic, broken, quote, remark, text};
+use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
-use tck_check::takes;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Close, Event, Packet};
 use tck_pack::Role;
+use tck_world::members::text;
+use tck_world::{End, Listen, Observation, Topic, takes};
 
 /// `commands/alive`.
 pub(crate) const ALIVE: Check = Check {
     name: "commands/alive",
     decides: &["TOPIC-14"],
     doc: "A master control stays connected, or comes back: its last connection does not end within a second of a message \
-          of a vehicle for good. Seen by the tap, while nobody plays with the link and no hook has stopped it.",
+          of a vehicle for good. ShownState by the tap, while nobody plays with the link and no hook has stopped it.",
     arguments: &[],
+    listens: &[Listen::Everything],
+    reads: &[],
     start: |_| Box::new(Alive::default()),
 };
 
@@ -29,6 +30,8 @@ pub(crate) const LISTENS: Check = Check {
     doc: "The connection topic, which is published with QoS 1, is not subscribed with QoS 0 only: then a last will may be \
           lost. A warning; seen by the tap.",
     arguments: &[],
+    listens: &[Listen::Subscribe, Listen::Closed, Listen::Sent(Topic::Connection)],
+    reads: &[],
     start: |_| Box::new(Listens::default()),
 };
 
@@ -47,7 +50,6 @@ struct Gone {
 
 #[derive(Default)]
 struct Alive {
-    traffic: Traffic,
     open: BTreeSet<u64>,
     last: Option<(u64, String, Moment)>,
     gone: Option<Gone>,
@@ -72,19 +74,23 @@ impl Alive {
     }
 
     fn overdue(&self, now: Moment, context: &CheckContext<'_>) -> bool {
-        let patience = context.time("reconnect").unwrap_or(Duration::from_secs(90));
+        let patience = context.time.reconnect;
         self.gone.as_ref().is_some_and(|gone| now.since(gone.at) >= patience)
     }
 }
 
 impl Running for Alive {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         if context.role != Role::MasterControl {
             return false;
         }
-        let now = entry.at().moment;
-        match entry.event() {
+        let now = record.at().moment;
+        match record.event() {
             Event::Packet {
                 connection,
                 packet: Packet::Connect { .. },
@@ -111,7 +117,7 @@ impl Running for Alive {
             Event::Closed { connection, how } => {
                 let known = self.open.remove(connection);
                 let played = self.played.is_some_and(|at| now.since(at) < AT_ONCE * 5);
-                let ours = played || self.traffic.disturbed || *how == Close::Harness;
+                let ours = played || record.link.disturbed || *how == Close::Harness;
                 let recent = self.last.clone().filter(|(.., at)| now.since(*at) <= AT_ONCE);
                 if let Some(after) = recent.filter(|_| known && self.open.is_empty() && !ours) {
                     self.gone = Some(Gone {
@@ -121,9 +127,9 @@ impl Running for Alive {
                     });
                 }
             }
-            Event::Sent { topic, .. } if self.gone.is_none() => {
-                if let Some(name) = context.topic_name(topic) {
-                    self.last = Some((entry.seq(), name.to_owned(), now));
+            Event::Sent { .. } if self.gone.is_none() => {
+                if let Some(name) = record.topic_name() {
+                    self.last = Some((record.seq(), name.to_owned(), now));
                 }
             }
             _ => {}
@@ -131,8 +137,8 @@ impl Running for Alive {
         self.overdue(now, context) && self.report("it did not come back", findings)
     }
 
-    fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
-        if self.overdue(end, context) {
+    fn finish(&mut self, end: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+        if self.overdue(end.moment, context) {
             self.report("it did not come back", findings);
         }
     }
@@ -140,15 +146,18 @@ impl Running for Alive {
 
 #[derive(Default)]
 struct Listens {
-    traffic: Traffic,
     filters: BTreeMap<u64, Vec<(String, u8)>>,
     told: bool,
 }
 
 impl Running for Listens {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        match entry.event() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        match record.event() {
             Event::Packet {
                 connection,
                 packet: Packet::Subscribe { filters, .. },
@@ -167,10 +176,13 @@ impl Running for Listens {
             }
             _ => {}
         }
-        let Some(said) = said("connection", entry, context).filter(|_| context.role == Role::MasterControl) else {
+        let Some(said) = record
+            .said(Topic::Connection)
+            .filter(|_| context.role == Role::MasterControl)
+        else {
             return false;
         };
-        let Event::Sent { topic, .. } = entry.event() else {
+        let Event::Sent { topic, .. } = record.event() else {
             return false;
         };
         let all = self.filters.values().flatten();
@@ -184,7 +196,7 @@ impl Running for Listens {
         {
             self.told = true;
             let text = "the connection topic is subscribed with QoS 0, so that a last will may be lost";
-            findings.push(remark("TOPIC-14", entry.seq(), text));
+            findings.push(remark("TOPIC-14", record.seq(), text));
         }
         best.is_some()
     }
@@ -195,18 +207,7 @@ mod tests {
     use serde_json::json;
 
     use crate::trace::Trace;
-    use tck_check::takes;
     use tck_journal::event::{Direction, Filter, Packet};
-
-    #[test]
-    fn filters_take_what_mqtt_says() {
-        for filter in ["#", "a/#", "a/+/c", "a/b/c", "a/b/c/#", "$share/g/a/+/c"] {
-            assert!(takes(filter, "a/b/c"), "{filter}");
-        }
-        for filter in ["a/b", "a/b/c/d", "+", "a/+", "b/#"] {
-            assert!(!takes(filter, "a/b/c"), "{filter}");
-        }
-    }
 
     fn listening(qos: &[u8]) -> Vec<String> {
         let mut trace = Trace::master_control_at_tap();

@@ -4,14 +4,12 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use serde_json::Value;
 
-use super::sheet::grace;
-use super::vehicle::{Outside, Vehicle};
-use super::{Command, ELEMENTS, Each, Found, content, in_sequence, parameter, place_of, said, short};
-use crate::orders::number;
-use crate::traffic::{Traffic, elements, quote, show, text};
+use super::{Command, ELEMENTS, Each, Found, in_sequence, parameter, place_of, short};
+use crate::finding::{quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, number, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/map-enabled`.
 pub(crate) const ENABLED: Check = Check {
@@ -21,6 +19,15 @@ pub(crate) const ENABLED: Check = Check {
           FINISHED has enabled, or that an order enables on its way; of an update it is a warning. Judged only for a vehicle \
           that lists maps, and not of the last order that is sent again as it was.",
     arguments: &[],
+    listens: &[
+        Listen::Vehicle,
+        Listen::Fault,
+        Listen::Hook,
+        Listen::Sent(Topic::State),
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Mock],
     start: |_| Box::new(Enabled::default()),
 };
 
@@ -31,6 +38,15 @@ pub(crate) const ON_BOARD: Check = Check {
     doc: "The instant action enableMap names a map version that a state of the vehicle lists: it was brought on board \
           before. Judged only for a vehicle that lists maps; otherwise it is a warning.",
     arguments: &[],
+    listens: &[
+        Listen::Vehicle,
+        Listen::Fault,
+        Listen::Hook,
+        Listen::Sent(Topic::State),
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Mock],
     start: |_| Box::new(OnBoard::default()),
 };
 
@@ -40,6 +56,11 @@ pub(crate) const DOWNLOADS: Check = Check {
     decides: &["MAP-16"],
     doc: "downloadMap names mapId and mapDownloadLink; without mapVersion it is a warning, and so is a link without a host.",
     arguments: &[],
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[],
     start: |_| Each::start(download),
 };
 
@@ -50,6 +71,15 @@ pub(crate) const DUPLICATES: Check = Check {
     doc: "When a downloadMap has failed for a map version the vehicle already lists, deleteMap for it has to come, and not \
           to fail, before the next downloadMap for it. With `settled`, a download that follows the refusal at once is judged as well.",
     arguments: &["settled"],
+    listens: &[
+        Listen::Vehicle,
+        Listen::Fault,
+        Listen::Hook,
+        Listen::Sent(Topic::State),
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Mock],
     start: |context| {
         Box::new(Duplicates {
             settled: context.with.get("settled") == Some(&Value::Bool(true)),
@@ -115,8 +145,6 @@ fn pair(action: &Value) -> Option<(String, String)> {
 
 #[derive(Default)]
 struct Enabled {
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// Enabled maps of the last states; `None` for a state that lists no maps.
     reported: VecDeque<(Moment, Option<BTreeSet<String>>)>,
     /// Maps to be enabled, by the id of the action.
@@ -128,12 +156,16 @@ struct Enabled {
 }
 
 impl Running for Enabled {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.mock().is_lost(record) {
             self.reported.clear();
         }
-        if let Some(state) = said("state", entry, context) {
+        if let Some(state) = record.said(Topic::State) {
             let listed = state
                 .get("maps")
                 .and_then(Value::as_array)
@@ -145,14 +177,14 @@ impl Running for Enabled {
             if self.reported.len() == 64 {
                 self.reported.pop_front();
             }
-            self.reported.push_back((entry.at().moment, enabled));
+            self.reported.push_back((record.at().moment, enabled));
             let all = elements(state, "actionStates").take(ELEMENTS);
             for action in all.filter(|action| text(action, "actionStatus") == "FINISHED") {
                 let map = self.asked.remove(text(action, "actionId"));
                 self.usable.extend(map.filter(|_| self.usable.len() < KEPT));
             }
         }
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+        let Some(command) = Command::read(record) else {
             return false;
         };
         for (scope, action) in command.actions() {
@@ -166,18 +198,18 @@ impl Running for Enabled {
             }
         }
         let Some(order) = command.order() else { return false };
-        let before = self.sent.replace(content(order));
+        let before = std::mem::replace(&mut self.sent, record.content());
         if before == self.sent {
             return false;
         }
-        let (now, grace) = (entry.at().moment, grace(context));
+        let (now, grace) = (record.at().moment, context.time.notice);
         let newest = self.reported.iter().rev();
         let fresh = newest.clone().take_while(|(said, _)| now.since(*said) < grace).count();
         let recent: Vec<_> = newest.take(fresh + 1).map(|(_, enabled)| enabled.as_ref()).collect();
-        if recent.is_empty() || recent.iter().any(Option::is_none) || self.vehicle.unsettled(entry, context) {
+        if recent.is_empty() || recent.iter().any(Option::is_none) || context.world.mock().unsettled(record, context) {
             return false;
         }
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         let mut said = BTreeSet::new();
         let is_update = number(order, "orderUpdateId").is_some_and(|update| update > 0);
@@ -202,20 +234,22 @@ impl Running for Enabled {
 
 #[derive(Default)]
 struct OnBoard {
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// Map versions of the last states.
     listed: VecDeque<(Moment, BTreeSet<(String, String)>)>,
 }
 
 impl Running for OnBoard {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.mock().is_lost(record) {
             self.listed.clear();
         }
-        let now = entry.at().moment;
-        if let Some(state) = said("state", entry, context) {
+        let now = record.at().moment;
+        if let Some(state) = record.said(Topic::State) {
             let name = |map: &Value, member| short(map, member).unwrap_or_default();
             let maps = elements(state, "maps").take(KEPT);
             let maps = maps.map(|map| (name(map, "mapId"), name(map, "mapVersion"))).collect();
@@ -224,19 +258,22 @@ impl Running for OnBoard {
             }
             self.listed.push_back((now, maps));
         }
-        let Some(command @ Command::Instant(_)) = Command::read(self.traffic, entry, context) else {
+        let Some(command @ Command::Instant(_)) = Command::read(record) else {
             return false;
         };
         let newest = self.listed.iter().rev();
         let fresh = newest
             .clone()
-            .take_while(|(said, _)| now.since(*said) < grace(context))
+            .take_while(|(said, _)| now.since(*said) < context.time.notice)
             .count();
         let recent: Vec<_> = newest.take(fresh + 1).map(|(_, maps)| maps).collect();
-        if recent.is_empty() || recent.iter().any(|maps| maps.is_empty()) || self.vehicle.unsettled(entry, context) {
+        if recent.is_empty()
+            || recent.iter().any(|maps| maps.is_empty())
+            || context.world.mock().unsettled(record, context)
+        {
             return false;
         }
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for (_, action) in command.actions() {
             let (Some((id, version)), "enableMap") = (pair(action), text(action, "actionType")) else {
@@ -261,8 +298,6 @@ impl Running for OnBoard {
 struct Duplicates {
     /// The one who asks knows that the master control has seen the refusal.
     settled: bool,
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// Downloads by actionId.
     asked: BTreeMap<String, (String, String)>,
     /// Actions that were sent before: what comes again under the same id is no new download.
@@ -296,20 +331,24 @@ impl Duplicates {
 }
 
 impl Running for Duplicates {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.mock().is_lost(record) {
             self.asked.clear();
             self.refused.clear();
             self.deleted.clear();
         }
-        if let Some(state) = said("state", entry, context) {
-            self.note_state(state, entry.at().moment);
+        if let Some(state) = record.said(Topic::State) {
+            self.note_state(state, record.at().moment);
         }
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for (_, action) in command.actions() {
             let Some(pair) = pair(action) else { continue };
@@ -329,7 +368,7 @@ impl Running for Duplicates {
                     if !self.sent.insert(id.clone()) {
                         continue;
                     }
-                    let late = |at: &Moment| self.settled || entry.at().moment.since(*at) >= grace(context);
+                    let late = |at: &Moment| self.settled || record.at().moment.since(*at) >= context.time.notice;
                     judged |= self.settled;
                     if self.refused.get(&pair).is_some_and(late) {
                         let text = format!("map {} is downloaded again, and was not deleted", quote(&pair.0));

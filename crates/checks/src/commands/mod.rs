@@ -24,11 +24,10 @@ mod maps;
 mod modes;
 mod parameters;
 mod place;
-mod sheet;
+mod stitching;
 #[cfg(test)]
 mod tests;
 mod trajectories;
-mod vehicle;
 
 pub(super) use actions::{IN_FACTSHEET, LOAD_DEVICE, SCOPES};
 pub(super) use asked::NOT_ASKED;
@@ -52,20 +51,13 @@ pub(super) use parameters::{KEYS, MANDATORY, VALUES};
 pub(super) use place::{CANCELLED_BETWEEN, CANCELLED_ON_NODE, FIRST_PLACE, START};
 pub(super) use trajectories::{ENDS, TRAJECTORY};
 
-use std::collections::hash_map::DefaultHasher;
-use std::hash::{Hash, Hasher};
-
 use serde_json::Value;
 
-use super::orders::number;
-use super::traffic::{Traffic, broken, elements, remark, text};
+use crate::finding::{broken, remark};
 use tck_check::{CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
-use tck_journal::event::Event;
-use tck_pack::Role;
+use tck_world::members::{ELEMENTS, elements, in_sequence, instant_actions, place_of, released, short, text};
+use tck_world::{Observation, Topic};
 
-/// How many elements of a list are looked at.
-const ELEMENTS: usize = 2048;
 /// How many findings of one kind a message is worth.
 const REPORTED: usize = 4;
 
@@ -77,18 +69,10 @@ enum Command<'e> {
 }
 
 impl<'e> Command<'e> {
-    /// Reads an entry; only what is a JSON object.
-    fn read(traffic: Traffic, entry: &'e Entry, context: &CheckContext<'_>) -> Option<Self> {
-        let message = traffic.delivered(entry, context)?;
-        if context.role != Role::MasterControl {
-            return None;
-        }
-        let value = entry.json().filter(|value| value.is_object())?;
-        match message.name {
-            "order" => Some(Self::Order(value)),
-            "instantActions" => Some(Self::Instant(value)),
-            _ => None,
-        }
+    /// Reads a record; only what is a JSON object.
+    fn read(record: &Observation<'e>) -> Option<Self> {
+        let order = record.delivered_on(Topic::Order).map(Self::Order);
+        order.or_else(|| record.delivered_on(Topic::InstantActions).map(Self::Instant))
     }
 
     fn order(self) -> Option<&'e Value> {
@@ -105,17 +89,9 @@ impl<'e> Command<'e> {
     }
 
     /// Every action in it, with its scope in the words of a factsheet.
-    ///
-    /// Where there is no array `actions`, the name that older versions gave it counts: what must not come does not
-    /// become right by a wrong name.
     fn actions(self) -> Vec<(&'static str, &'e Value)> {
         match self {
-            Self::Instant(message) => {
-                let named = message.get("actions").is_some_and(Value::is_array);
-                let list = if named { "actions" } else { "instantActions" };
-                let all = elements(message, list).take(ELEMENTS);
-                all.map(|action| ("INSTANT", action)).collect()
-            }
+            Self::Instant(message) => instant_actions(message).map(|action| ("INSTANT", action)).collect(),
             Self::Order(order) => {
                 let of = |list, scope| {
                     elements(order, list)
@@ -137,10 +113,10 @@ struct Found<'f> {
 }
 
 impl<'f> Found<'f> {
-    fn new(entry: &Entry, findings: &'f mut Vec<CheckFinding>) -> Self {
+    fn new(record: &Observation<'_>, findings: &'f mut Vec<CheckFinding>) -> Self {
         let before = findings.len();
         Self {
-            seq: entry.seq(),
+            seq: record.seq(),
             findings,
             before,
         }
@@ -168,68 +144,27 @@ type Rule = fn(Command<'_>, &CheckContext<'_>, &mut Found<'_>) -> bool;
 
 /// Judges every message by itself.
 struct Each {
-    traffic: Traffic,
     rule: Rule,
 }
 
 impl Each {
     fn start(rule: Rule) -> Box<dyn Running> {
-        Box::new(Self {
-            traffic: Traffic::default(),
-            rule,
-        })
+        Box::new(Self { rule })
     }
 }
 
 impl Running for Each {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        (self.rule)(command, context, &mut Found::new(entry, findings))
+        (self.rule)(command, context, &mut Found::new(record, findings))
     }
-}
-
-/// What a mock vehicle says on a topic.
-fn said<'e>(name: &str, entry: &'e Entry, context: &CheckContext<'_>) -> Option<&'e Value> {
-    let Event::Sent { topic, .. } = entry.event() else {
-        return None;
-    };
-    (context.topic_name(topic) == Some(name))
-        .then(|| entry.json())
-        .flatten()
-        .filter(|value| value.is_object())
-}
-
-/// The nodes of an order in the order of their sequenceIds, where all have one; as they stand otherwise.
-fn in_sequence<'v>(order: &'v Value, list: &str) -> Vec<&'v Value> {
-    let mut all: Vec<&Value> = elements(order, list).take(ELEMENTS).collect();
-    if all.iter().all(|element| number(element, "sequenceId").is_some()) {
-        all.sort_by_key(|element| number(element, "sequenceId"));
-    }
-    all
-}
-
-fn released(element: &Value) -> Option<bool> {
-    element.get("released")?.as_bool()
-}
-
-/// A short copy of a text member; `None` when it is missing or no text.
-fn short(value: &Value, name: &str) -> Option<String> {
-    Some(value.get(name)?.as_str()?.chars().take(256).collect())
-}
-
-/// x, y and mapId of a node.
-fn place_of(node: &Value) -> Option<(f64, f64, &str)> {
-    let position = node.get("nodePosition")?;
-    let member = |name: &str| {
-        position
-            .get(name)
-            .and_then(Value::as_f64)
-            .filter(|value| value.is_finite())
-    };
-    Some((member("x")?, member("y")?, text(position, "mapId")))
 }
 
 /// Of a parameter of an action.
@@ -238,43 +173,4 @@ fn parameter<'v>(action: &'v Value, key: &str) -> Option<&'v Value> {
         .take(ELEMENTS)
         .find(|parameter| text(parameter, "key") == key)?
         .get("value")
-}
-
-/// The same for the same JSON value, whatever the order of its members and however a number is written.
-fn fingerprint(value: &Value) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    match value {
-        Value::Object(members) => {
-            let of_member = |(name, value): (&String, &Value)| {
-                let mut hasher = DefaultHasher::new();
-                name.hash(&mut hasher);
-                fingerprint(value).hash(&mut hasher);
-                hasher.finish()
-            };
-            members
-                .iter()
-                .map(of_member)
-                .fold(0_u64, u64::wrapping_add)
-                .hash(&mut hasher);
-        }
-        Value::Array(list) => list.iter().for_each(|value| fingerprint(value).hash(&mut hasher)),
-        Value::Number(number) => number.as_f64().map(f64::to_bits).hash(&mut hasher),
-        other => other.to_string().hash(&mut hasher),
-    }
-    std::mem::discriminant(value).hash(&mut hasher);
-    hasher.finish()
-}
-
-/// The same for a message that is sent again: headerId and timestamp are left out.
-fn content(message: &Value) -> u64 {
-    let members = message.as_object().into_iter().flatten();
-    members
-        .filter(|(name, _)| !matches!(name.as_str(), "headerId" | "timestamp"))
-        .map(|(name, value)| {
-            let mut hasher = DefaultHasher::new();
-            name.hash(&mut hasher);
-            fingerprint(value).hash(&mut hasher);
-            hasher.finish()
-        })
-        .fold(0_u64, u64::wrapping_add)
 }

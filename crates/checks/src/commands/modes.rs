@@ -1,12 +1,10 @@
 //! Nothing is sent to a vehicle that people have taken over.
 
-use super::sheet::grace;
-use super::vehicle::{Outside, Vehicle};
 use super::{Command, Found};
-use crate::traffic::{Traffic, text};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::text;
+use tck_world::{Fact, Listen, Observation, Outside, Topic};
 
 /// `commands/modes`.
 pub(crate) const MODES: Check = Check {
@@ -16,25 +14,38 @@ pub(crate) const MODES: Check = Check {
           What comes within the time a message may take is not judged; stateRequest and factsheetRequest alone are a \
           warning.",
     arguments: &[],
+    listens: &[
+        Listen::Vehicle,
+        Listen::Fault,
+        Listen::Hook,
+        Listen::Sent(Topic::State),
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Mock],
     start: |_| Box::new(Modes::default()),
 };
 
 #[derive(Default)]
 struct Modes {
-    traffic: Traffic,
-    vehicle: Vehicle,
     /// Since when people are in charge.
     since: Option<Moment>,
 }
 
 impl Running for Modes {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if self.vehicle.note(entry, context) != Outside::No {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.mock().now(record) != Outside::No {
             // The next state says what holds from now on.
             self.since = None;
         }
-        let Some(seen) = self.vehicle.last() else { return false };
+        let Some(seen) = context.world.mock().last() else {
+            return false;
+        };
         let word = |name: &str| context.pack.word(name).unwrap_or_default().to_owned();
         let theirs = ["operatingMode.manual", "operatingMode.service", "operatingMode.teachIn"];
         if !theirs.iter().any(|name| word(name) == seen.mode) {
@@ -42,15 +53,15 @@ impl Running for Modes {
             return false;
         }
         let since = *self.since.get_or_insert(seen.at);
-        let now = entry.at().moment;
-        if self.traffic.disturbed || now.since(since) < grace(context) {
+        let now = record.at().moment;
+        if record.link.disturbed || now.since(since) < context.time.notice {
             return false;
         }
         // That nothing comes is seen with every state.
-        let Some(command) = Command::read(self.traffic, entry, context) else {
-            return super::said("state", entry, context).is_some();
+        let Some(command) = Command::read(record) else {
+            return record.said(Topic::State).is_some();
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let asks = |kind: &str| matches!(kind, "stateRequest" | "factsheetRequest");
         let actions = command.actions();
         let only_asks = command.order().is_none()

@@ -2,12 +2,12 @@
 
 use serde_json::Value;
 
-use super::sheet::{Sheet, Sheets};
 use super::{Command, ELEMENTS, Found, parameter};
 use crate::factsheet_actions::{How, look};
-use crate::traffic::{Traffic, elements, quote, show, text};
+use crate::finding::{quote, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/parameter-form`.
 pub(crate) const VALUES: Check = Check {
@@ -17,25 +17,29 @@ pub(crate) const VALUES: Check = Check {
           valueDataType that the factsheet of the vehicle names. Another word in the place of key or value breaks both \
           rules.",
     arguments: &[],
-    start: |_| Box::new(Values::default()),
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(Values),
 };
 
-#[derive(Default)]
-struct Values {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct Values;
 
 impl Running for Values {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let mut found = Found::new(entry, findings);
+        let mut found = Found::new(record, findings);
         let judged = form(command, &mut found);
-        let sheets = self.sheets.valid(entry, context);
+        let sheets = context.world.factsheets().valid(record, context);
         if sheets.is_empty() {
             return judged;
         }
@@ -47,7 +51,7 @@ impl Running for Values {
                     continue;
                 };
                 // Wrong is what no factsheet that counts allows.
-                let wanted = |sheet: &Sheet| {
+                let wanted = |sheet: &Factsheet| {
                     let offered = sheet.actions.as_ref()?.get(kind)?;
                     let wanted = offered.types.get(key)?;
                     (!is_of_type(value, wanted)).then(|| wanted.clone())
@@ -76,7 +80,12 @@ pub(crate) const KEYS: Check = Check {
           its own. One that only has all its words, \
           and is not listed in the factsheet of the vehicle, is a warning.",
     arguments: &[],
-    start: |_| Box::new(Keys::default()),
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(Keys),
 };
 
 /// `commands/mandatory-parameters`.
@@ -86,7 +95,12 @@ pub(crate) const MANDATORY: Check = Check {
     doc: "Predefined actions come with all their mandatory parameters, of the right types. One that the factsheet of \
           the vehicle lists as optional is a warning when it is missing.",
     arguments: &[],
-    start: |_| Box::new(Mandatory::default()),
+    listens: &[
+        Listen::Delivered(Topic::Order),
+        Listen::Delivered(Topic::InstantActions),
+    ],
+    reads: &[Fact::Factsheets],
+    start: |_| Box::new(Mandatory),
 };
 
 fn form(command: Command<'_>, found: &mut Found<'_>) -> bool {
@@ -144,21 +158,20 @@ fn predefined<'c>(action: &Value, context: &'c CheckContext<'_>) -> Option<&'c s
     known.get("parameters")?.as_object()
 }
 
-#[derive(Default)]
-struct Keys {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct Keys;
 
 impl Running for Keys {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let sheets = self.sheets.valid(entry, context);
-        let mut found = Found::new(entry, findings);
+        let sheets = context.world.factsheets().valid(record, context);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for (_, action) in command.actions() {
             let Some(predefined) = predefined(action, context).filter(|known| !known.is_empty()) else {
@@ -170,7 +183,7 @@ impl Running for Keys {
                 .map(|parameter| text(parameter, "key"))
                 .collect();
             judged |= !keys.is_empty();
-            let lists = |sheet: &Sheet, key: &str| {
+            let lists = |sheet: &Factsheet, key: &str| {
                 let offered = sheet.actions.as_ref().and_then(|actions| actions.get(kind));
                 offered
                     .and_then(|offered| offered.parameters.as_ref())
@@ -216,21 +229,20 @@ impl Running for Keys {
     }
 }
 
-#[derive(Default)]
-struct Mandatory {
-    traffic: Traffic,
-    sheets: Sheets,
-}
+struct Mandatory;
 
 impl Running for Mandatory {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(command) = Command::read(record) else {
             return false;
         };
-        let sheets = self.sheets.valid(entry, context);
-        let mut found = Found::new(entry, findings);
+        let sheets = context.world.factsheets().valid(record, context);
+        let mut found = Found::new(record, findings);
         let mut judged = false;
         for (_, action) in command.actions() {
             let kind = text(action, "actionType");
@@ -258,7 +270,7 @@ impl Running for Mandatory {
     }
 }
 
-fn is_optional(sheet: &Sheet, kind: &str, key: &str) -> bool {
+fn is_optional(sheet: &Factsheet, kind: &str, key: &str) -> bool {
     let offered = sheet.actions.as_ref().and_then(|actions| actions.get(kind));
     let listed = offered.and_then(|offered| offered.parameters.as_ref());
     listed.is_some_and(|listed| listed.get(key) == Some(&true))

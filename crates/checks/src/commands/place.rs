@@ -1,16 +1,12 @@
 //! Where a new order begins, seen from where the vehicle stands.
 
-use std::collections::BTreeSet;
-
 use serde_json::Value;
 
-use super::sheet::{Sheet, Sheets};
-use super::vehicle::{Outside, Seen, Vehicle};
-use super::{Command, Found, in_sequence, place_of, short};
-use crate::orders::number;
-use crate::traffic::{Traffic, quote, text};
+use super::{Command, Found, in_sequence, place_of};
+use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{number, text};
+use tck_world::{Fact, Factsheet, Listen, Observation, ShownState, Topic};
 
 /// `commands/start`.
 pub(crate) const START: Check = Check {
@@ -20,6 +16,8 @@ pub(crate) const START: Check = Check {
           reported position. Any state that may still have been under way will do. With `settled`, a vehicle that was \
           set up a moment ago is judged as well: the test has waited until its states show where it stands.",
     arguments: &["settled"],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Starts, Fact::Mock],
     start: |context| {
         let settled = context.with.get("settled") == Some(&Value::Bool(true));
         Box::new(Start {
@@ -36,6 +34,8 @@ pub(crate) const CANCELLED_ON_NODE: Check = Check {
     doc: "After cancelOrder, the next order of a vehicle that localizes on nodes by tags, or reports no position, begins \
           at its lastNodeId.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Starts, Fact::Mock, Fact::Factsheets],
     start: |_| Box::new(Start::new(Rule::OnNode)),
 };
 
@@ -46,6 +46,8 @@ pub(crate) const CANCELLED_BETWEEN: Check = Check {
     doc: "After cancelOrder stopped a vehicle between nodes, the next order begins at a node where the vehicle stands, or \
           at its lastNodeId with a deviation that reaches the vehicle; a lastNodeId without any deviation is a warning.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Starts, Fact::Mock, Fact::Factsheets],
     start: |_| Box::new(Start::new(Rule::Between)),
 };
 
@@ -56,6 +58,8 @@ pub(crate) const FIRST_PLACE: Check = Check {
     doc: "A new order that begins at the node on which the vehicle was put says that this node is where the vehicle says \
           it is. One that is far off is in another unit. Only for a test that knows the vehicle to stand on its node, and not at the origin.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Starts, Fact::Mock],
     start: |_| {
         Box::new(Start {
             settled: true,
@@ -72,9 +76,6 @@ const ROUNDED: f64 = 0.06;
 const FAR_OFF: f64 = 50.0;
 /// A vehicle this far from the place of its last node stands between nodes, in metres.
 const BETWEEN: f64 = 0.6;
-/// How many ids are remembered.
-const IDS: usize = 1024;
-
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Rule {
     Start,
@@ -87,46 +88,29 @@ struct Start {
     rule: Rule,
     /// The one who asks knows that the vehicle stands where it says.
     settled: bool,
-    traffic: Traffic,
-    sheets: Sheets,
-    vehicle: Vehicle,
-    orders: BTreeSet<String>,
-    /// Places of nodes, from the orders.
-    places: std::collections::BTreeMap<String, (f64, f64)>,
-    /// Whether the order before was called off.
-    cancelled: bool,
+}
+
+/// The distance of the vehicle from the place of its last node, by the orders before.
+fn off(seen: &ShownState, context: &CheckContext<'_>) -> Option<f64> {
+    let (x, y, _) = seen.pose.as_ref()?;
+    let place = context.world.starts().place(&seen.last_node)?;
+    Some((x - place.0).hypot(y - place.1))
 }
 
 impl Start {
     fn new(rule: Rule) -> Self {
-        Self {
-            rule,
-            settled: false,
-            traffic: Traffic::default(),
-            sheets: Sheets::default(),
-            vehicle: Vehicle::default(),
-            orders: BTreeSet::new(),
-            places: std::collections::BTreeMap::new(),
-            cancelled: false,
-        }
-    }
-
-    /// The distance of the vehicle from the place of its last node.
-    fn off(&self, seen: &Seen) -> Option<f64> {
-        let (x, y, _) = seen.pose.as_ref()?;
-        let place = self.places.get(&seen.last_node)?;
-        Some((x - place.0).hypot(y - place.1))
+        Self { rule, settled: false }
     }
 
     fn judge(
         &self,
         node: &Value,
-        recent: &[&Seen],
-        sheets: &Sheets,
-        entry: &Entry,
+        recent: &[&ShownState],
+        record: &Observation<'_>,
         context: &CheckContext<'_>,
         found: &mut Found<'_>,
     ) -> bool {
+        let cancelled = context.world.starts().is_behind_cancellation(record);
         let id = text(node, "nodeId");
         let is_last = recent.iter().any(|seen| seen.last_node == id);
         // What was set up by the harness stands exactly there.
@@ -178,10 +162,10 @@ impl Start {
                 true
             }
             Rule::OnNode => {
-                let sheets = sheets.valid(entry, context);
+                let sheets = context.world.factsheets().valid(record, context);
                 let bound = !sheets.is_empty() && sheets.iter().all(|sheet| sheet.on_nodes_only);
                 let no_pose = recent.iter().all(|seen| seen.pose.is_none());
-                if !self.cancelled || !(bound || no_pose) || newest.is_empty() {
+                if !cancelled || !(bound || no_pose) || newest.is_empty() {
                     return false;
                 }
                 if !is_last {
@@ -197,20 +181,21 @@ impl Start {
                 let between = recent
                     .iter()
                     .take(1)
-                    .any(|seen| self.off(seen).is_some_and(|off| off > BETWEEN));
-                if !self.cancelled || !between || covered == Reach::Unknown {
+                    .any(|seen| off(seen, context).is_some_and(|off| off > BETWEEN));
+                if !cancelled || !between || covered == Reach::Unknown {
                     return false;
                 }
                 let allowed = node.pointer("/nodePosition/allowedDeviationXY");
                 if covered == Reach::Yes {
                     return true;
                 }
-                let unlisted = |sheet: &Sheet| {
+                let unlisted = |sheet: &Factsheet| {
                     let listed = sheet.supported.as_ref();
                     listed.is_some_and(|listed| !listed.iter().any(|one| one.ends_with("allowedDeviationXY")))
                 };
                 // What the vehicle does not support need not be sent to it.
-                let unsupported = sheets.valid(entry, context).iter().any(|sheet| unlisted(sheet));
+                let sheets = context.world.factsheets().valid(record, context);
+                let unsupported = sheets.iter().any(|sheet| unlisted(sheet));
                 if is_last && allowed.is_none() && unsupported {
                     return false;
                 }
@@ -235,7 +220,7 @@ enum Reach {
 }
 
 /// The map of a node and that of the vehicle, where it was on another one in every state that counts.
-fn other_map<'a>(node: &'a Value, recent: &[&'a Seen]) -> Option<(&'a str, &'a str)> {
+fn other_map<'a>(node: &'a Value, recent: &[&'a ShownState]) -> Option<(&'a str, &'a str)> {
     let map = place_of(node)?.2;
     let (_, _, first) = recent.first()?.pose.as_ref()?;
     let elsewhere = recent
@@ -246,7 +231,7 @@ fn other_map<'a>(node: &'a Value, recent: &[&'a Seen]) -> Option<(&'a str, &'a s
 
 /// Whether the place of a node covers where the vehicle says it is; a deviation that is named has to reach it where
 /// that is known exactly.
-fn covers(node: &Value, seen: &Seen, exact: bool) -> Reach {
+fn covers(node: &Value, seen: &ShownState, exact: bool) -> Reach {
     let (Some((x, y, map)), Some((at_x, at_y, on))) = (place_of(node), seen.pose.as_ref()) else {
         return Reach::Unknown;
     };
@@ -262,55 +247,35 @@ fn covers(node: &Value, seen: &Seen, exact: bool) -> Reach {
 }
 
 impl Running for Start {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.sheets.note(entry, context);
-        if matches!(self.vehicle.note(entry, context), Outside::Moved | Outside::Lost) {
-            self.cancelled = false;
-        }
-        let Some(command) = Command::read(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(order) = Command::read(record).and_then(Command::order) else {
             return false;
         };
-        let Command::Order(order) = command else {
-            let mut actions = command.actions().into_iter();
-            self.cancelled |= actions.any(|(_, action)| text(action, "actionType") == "cancelOrder");
-            return false;
-        };
-        let Some(id) = short(order, "orderId") else {
-            return false;
-        };
-        if self.orders.len() == IDS {
-            self.orders.pop_first();
-        }
-        let is_new = self.orders.insert(id);
-        let nodes = in_sequence(order, "nodes");
-        let mut judged = false;
         // Who knows that the vehicle has nothing to do also knows that an order of another name is a new one.
         let begins = self.settled || number(order, "orderUpdateId").is_none_or(|update| update == 0);
-        if let Some(node) = nodes.first().filter(|_| is_new && begins) {
-            // A state may overtake the order it answers.
-            let own = text(order, "orderId");
-            let recent = self.vehicle.recent(entry, context);
-            let mut recent: Vec<&Seen> = recent.filter(|seen| seen.order != own).collect();
-            if self.settled {
-                // The newest may have crossed the order on its way.
-                recent.truncate(2);
-            }
-            let settled = self.settled || (!self.vehicle.unsettled(entry, context) && !self.traffic.disturbed);
-            let idle = recent.first().is_some_and(|seen| seen.is_idle());
-            if settled && idle && node.get("nodeId").is_some_and(Value::is_string) {
-                let mut found = Found::new(entry, findings);
-                judged = self.judge(node, &recent, &self.sheets, entry, context, &mut found);
-            }
-            self.cancelled = false;
+        let node = in_sequence(order, "nodes").into_iter().next();
+        let Some(node) = node.filter(|_| begins && context.world.starts().is_new(record)) else {
+            return false;
+        };
+        let vehicle = context.world.mock();
+        // A state may overtake the order it answers.
+        let own = text(order, "orderId");
+        let recent = vehicle.recent(record, context);
+        let mut recent: Vec<&ShownState> = recent.filter(|seen| seen.order != own).collect();
+        if self.settled {
+            // The newest may have crossed the order on its way.
+            recent.truncate(2);
         }
-        for node in nodes {
-            if let (Some(id), Some((x, y, _))) = (short(node, "nodeId"), place_of(node))
-                && (self.places.len() < IDS || self.places.contains_key(&id))
-            {
-                self.places.insert(id, (x, y));
-            }
+        let settled = self.settled || (!vehicle.unsettled(record, context) && !record.link.disturbed);
+        let idle = recent.first().is_some_and(|seen| seen.is_idle());
+        if !settled || !idle || !node.get("nodeId").is_some_and(Value::is_string) {
+            return false;
         }
-        judged
+        self.judge(node, &recent, record, context, &mut Found::new(record, findings))
     }
 }

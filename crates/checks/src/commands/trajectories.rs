@@ -1,9 +1,11 @@
 //! Trajectories that are sent with edges.
 
 use super::{Command, Each, Found, in_sequence, place_of};
-use crate::traffic::{quote, text};
+use crate::finding::quote;
 use tck_base::nurbs::{Curve, Flaw};
 use tck_check::{Check, CheckContext};
+use tck_world::members::text;
+use tck_world::{Listen, Topic};
 
 /// `commands/trajectory`.
 pub(crate) const TRAJECTORY: Check = Check {
@@ -13,6 +15,8 @@ pub(crate) const TRAJECTORY: Check = Check {
           not below 0, and as many knots within 0 to 1 as control points, degree and one together. A missing degree \
           and knots out of order are warnings.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Each::start(shape),
 };
 
@@ -23,6 +27,8 @@ pub(crate) const ENDS: Check = Check {
     doc: "The first and the last control point of a trajectory in an order are where the nodes of its edge are, within \
           their allowedDeviationXY and half a metre.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[],
     start: |_| Each::start(ends),
 };
 

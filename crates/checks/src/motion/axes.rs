@@ -1,11 +1,8 @@
 //! `motion/axes`: positions in the coordinates of the project, not in mirrored or swapped ones.
 
 use super::found;
-use super::lane::Place;
-use super::pose::Pose;
-use super::way;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, OrderedPlace, Pose, Topic};
 
 /// `motion/axes`.
 pub(crate) const AXES: Check = Check {
@@ -15,6 +12,8 @@ pub(crate) const AXES: Check = Check {
           of the nodes in the orders do, and not like a mirror image of that. A change that is like neither, or like \
           both, is not judged.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(Axes::default()),
 };
 
@@ -28,7 +27,7 @@ const UNLIKE: f64 = 0.9;
 #[derive(Default)]
 struct Axes {
     /// Where the vehicle was at rest last, by the order and by its own account.
-    rested: Option<(Place, Pose)>,
+    rested: Option<(OrderedPlace, Pose)>,
 }
 
 /// Mirror images of a way and what they mean.
@@ -46,8 +45,13 @@ fn distance(one: (f64, f64), other: (f64, f64)) -> f64 {
 }
 
 impl Running for Axes {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;
@@ -69,7 +73,7 @@ impl Running for Axes {
         let ordered = (place.x - from.x, place.y - from.y);
         let reported = (pose.x - was.x, pose.y - was.y);
         let length = ordered.0.hypot(ordered.1);
-        let vague = |place: &Place| place.deviation.is_some_and(|allowed| allowed > ALIKE / 2.0 * length);
+        let vague = |place: &OrderedPlace| place.deviation.is_some_and(|allowed| allowed > ALIKE / 2.0 * length);
         if from.map != place.map || length < SHORTEST || vague(&from) || vague(place) {
             return false;
         }

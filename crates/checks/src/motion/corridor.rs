@@ -2,13 +2,10 @@
 
 use serde_json::Value;
 
-use super::lane::Lane;
 use super::node_tolerance::margin;
-use super::pose::Pose;
-use super::way;
 use super::{found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Lane, Listen, Observation, Pose, Topic};
 
 /// `motion/corridor`.
 pub(crate) const CORRIDOR: Check = Check {
@@ -18,6 +15,8 @@ pub(crate) const CORRIDOR: Check = Check {
           the corridor is wide on that side, with 0.1 m for wrong positions. Judged where the vehicle has left its \
           trajectory by more than 0.15 m: one that never does so proves nothing.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(Boundaries::of(Point::Centre)),
 };
 
@@ -28,6 +27,8 @@ pub(crate) const CORRIDOR_POINT: Check = Check {
     doc: "As motion/corridor, but with corridorRefPoint CONTOUR half the width of the vehicle, as its factsheet gives \
           it, has to be inside as well; without a width that is not judged.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(Boundaries::of(Point::AsOrdered)),
 };
 
@@ -39,6 +40,8 @@ pub(crate) const NEXT_CORRIDOR: Check = Check {
           or released, with 0.05 m for wrong positions and a margin for the way since the state before, but at the end \
           of the base only for 0.2 s of late reports. Not judged on nodes with actions. Always a warning.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(NextCorridor),
 };
 
@@ -84,8 +87,13 @@ fn lateral(lane: &Lane, pose: &Pose) -> Option<(f64, f64)> {
 }
 
 impl Running for Boundaries {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;
@@ -117,8 +125,13 @@ impl Running for Boundaries {
 struct NextCorridor;
 
 impl Running for NextCorridor {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

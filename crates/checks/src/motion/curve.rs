@@ -1,10 +1,8 @@
 //! `motion/trajectory` and `motion/curve-orientation`: edges that are no straight lines.
 
-use super::lane::apart;
-use super::way;
 use super::{TURNED, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic, apart, wrapped};
 
 /// `motion/trajectory`.
 pub(crate) const TRAJECTORY: Check = Check {
@@ -14,6 +12,8 @@ pub(crate) const TRAJECTORY: Check = Check {
           Judged away from the nodes only; a position near the curve proves something only where the curve is more \
           than 0.3 m away from the straight line.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(Trajectory),
 };
 
@@ -26,6 +26,8 @@ pub(crate) const CURVE_ORIENTATION: Check = Check {
           the curve, in the second half of the edge and away from the nodes, where the curve points elsewhere than the \
           straight line, and not if the end node asks for an orientation of its own.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(CurveOrientation),
 };
 
@@ -39,8 +41,13 @@ const RIGHT: f64 = 0.25;
 struct Trajectory;
 
 impl Running for Trajectory {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;
@@ -68,8 +75,13 @@ impl Running for Trajectory {
 struct CurveOrientation;
 
 impl Running for CurveOrientation {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;
@@ -91,7 +103,7 @@ impl Running for CurveOrientation {
         if !telling || turns_for_node || bend.beside.made < bend.length / 2.0 {
             return false;
         }
-        let wanted = super::lane::wrapped(bend.beside.heading + orientation);
+        let wanted = wrapped(bend.beside.heading + orientation);
         let off = apart(pose.theta, wanted);
         let text = format!("theta is {:.2} where the curve asks for {wanted:.2}", pose.theta);
         if off > TURNED {

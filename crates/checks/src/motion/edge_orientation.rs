@@ -1,10 +1,8 @@
 //! `motion/edge-orientation`: the orientation an edge asks for, against the map or against the way.
 
-use super::lane::apart;
-use super::way;
 use super::{TURNED, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic, apart};
 
 /// `motion/edge-orientation`.
 pub(crate) const EDGE_ORIENTATION: Check = Check {
@@ -16,6 +14,8 @@ pub(crate) const EDGE_ORIENTATION: Check = Check {
           permits rotation, only in its second half, while the vehicle does not turn, and not if the end node asks \
           for an orientation of its own.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(EdgeOrientation),
 };
 
@@ -27,8 +27,13 @@ const STEADY: f64 = 0.05;
 struct EdgeOrientation;
 
 impl Running for EdgeOrientation {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

@@ -1,10 +1,8 @@
 //! `motion/edge-rotation-speed`: maxRotationSpeed of an edge.
 
-use super::lane::{Lane, apart};
-use super::way::{self, View};
 use super::{SHARE, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Lane, Listen, Observation, Topic, View, apart};
 
 /// `motion/edge-rotation-speed`.
 pub(crate) const EDGE_ROTATION_SPEED: Check = Check {
@@ -15,6 +13,8 @@ pub(crate) const EDGE_ROTATION_SPEED: Check = Check {
           for an orientation, so that the turn belongs to the edge; an excess there is a warning, for the place \
           cannot be told from the node. Not judged at the end node.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(EdgeRotationSpeed::default()),
 };
 
@@ -50,8 +50,13 @@ fn owner(lane: &Lane, view: &View) -> Option<Owner> {
 }
 
 impl Running for EdgeRotationSpeed {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

@@ -1,9 +1,8 @@
 //! `motion/edge-speed`: maxSpeed of an edge, by the velocity that is reported and by the way that was made.
 
-use super::way::{self, AT_REST, View};
 use super::{SHARE, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{AT_REST, Fact, Listen, Observation, Topic, View};
 
 /// `motion/edge-speed`.
 pub(crate) const EDGE_SPEED: Check = Check {
@@ -13,6 +12,8 @@ pub(crate) const EDGE_SPEED: Check = Check {
           that the vehicle was faster, with a margin of a tenth, 0.05 m/s, and half a second of late reports. The \
           first state after a node may still show the velocity of the edge before.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(EdgeSpeed::default()),
 };
 
@@ -44,8 +45,13 @@ fn advance(then: &View, now: &View, limit: f64) -> Option<(f64, f64)> {
 }
 
 impl Running for EdgeSpeed {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

@@ -9,14 +9,11 @@ mod curve;
 mod edge_orientation;
 mod edge_rotation_speed;
 mod edge_speed;
-mod lane;
 mod mode_speed;
 mod node_theta;
 mod node_tolerance;
-mod pose;
 mod rotation_place;
 mod velocity_sign;
-mod way;
 
 pub(super) use axes::AXES;
 pub(super) use corridor::{CORRIDOR, CORRIDOR_POINT, NEXT_CORRIDOR};

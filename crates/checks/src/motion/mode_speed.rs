@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::way::{self, View};
 use super::{SHARE, found, softly};
-use crate::traffic::text;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::text;
+use tck_world::{Fact, Listen, Observation, Topic, View};
 
 /// `motion/mode-speed`.
 pub(crate) const MODE_SPEED: Check = Check {
@@ -18,6 +17,8 @@ pub(crate) const MODE_SPEED: Check = Check {
           either alone can be chance. Without reported velocities, and unless `alike` says that the drives differ in \
           nothing else, it is a warning. Edges are compared under the same maxSpeed.",
     arguments: &["alike"],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(ModeSpeed::default()),
 };
 
@@ -109,12 +110,17 @@ impl ModeSpeed {
 }
 
 impl Running for ModeSpeed {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;
-        let mode = entry.json().map(|state| text(state, "operatingMode").to_owned());
+        let mode = record.json().map(|state| text(state, "operatingMode").to_owned());
         let mode = mode.filter(|mode| matches!(mode.as_str(), "AUTOMATIC" | "SEMIAUTOMATIC"));
         let Some(mode) = mode.filter(|_| step.before.is_some() || now.lane.is_some()) else {
             self.present = None;

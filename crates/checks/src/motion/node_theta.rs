@@ -1,11 +1,9 @@
 //! `motion/node-theta`: the orientation in which a node is reported traversed.
 
-use super::lane::apart;
 use super::node_tolerance::margin;
-use super::way::{self, View};
 use super::{TURNED, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 
 /// `motion/node-theta`.
 pub(crate) const NODE_THETA: Check = Check {
@@ -17,6 +15,8 @@ pub(crate) const NODE_THETA: Check = Check {
           before. A vehicle that still turns at the end of its base when it reports the node is judged by the first state \
           in which it stands there, and warned. Not judged on nodes with actions, which may move the vehicle.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(NodeTheta::default()),
 };
 
@@ -68,8 +68,13 @@ impl Turning {
 }
 
 impl Running for NodeTheta {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

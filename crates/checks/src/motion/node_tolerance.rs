@@ -1,9 +1,8 @@
 //! `motion/node-tolerance`: where the vehicle is when it reports a node traversed.
 
 use super::softly;
-use super::way::{self, View};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic, View};
 
 /// `motion/node-tolerance`.
 pub(crate) const NODE_TOLERANCE: Check = Check {
@@ -15,6 +14,8 @@ pub(crate) const NODE_TOLERANCE: Check = Check {
           late reports. Not judged on nodes with actions, which may move the \
           vehicle. Always a warning.",
     arguments: &["tolerance"],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |context| {
         let stated = context.with.get("tolerance").and_then(serde_json::Value::as_f64);
         Box::new(NodeTolerance {
@@ -48,8 +49,13 @@ pub(super) fn margin(now: &View, before: &View, speed: impl Fn(&View) -> Option<
 }
 
 impl Running for NodeTolerance {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

@@ -1,10 +1,8 @@
 //! `motion/rotation-place`: no turning on an edge that forbids rotation.
 
-use super::lane::apart;
-use super::way::{self, View};
 use super::{TURNED, found};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 
 /// `motion/rotation-place`.
 pub(crate) const ROTATION_PLACE: Check = Check {
@@ -14,6 +12,8 @@ pub(crate) const ROTATION_PLACE: Check = Check {
           orientation, it is that from the start: the vehicle turns on the nodes. Judged on the line between the nodes \
           and away from both, with 0.35 rad for what following a line needs.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(RotationPlace::default()),
 };
 
@@ -24,8 +24,13 @@ struct RotationPlace {
 }
 
 impl Running for RotationPlace {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

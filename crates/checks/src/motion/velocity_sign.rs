@@ -1,10 +1,8 @@
 //! `motion/velocity-sign`: vx is positive when the vehicle drives forwards.
 
 use super::found;
-use super::lane::apart;
-use super::way::{self, View};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 
 /// `motion/velocity-sign`.
 pub(crate) const VELOCITY_SIGN: Check = Check {
@@ -14,6 +12,8 @@ pub(crate) const VELOCITY_SIGN: Check = Check {
           direction the vehicle points to. Two states in a row have to disagree, for a vehicle may shunt. Judged on \
           the line between the nodes and away from both, and only where the vehicle does not turn.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Way],
     start: |_| Box::new(VelocitySign::default()),
 };
 
@@ -30,8 +30,13 @@ struct VelocitySign {
 }
 
 impl Running for VelocitySign {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(step) = way::step(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(step) = context.world.way().step(record) else {
             return false;
         };
         let now = &step.now;

@@ -6,9 +6,10 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use crate::traffic::{Traffic, actions, broken, elements, quote, state, text, to_vehicle};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// How many actionIds are kept in mind, and how many of one message are looked at.
 const IDS: usize = 8192;
@@ -23,12 +24,17 @@ pub(crate) const ACTION_IDS: Check = Check {
           was: it was cut off. Judged only as long as all actionIds of the run are kept in mind; what was listed before \
           anything was sent is of an earlier run.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(ActionIds::default()),
 };
 
 #[derive(Default)]
 struct ActionIds {
-    traffic: Traffic,
     sent: BTreeSet<String>,
     /// What a vehicle listed before any of this was sent may be of an earlier run.
     old: BTreeSet<String>,
@@ -37,14 +43,14 @@ struct ActionIds {
 }
 
 impl ActionIds {
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+    fn learn(&mut self, record: &Observation<'_>) {
         let read = |action: &Value| text(action, "actionId").chars().take(1024).collect::<String>();
-        if let Some(order) = to_vehicle("order", entry, context) {
+        if let Some(order) = record.to_vehicle(Topic::Order) {
             let all = elements(order, "nodes").chain(elements(order, "edges"));
             let ids = all.flat_map(|element| elements(element, "actions")).map(read);
             self.sent.extend(ids.take(IDS));
         }
-        if let Some(message) = to_vehicle("instantActions", entry, context) {
+        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
             self.sent.extend(actions(message).map(read).take(IDS));
         }
         self.unknown |= self.sent.len() > IDS;
@@ -58,10 +64,9 @@ impl ActionIds {
 }
 
 impl Running for ActionIds {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.learn(entry, context);
-        let Some(state) = state(self.traffic, entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.learn(record);
+        let Some(state) = record.state() else {
             return false;
         };
         let ids = elements(state, "actionStates").take(IDS);
@@ -84,7 +89,7 @@ impl Running for ActionIds {
                 continue;
             };
             let text = format!("actionStates lists {}, and {} was sent", quote(id), quote(whole));
-            findings.push(broken("STATE-MSG-14", entry.seq(), text));
+            findings.push(broken("STATE-MSG-14", record.seq(), text));
             self.told = true;
         }
         judged

@@ -6,12 +6,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 
 use serde_json::Value;
 
-use crate::continuity::Continuity;
-use crate::orders::number;
-use crate::traffic::{Traffic, actions, broken, elements, outside_influence, quote, remark, state, text, to_vehicle};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_pack::Pack;
+use tck_world::members::{actions, elements, number, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind; a state that lists more is judged on the first ones.
 const ACTIONS: usize = 4096;
@@ -23,6 +22,8 @@ pub(crate) const TRANSITIONS: Check = Check {
     doc: "actionStatus moves only along the legal graph, where statuses may be skipped because states coalesce; \
           FINISHED and FAILED are never left; no actionId is listed twice.",
     arguments: &[],
+    listens: &[Listen::Hook, Listen::Answer, Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |context| {
         Box::new(Transitions {
             graph: Graph::of(context.pack),
@@ -38,6 +39,16 @@ pub(crate) const KEPT: Check = Check {
     doc: "Action states stay listed until a new order is accepted, also after a cancellation. Where the factsheet \
           limits the array and it was full, leaving out finished ones is a warning.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |context| {
         Box::new(Kept {
             graph: Graph::of(context.pack),
@@ -96,20 +107,18 @@ impl Graph {
 #[derive(Default)]
 struct Transitions {
     graph: Graph,
-    traffic: Traffic,
     last: HashMap<String, String>,
 }
 
 impl Running for Transitions {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if outside_influence(entry) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if record.outside_influence() {
             self.last.clear();
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let seq = entry.seq();
+        let seq = record.seq();
         let mut now = HashMap::new();
         for (id, status) in self.graph.statuses(state) {
             if now.insert(id.to_owned(), status.to_owned()).is_some() {
@@ -138,8 +147,6 @@ impl Running for Transitions {
 #[derive(Default)]
 struct Kept {
     graph: Graph,
-    traffic: Traffic,
-    life: Continuity,
     order: Option<(String, u64)>,
     listed: HashMap<String, String>,
     /// actionIds of cancelOrder actions seen on their way to the vehicle.
@@ -151,13 +158,17 @@ struct Kept {
 }
 
 impl Running for Kept {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         // A restarted vehicle may have forgotten everything; what it keeps over a restart is not ruled.
-        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+        if context.world.restarts().now(record) || record.outside_influence() {
             self.listed.clear();
         }
-        if let Some(message) = to_vehicle("instantActions", entry, context) {
+        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
             let all = actions(message).map(|action| text(action, "actionId").to_owned());
             self.instant.extend(all.take(ACTIONS));
             let excess = self.instant.len().saturating_sub(ACTIONS);
@@ -168,10 +179,10 @@ impl Running for Kept {
             let excess = self.cancels.len().saturating_sub(64);
             self.cancels.drain(..excess);
         }
-        if let Some(limit) = self.factsheet_limit(entry, context) {
+        if let Some(limit) = Self::factsheet_limit(record) {
             self.limit = limit;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         if !state.get("actionStates").is_some_and(Value::is_array) {
@@ -196,7 +207,7 @@ impl Running for Kept {
         if same_order && complete {
             let cancelled = listed.keys().chain(now.keys()).any(|id| self.cancels.contains(id));
             for (id, status) in listed.iter().filter(|(id, _)| !now.contains_key(*id)) {
-                self.judge(id, status, (cancelled, updated, listed.len()), entry, findings);
+                self.judge(id, status, (cancelled, updated, listed.len()), record, findings);
             }
         }
         self.listed = now;
@@ -210,10 +221,10 @@ impl Kept {
         id: &str,
         status: &str,
         (cancelled, updated, count): (bool, bool, usize),
-        entry: &Entry,
+        record: &Observation<'_>,
         findings: &mut Vec<CheckFinding>,
     ) {
-        let seq = entry.seq();
+        let seq = record.seq();
         let text = format!(
             "action {} was {status} and is gone, although no new order was accepted",
             quote(id)
@@ -236,9 +247,8 @@ impl Kept {
         findings.push(broken("STATE-MSG-10", seq, text));
     }
 
-    fn factsheet_limit(&self, entry: &Entry, context: &CheckContext<'_>) -> Option<usize> {
-        let message = self.traffic.delivered(entry, context)?;
-        let value = (message.name == "factsheet").then(|| entry.json()).flatten()?;
+    fn factsheet_limit(record: &Observation<'_>) -> Option<usize> {
+        let value = record.is_delivered(Topic::Factsheet).then(|| record.json()).flatten()?;
         let limits = value.pointer("/protocolLimits/maxArrayLens")?;
         let limit = number(limits, "state.actionStates").unwrap_or_default();
         usize::try_from(limit).ok()
@@ -248,6 +258,7 @@ impl Kept {
 #[cfg(test)]
 mod tests {
     use serde_json::{Value, json};
+    use tck_journal::event::LinkFault;
 
     use crate::trace::Trace;
 
@@ -385,5 +396,35 @@ mod tests {
             trace.judge("state/action-states-kept").summary(),
             ["STATE-MSG-10 warning"]
         );
+    }
+
+    fn over_a_cut(anew: bool) -> Vec<String> {
+        let mut trace = Trace::tap();
+        let listed = json!({ "orderId": "o", "actionStates": [{ "actionId": "a", "actionStatus": "FINISHED" }] });
+        trace
+            .connected(1)
+            .state(&listed)
+            .fault(LinkFault::Cut { reset: false })
+            .closed(1);
+        trace.fault(LinkFault::Restore);
+        if anew {
+            trace.connected(2);
+        } else {
+            trace.connect(2, None, 15, 4);
+        }
+        trace
+            .state(&json!({ "orderId": "o" }))
+            .state(&json!({ "orderId": "o" }));
+        trace.judge("state/action-states-kept").summary()
+    }
+
+    #[test]
+    fn a_vehicle_that_counts_on_over_a_cut_of_ours_has_no_reason_to_forget() {
+        assert_eq!(over_a_cut(false), ["STATE-MSG-10"]);
+    }
+
+    #[test]
+    fn a_vehicle_that_counts_anew_may_have_been_restarted() {
+        assert!(over_a_cut(true).is_empty());
     }
 }

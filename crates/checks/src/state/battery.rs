@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::traffic::{Traffic, broken, state};
-use tck_base::clock::Moment;
+use crate::finding::broken;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::{End, Listen, Observation, Topic};
 
 /// See the module.
 pub(crate) const LEVELS: Check = Check {
@@ -16,6 +15,8 @@ pub(crate) const LEVELS: Check = Check {
     doc: "When a run shows exactly two charges, each more than once and at least 30 points apart, the vehicle knows \
           good and bad only, and they have to be 80 and 20. Everything else tells nothing about it.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(Levels::default()),
 };
 
@@ -26,7 +27,6 @@ const JUMPS: usize = 3;
 
 #[derive(Default)]
 struct Levels {
-    traffic: Traffic,
     /// The charges seen, in hundredths of a percent, each with the entry that showed it first.
     seen: BTreeMap<i64, u64>,
     last: Option<i64>,
@@ -40,21 +40,21 @@ fn hundredths(charge: f64) -> Option<i64> {
 }
 
 impl Running for Levels {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, _findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let charge = state(self.traffic, entry, context)
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, _findings: &mut Vec<CheckFinding>) -> bool {
+        let charge = record
+            .state()
             .and_then(|state| state.get("batteryState")?.get("batteryCharge")?.as_f64())
             .and_then(hundredths);
         let Some(charge) = charge.filter(|_| self.seen.len() <= 2) else {
             return false;
         };
-        self.seen.entry(charge).or_insert(entry.seq());
+        self.seen.entry(charge).or_insert(record.seq());
         self.jumps += usize::from(self.last.replace(charge).is_some_and(|last| last != charge));
         // What two charges mean is only known at the end.
         false
     }
 
-    fn finish(&mut self, _end: Moment, _context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+    fn finish(&mut self, _: &End, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         let [(low, _), (high, seq)] = self
             .seen
             .iter()

@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::traffic::{HEADER, Traffic, broken, is_to_vehicle, lag, outside_influence, state, text};
+use crate::finding::{HEADER, broken};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::text;
+use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
 pub(crate) const BURSTS: Check = Check {
@@ -18,6 +19,16 @@ pub(crate) const BURSTS: Check = Check {
           battery. Messages to the vehicle, hooks and a disturbed link begin the count anew, and states that only \
           arrived together by their timestamps do not count.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Lag,
+        Listen::Fault,
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(Bursts::default()),
 };
 
@@ -30,7 +41,6 @@ const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceS
 
 #[derive(Default)]
 struct Bursts {
-    traffic: Traffic,
     last: Option<Value>,
     /// Arrival and timestamp of the states equal to the last one.
     equal: VecDeque<(Moment, Option<jiff::Timestamp>)>,
@@ -46,15 +56,12 @@ fn essence(state: &Value) -> Value {
 }
 
 impl Running for Bursts {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let asked = ["order", "instantActions"]
-            .iter()
-            .any(|name| is_to_vehicle(name, entry, context));
-        if asked || outside_influence(entry) || lag(entry).is_some() || self.traffic.disturbed {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let asked = record.is_to_vehicle(Topic::Order) || record.is_to_vehicle(Topic::InstantActions);
+        if asked || record.outside_influence() || record.lag().is_some() || record.link.disturbed {
             self.equal.clear();
         }
-        let Some(state) = state(self.traffic, entry, context).filter(|_| !self.traffic.disturbed) else {
+        let Some(state) = record.state().filter(|_| !record.link.disturbed) else {
             return false;
         };
         let now = essence(state);
@@ -63,7 +70,7 @@ impl Running for Bursts {
             self.last = Some(now);
         }
         let stamped: Option<jiff::Timestamp> = text(state, "timestamp").parse().ok();
-        self.equal.push_back((entry.at().moment, stamped));
+        self.equal.push_back((record.at().moment, stamped));
         if self.equal.len() < BURST {
             return true;
         }
@@ -72,10 +79,10 @@ impl Running for Bursts {
         let sent = stamped
             .zip(then)
             .and_then(|(now, then)| Duration::try_from(now.duration_since(then)).ok());
-        let span = entry.at().moment.since(arrived).max(sent.unwrap_or_default());
+        let span = record.at().moment.since(arrived).max(sent.unwrap_or_default());
         if span <= WITHIN {
             let text = format!("{BURST} states within {:.3} s say the same", span.as_secs_f64());
-            findings.push(broken("STATE-11", entry.seq(), text));
+            findings.push(broken("STATE-11", record.seq(), text));
             self.equal.clear();
         }
         true

@@ -7,12 +7,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::orders::{last_node, sets_position};
-use crate::traffic::{Traffic, actions, broken, elements, outside_influence, quote, show, state, text, to_vehicle};
+use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
-use tck_journal::event::{Event, Packet};
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Listen, Observation, Topic, last_node};
 
 /// Faster than this in a state without `driving` is no measuring noise, in metres and radians per second.
 const MOVING: f64 = 0.2;
@@ -42,6 +41,15 @@ pub(crate) const DRIVING: Check = Check {
           changes from state to state, three close states in a row, drives as well; whose does not for ten seconds, with \
           nothing released ahead and nothing under way, does not.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Displaced],
     start: |_| Box::new(Driving::default()),
 };
 
@@ -53,6 +61,15 @@ pub(crate) const POSITION_MOVES: Check = Check {
           its orders, is another one. Judged when it did not change twice in a row, and not for nodes that count as \
           reached from more than a metre away.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Displaced],
     start: |_| Box::new(PositionMoves::default()),
 };
 
@@ -99,26 +116,6 @@ impl Pose {
     }
 }
 
-/// Whether something else than driving may have changed the position: a person, a hook, another localization.
-pub(crate) fn is_displaced(entry: &Entry, context: &CheckContext<'_>) -> bool {
-    let told = to_vehicle("instantActions", entry, context)
-        .is_some_and(|message| actions(message).any(|action| sets_position(text(action, "actionType"))));
-    let placed = to_vehicle("order", entry, context).is_some_and(|order| {
-        let nodes = elements(order, "nodes").flat_map(|node| elements(node, "actions"));
-        nodes
-            .take(NODES)
-            .any(|action| sets_position(text(action, "actionType")))
-    });
-    let connects = matches!(
-        entry.event(),
-        Event::Packet {
-            packet: Packet::Connect { .. },
-            ..
-        }
-    );
-    told || placed || connects || outside_influence(entry)
-}
-
 /// Whether the vehicle is in command of itself and nothing holds it.
 fn is_free(state: &Value) -> bool {
     let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
@@ -137,11 +134,8 @@ fn has_nowhere_to_go(state: &Value) -> bool {
 
 #[derive(Default)]
 struct Driving {
-    traffic: Traffic,
     /// Since when each state shows a velocity without `driving`.
     suspicious: Option<Moment>,
-    /// When something else than driving last set the position.
-    displaced: Option<Moment>,
     /// The last states that said they stand: time and pose, and how often it moved from one to the next.
     standing: Option<(Moment, Pose)>,
     moves: u32,
@@ -150,8 +144,8 @@ struct Driving {
 }
 
 impl Driving {
-    fn by_position(&mut self, state: &Value, entry: &Entry, findings: &mut Vec<CheckFinding>) {
-        let now = entry.at().moment;
+    fn by_position(&mut self, state: &Value, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
+        let now = record.at().moment;
         let driving = state.get("driving").and_then(Value::as_bool);
         let Some(pose) = Pose::of(state).filter(|_| is_free(state) && driving.is_some()) else {
             self.forget();
@@ -160,7 +154,7 @@ impl Driving {
         if driving == Some(true) {
             self.standing = None;
             self.moves = 0;
-            self.at_rest(pose, state, entry, findings);
+            self.at_rest(pose, state, record, findings);
             return;
         }
         self.resting = None;
@@ -174,19 +168,19 @@ impl Driving {
         if self.moves >= 2 {
             self.moves = 0;
             let text = "driving is false, while the position changes from state to state";
-            findings.push(broken("STATE-MSG-08", entry.seq(), text));
+            findings.push(broken("STATE-MSG-08", record.seq(), text));
         }
     }
 
-    fn at_rest(&mut self, pose: Pose, state: &Value, entry: &Entry, findings: &mut Vec<CheckFinding>) {
-        let now = entry.at().moment;
+    fn at_rest(&mut self, pose: Pose, state: &Value, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
+        let now = record.at().moment;
         let nowhere = has_nowhere_to_go(state);
         match &mut self.resting {
             Some((since, at, count)) if nowhere && at.stays(&pose) => {
                 *count += 1;
                 if now.since(*since) > COMING_TO_REST && *count > 2 {
                     let text = "driving is true, while the vehicle stands and has nowhere to go";
-                    findings.push(broken("STATE-MSG-08", entry.seq(), text));
+                    findings.push(broken("STATE-MSG-08", record.seq(), text));
                     self.resting = None;
                 }
             }
@@ -202,23 +196,31 @@ impl Driving {
 }
 
 impl Running for Driving {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let now = entry.at().moment;
-        if is_displaced(entry, context) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let now = record.at().moment;
+        if context.world.displaced().now(record) {
             self.forget();
-            self.displaced = Some(now);
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         // A vehicle may be slow to take a new place over.
-        let patience = context.time("react").unwrap_or(COMING_TO_REST);
-        if self.displaced.is_some_and(|since| now.since(since) < patience) {
+        let patience = context.time.react;
+        if context
+            .world
+            .displaced()
+            .last()
+            .is_some_and(|since| now.since(since) < patience)
+        {
             self.forget();
             return false;
         }
-        self.by_position(state, entry, findings);
+        self.by_position(state, record, findings);
         let Some(velocity) = state.get("velocity") else {
             return Pose::of(state).is_some();
         };
@@ -228,7 +230,7 @@ impl Running for Driving {
         match self.suspicious {
             Some(since) if suspicious && now.since(since) >= ONE_CYCLE => {
                 let text = format!("driving is false at velocity {}", show(velocity));
-                findings.push(broken("STATE-MSG-08", entry.seq(), text));
+                findings.push(broken("STATE-MSG-08", record.seq(), text));
             }
             Some(_) if suspicious => {}
             _ => self.suspicious = suspicious.then_some(now),
@@ -239,13 +241,10 @@ impl Running for Driving {
 
 #[derive(Default)]
 struct PositionMoves {
-    traffic: Traffic,
     /// Where orders say their nodes are: map, x and y.
     nodes: BTreeMap<String, (String, f64, f64)>,
     /// The last node, and the pose when it was reached, if that was seen.
     before: Option<(String, Option<Pose>)>,
-    /// When something else than driving last set the position.
-    displaced: Option<Moment>,
     stuck: u32,
 }
 
@@ -272,17 +271,20 @@ impl PositionMoves {
 }
 
 impl Running for PositionMoves {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if is_displaced(entry, context) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.displaced().now(record) {
             self.before = None;
             self.stuck = 0;
-            self.displaced = Some(entry.at().moment);
         }
-        if let Some(order) = to_vehicle("order", entry, context) {
+        if let Some(order) = record.to_vehicle(Topic::Order) {
             self.learn(order);
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let (Some(pose), Some((node, _))) = (Pose::of(state), last_node(state)) else {
@@ -290,10 +292,12 @@ impl Running for PositionMoves {
             return false;
         };
         // A vehicle may be slow to take a new place over.
-        let patience = context.time("react").unwrap_or(COMING_TO_REST);
-        if self
-            .displaced
-            .is_some_and(|since| entry.at().moment.since(since) < patience)
+        let patience = context.time.react;
+        if context
+            .world
+            .displaced()
+            .last()
+            .is_some_and(|since| record.at().moment.since(since) < patience)
         {
             self.before = None;
             return false;
@@ -324,7 +328,7 @@ impl Running for PositionMoves {
                 quote(&last),
                 quote(&node)
             );
-            findings.push(broken("MAP-01", entry.seq(), text));
+            findings.push(broken("MAP-01", record.seq(), text));
         }
         true
     }

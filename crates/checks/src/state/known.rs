@@ -8,12 +8,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::continuity::Continuity;
-use crate::orders::{Element, Malformed, last_node, may_abandon, number, read_elements};
-use crate::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
+use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, number, text};
+use tck_world::{Element, Fact, Listen, Observation, Topic, last_node, may_abandon, read_elements};
 
 /// How many orders on their way are kept in mind.
 const ORDERS: usize = 1024;
@@ -30,6 +29,16 @@ pub(crate) const ORDER_KNOWN: Check = Check {
           in which master control is in command; a restart, what a person or a hook did, and malformed orders of the \
           harness are left out.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts, Fact::Malformed],
     start: |_| Box::new(OrderKnown::looking_for(Part::Known)),
 };
 
@@ -40,6 +49,16 @@ pub(crate) const UPDATE_ID_RISES: Check = Check {
     doc: "The orderUpdateId of an order that was not cancelled does not fall when an update with a lower one is sent. \
           Otherwise as state/order-known.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts, Fact::Malformed],
     start: |_| Box::new(OrderKnown::looking_for(Part::Rises)),
 };
 
@@ -51,6 +70,16 @@ pub(crate) const NOT_REPLACED: Check = Check {
           the one before was cancelled, extended, or may have been given up; and one that was refused then, with an error \
           that names it, is not shown later either, unless it was sent again. Otherwise as state/order-known.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts, Fact::Malformed],
     start: |_| Box::new(OrderKnown::looking_for(Part::Replaced)),
 };
 
@@ -77,9 +106,6 @@ struct Before {
 #[derive(Default)]
 struct OrderKnown {
     part: Part,
-    traffic: Traffic,
-    life: Continuity,
-    malformed: Malformed,
     sent: VecDeque<Pair>,
     /// More was sent than is kept in mind.
     unknown: bool,
@@ -108,16 +134,17 @@ impl OrderKnown {
         }
     }
 
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
+    fn learn(&mut self, record: &Observation<'_>) {
         // One without a name or number is malformed, and looked after there.
-        if let Some(pair) = to_vehicle("order", entry, context).and_then(named) {
+        if let Some(pair) = record.to_vehicle(Topic::Order).and_then(named) {
             self.since.push(pair.clone());
             self.sent.push_back(pair);
             self.unknown |= self.sent.len() > ORDERS;
             let excess = self.sent.len().saturating_sub(ORDERS);
             self.sent.drain(..excess);
         }
-        let cancels = to_vehicle("instantActions", entry, context)
+        let cancels = record
+            .to_vehicle(Topic::InstantActions)
             .is_some_and(|message| actions(message).any(|action| text(action, "actionType") == "cancelOrder"));
         if cancels {
             self.cancelled = self.before.as_ref().map(|before| before.pair.0.clone());
@@ -158,7 +185,7 @@ impl OrderKnown {
     }
 
     /// Learns which orders a vehicle refuses that has still another one to drive.
-    fn refusals(&mut self, entry: &Entry, state: &Value, busy: bool) {
+    fn refusals(&mut self, record: &Observation<'_>, state: &Value, busy: bool) {
         let named: BTreeSet<String> = elements(state, "errors")
             .take(REFUSALS)
             .flat_map(|error| elements(error, "errorReferences").take(REFUSALS))
@@ -175,8 +202,8 @@ impl OrderKnown {
             }
             self.refused.push_back(Refused {
                 order: order.clone(),
-                at: entry.at().moment,
-                seq: entry.seq(),
+                at: record.at().moment,
+                seq: record.seq(),
             });
         }
         self.blamed = named;
@@ -244,19 +271,22 @@ fn ahead(state: &Value, last: Option<&(String, u64)>) -> Option<Vec<Element>> {
 }
 
 impl Running for OrderKnown {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.malformed.note(entry, context);
-        self.learn(entry, context);
-        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.learn(record);
+        if context.world.restarts().now(record) || record.outside_influence() {
             self.before = None;
             self.refused.clear();
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
-        let pair = named(state).filter(|_| in_command && !self.malformed.is_shown_in(state));
+        let pair = named(state).filter(|_| in_command && !context.world.malformed().is_shown_in_command(record));
         let Some(pair) = pair else {
             self.before = None;
             self.blamed.clear();
@@ -271,7 +301,7 @@ impl Running for OrderKnown {
             may_be_over: may_abandon(state),
         };
         let busy = self.part == Part::Replaced && now.ahead.is_some();
-        self.refusals(entry, state, busy);
+        self.refusals(record, state, busy);
         let Some(before) = self.before.take() else {
             self.before = Some(now);
             self.since.clear();
@@ -285,7 +315,7 @@ impl Running for OrderKnown {
             }
             Part::Replaced => {
                 let other = |sent: &Pair| sent.0 != before.pair.0;
-                let queued = self.queued(&before, &pair, entry.at().moment);
+                let queued = self.queued(&before, &pair, record.at().moment);
                 let early = queued.or_else(|| self.too_early(&before, &now));
                 (
                     early.is_some() || before.ahead.is_some() && self.since.iter().any(other),
@@ -294,7 +324,7 @@ impl Running for OrderKnown {
             }
         };
         if let Some((requirement, text)) = found {
-            findings.push(broken(requirement, entry.seq(), text));
+            findings.push(broken(requirement, record.seq(), text));
         }
         if before.pair.0 != pair.0 {
             self.cancelled = None;

@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use crate::continuity::Continuity;
-use crate::traffic::{Delivered, Traffic, broken, elements, outside_influence, quote, state, text};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many loads, places and actions are looked at.
 const MANY: usize = 256;
@@ -23,13 +23,20 @@ pub(crate) const LOADS: Check = Check {
           loadPositions of the factsheet, where that has any. What a person or a hook did, a FATAL error and a restart are \
           forgiven.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(Loads::default()),
 };
 
 #[derive(Default)]
 struct Loads {
-    traffic: Traffic,
-    life: Continuity,
     /// Whether the last state listed a load.
     loaded: bool,
     /// How often the member has gone, and whether it was ever empty.
@@ -62,10 +69,14 @@ impl Loads {
 }
 
 impl Running for Loads {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if let Some(Delivered { name: "factsheet", .. }) = self.traffic.delivered(entry, context)
-            && let Some(sheet) = entry.json()
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if record.is_delivered(Topic::Factsheet)
+            && let Some(sheet) = record.json()
         {
             let places = sheet
                 .pointer("/loadSpecification/loadPositions")
@@ -73,14 +84,14 @@ impl Running for Loads {
             let places = places.into_iter().flatten().filter_map(Value::as_str).take(MANY);
             self.places = places.map(str::to_owned).collect();
         }
-        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+        if context.world.restarts().now(record) || record.outside_influence() {
             self.loaded = false;
             self.open.clear();
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
-        self.place(state, entry.seq(), findings);
+        self.place(state, record.seq(), findings);
         let fatal = elements(state, "errors").any(|error| text(error, "errorLevel") != "WARNING");
         let status = |action: &Value| text(action, "actionStatus") == "FINISHED";
         let all = || elements(state, "actionStates").take(MANY);
@@ -96,7 +107,7 @@ impl Running for Loads {
             self.gone += 1;
             if !self.empty && (ended || self.gone == 2) {
                 let text = "loads listed a load and is left out now that there is none; it was never seen empty";
-                findings.push(broken("STATE-MSG-06", entry.seq(), text));
+                findings.push(broken("STATE-MSG-06", record.seq(), text));
             }
         }
         loads.is_some()

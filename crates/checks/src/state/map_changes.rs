@@ -7,12 +7,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::continuity::Continuity;
-use crate::orders::sets_position;
-use crate::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
+use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, text};
+use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 
 /// How many maps and map actions are kept in mind.
 const LIMIT: usize = 1024;
@@ -26,6 +25,16 @@ pub(crate) const MAP_CHANGES: Check = Check {
           entry goes that the route in the same state still needs. A restart, an initPosition, and what a person or a hook \
           did are left out.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(MapChanges::default()),
 };
 
@@ -37,8 +46,6 @@ type Pair = (String, String);
 
 #[derive(Default)]
 struct MapChanges {
-    traffic: Traffic,
-    life: Continuity,
     /// Whether each entry of the last state was ENABLED.
     listed: Option<BTreeMap<Pair, bool>>,
     /// What was ever asked for: mapIds to download, pairs to enable.
@@ -75,9 +82,9 @@ fn of_order(order: &Value) -> impl Iterator<Item = &Value> {
 }
 
 impl MapChanges {
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let instant = to_vehicle("instantActions", entry, context);
-        let order = to_vehicle("order", entry, context);
+    fn learn(&mut self, record: &Observation<'_>) {
+        let instant = record.to_vehicle(Topic::InstantActions);
+        let order = record.to_vehicle(Topic::Order);
         let instant = instant.into_iter().flat_map(actions);
         let all = instant.chain(order.into_iter().flat_map(of_order));
         for action in all.take(LIMIT) {
@@ -95,12 +102,10 @@ impl MapChanges {
                 kind if sets_position(kind) => self.open = true,
                 _ => continue,
             }
-            self.ours.insert(short(text(action, "actionId")), entry.at().moment);
+            self.ours.insert(short(text(action, "actionId")), record.at().moment);
         }
         if self.downloads.len().max(self.enables.len()).max(self.ours.len()) > LIMIT {
             *self = Self {
-                traffic: self.traffic,
-                life: std::mem::take(&mut self.life),
                 open: true,
                 ..Self::default()
             };
@@ -180,13 +185,17 @@ impl MapChanges {
 }
 
 impl Running for MapChanges {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.learn(entry, context);
-        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.learn(record);
+        if context.world.restarts().now(record) || record.outside_influence() {
             self.listed = None;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let Some(maps) = state.get("maps").and_then(Value::as_array) else {
@@ -205,7 +214,7 @@ impl Running for MapChanges {
             match action.map(|action| text(action, "actionStatus")) {
                 Some(status) => matches!(status, "FINISHED" | "FAILED"),
                 // What was refused with its order is never listed.
-                None => entry.at().moment.since(*since) > REFUSED,
+                None => record.at().moment.since(*since) > REFUSED,
             }
         };
         let settled = self.ours.iter().all(ended);
@@ -215,7 +224,7 @@ impl Running for MapChanges {
             self.compare(&now, &before, settled, &mut found);
             self.needed(state, &now, &before, &mut found);
             for (requirement, text) in found {
-                findings.push(broken(requirement, entry.seq(), text));
+                findings.push(broken(requirement, record.seq(), text));
             }
         }
         if settled {

@@ -6,9 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use crate::traffic::{Traffic, actions, broken, elements, outside_influence, quote, state, text, to_vehicle};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// How many maps and how many deleteMap actions are kept in mind.
 const LIMIT: usize = 1024;
@@ -21,6 +22,13 @@ pub(crate) const MAPS: Check = Check {
           is an ENABLED map, maps is empty only without an active map, and no entry disappears unless deleteMap was \
           sent.",
     arguments: &[],
+    listens: &[
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(Maps::default()),
 };
 
@@ -28,19 +36,17 @@ type Pair = (String, String);
 
 #[derive(Default)]
 struct Maps {
-    traffic: Traffic,
     /// What the last state listed; nothing is known of it before the first, and after somebody had to do with the vehicle.
     listed: Option<BTreeSet<Pair>>,
     deleted: BTreeSet<Pair>,
 }
 
 impl Running for Maps {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if outside_influence(entry) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if record.outside_influence() {
             self.listed = None;
         }
-        if let Some(message) = to_vehicle("instantActions", entry, context) {
+        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
             for action in actions(message).filter(|action| text(action, "actionType") == "deleteMap") {
                 if self.deleted.len() < LIMIT {
                     self.deleted
@@ -48,13 +54,13 @@ impl Running for Maps {
                 }
             }
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let Some(maps) = state.get("maps").and_then(Value::as_array) else {
             return false;
         };
-        let seq = entry.seq();
+        let seq = record.seq();
         let mut now = BTreeSet::new();
         let mut enabled: BTreeMap<&str, u32> = BTreeMap::new();
         for map in maps.iter().take(LIMIT) {

@@ -4,11 +4,10 @@ use std::collections::{BTreeSet, VecDeque};
 
 use serde_json::Value;
 
-use super::route::Shown;
-use crate::orders::number;
-use crate::traffic::{broken, elements, quote, remark, text, to_vehicle};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, number, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many order messages, and nodes of one, are kept in mind.
 const MESSAGES: usize = 64;
@@ -23,6 +22,8 @@ pub(crate) const NODE_POSITIONS: Check = Check {
     doc: "Where nodeStates give a nodePosition, x, y and mapId are those of the order, but for ten centimetres. A vehicle that \
           reports places of its own throughout is not judged, nor a node that was sent twice.",
     arguments: &[],
+    listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
+    reads: &[Fact::Shown, Fact::Orders],
     start: |_| Box::new(NodePositions::default()),
 };
 
@@ -34,6 +35,8 @@ pub(crate) const JOINT_POSITION: Check = Check {
           nodePosition: a warning, as to list a place is not to use it. Judged when states have shown the order the first \
           one came with.",
     arguments: &[],
+    listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
+    reads: &[Fact::Shown, Fact::Orders],
     start: |_| {
         Box::new(NodePositions {
             joint: true,
@@ -56,7 +59,6 @@ struct Plan {
 struct NodePositions {
     /// Whether nodes are judged that were sent twice, or the others.
     joint: bool,
-    shown: Shown,
     plans: VecDeque<Plan>,
     /// orderUpdateIds of the present order that states have shown.
     adopted: BTreeSet<u64>,
@@ -79,8 +81,8 @@ fn same(one: &Place, other: &Place) -> bool {
 }
 
 impl NodePositions {
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let Some(order) = to_vehicle("order", entry, context) else {
+    fn learn(&mut self, record: &Observation<'_>) {
+        let Some(order) = record.to_vehicle(Topic::Order) else {
             return;
         };
         let Some(update) = number(order, "orderUpdateId") else {
@@ -115,9 +117,14 @@ impl NodePositions {
 }
 
 impl Running for NodePositions {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.learn(entry, context);
-        let Some(state) = self.shown.state(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        self.learn(record);
+        let Some(state) = context.world.shown().state(record) else {
             return false;
         };
         let Some(update) = number(state, "orderUpdateId") else {
@@ -132,7 +139,7 @@ impl Running for NodePositions {
         if self.adopted.len() < NODES {
             self.adopted.insert(update);
         }
-        let sound = self.shown.orders.of(order).all(|sent| sent.sound);
+        let sound = context.world.orders().of(order).all(|sent| sent.sound);
         let mut judged = false;
         for node in elements(state, "nodeStates").take(NODES).filter(|_| sound) {
             let (Some(shown), Some(sequence)) = (place(node), number(node, "sequenceId")) else {
@@ -169,7 +176,7 @@ impl Running for NodePositions {
             let Some(requirement) = requirement else { continue };
             if self.told.len() < NODES && self.told.insert((id.to_owned(), sequence)) {
                 let found = if self.joint { remark } else { broken };
-                findings.push(found(requirement, entry.seq(), text));
+                findings.push(found(requirement, record.seq(), text));
             }
         }
         judged

@@ -6,11 +6,10 @@ use std::collections::VecDeque;
 
 use serde_json::Value;
 
-use crate::continuity::Continuity;
-use crate::orders::number;
-use crate::traffic::{Traffic, actions, broken, outside_influence, quote, state, text, to_vehicle};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, number, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many orders on their way are kept in mind.
 const ORDERS: usize = 64;
@@ -24,13 +23,21 @@ pub(crate) const ORDER_KEPT: Check = Check {
           in between are forgiven; a cut of the link by the harness is no restart, as long as the vehicle counts its \
           headerId on.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Restarts],
     start: |_| Box::new(OrderKept::default()),
 };
 
 #[derive(Default)]
 struct OrderKept {
-    traffic: Traffic,
-    life: Continuity,
     shown: Option<(String, u64)>,
     /// orderId that a cancelOrder was sent for.
     cancelled: Option<String>,
@@ -39,24 +46,29 @@ struct OrderKept {
 }
 
 impl Running for OrderKept {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         // What is kept over a restart is not ruled, nor what a person does to the order.
-        if self.life.restarted(self.traffic, entry, context) || outside_influence(entry) {
+        if context.world.restarts().now(record) || record.outside_influence() {
             self.shown = None;
         }
-        let cancels = to_vehicle("instantActions", entry, context)
+        let cancels = record
+            .to_vehicle(Topic::InstantActions)
             .is_some_and(|message| actions(message).any(|action| text(action, "actionType") == "cancelOrder"));
         if cancels {
             self.cancelled = self.shown.as_ref().map(|shown| shown.0.clone());
         }
-        if let Some(order) = to_vehicle("order", entry, context) {
+        if let Some(order) = record.to_vehicle(Topic::Order) {
             self.sent.push_back(named(order));
             if self.sent.len() > ORDERS {
                 self.sent.pop_front();
             }
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
@@ -80,7 +92,7 @@ impl Running for OrderKept {
             );
             let cancelled = self.cancelled.as_ref() == Some(&before.0);
             let requirement = if cancelled { "ORD-CANCEL-08" } else { "STATE-MSG-02" };
-            findings.push(broken(requirement, entry.seq(), text));
+            findings.push(broken(requirement, record.seq(), text));
         } else if now.0 == before.0 && now.1 < before.1 && !self.sent.contains(&now) {
             let text = format!(
                 "orderUpdateId of order {} was {} and is {}, although no such order came",
@@ -88,7 +100,7 @@ impl Running for OrderKept {
                 before.1,
                 now.1
             );
-            findings.push(broken("STATE-MSG-02", entry.seq(), text));
+            findings.push(broken("STATE-MSG-02", record.seq(), text));
         }
         true
     }

@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::driving::is_displaced;
-use crate::traffic::{Traffic, broken, state, text};
+use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::text;
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// So long a vehicle may take to come to rest.
 const COMING_TO_REST: Duration = Duration::from_secs(10);
@@ -21,12 +21,20 @@ pub(crate) const PAUSE_STANDS: Check = Check {
           pause ends. Judged in modes in which master control is in command, and not after what a person or a hook did \
           during the pause.",
     arguments: &[],
+    listens: &[
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Connect,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[Fact::Displaced],
     start: |_| Box::new(PauseStands::default()),
 };
 
 #[derive(Default)]
 struct PauseStands {
-    traffic: Traffic,
     /// Since when states say that it is paused.
     since: Option<Moment>,
     /// Whether it drove in the last state after it had time to come to rest.
@@ -35,12 +43,16 @@ struct PauseStands {
 }
 
 impl Running for PauseStands {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if is_displaced(entry, context) {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.displaced().now(record) {
             self.since = None;
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
@@ -50,7 +62,7 @@ impl Running for PauseStands {
             self.told = false;
             return false;
         }
-        let now = entry.at().moment;
+        let now = record.at().moment;
         let since = *self.since.get_or_insert(now);
         let drives = state.get("driving") == Some(&Value::Bool(true)) && now.since(since) > COMING_TO_REST;
         // One state alone may have been on its way when the pause began anew.
@@ -60,7 +72,7 @@ impl Running for PauseStands {
                 "driving is true, and paused has been true for {:.0} s",
                 now.since(since).as_secs_f64()
             );
-            findings.push(broken("ACT-12", entry.seq(), text));
+            findings.push(broken("ACT-12", record.seq(), text));
         }
         self.drove = drives;
         true

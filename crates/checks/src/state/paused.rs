@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::traffic::{Traffic, broken, elements, outside_influence, quote, state, text};
+use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Topic};
 
 /// How many actions are looked at.
 const ACTIONS: usize = 256;
@@ -23,12 +24,13 @@ pub(crate) const PAUSED: Check = Check {
           which master control is not in command, or a fatal error. Judged when states show it without any of these for \
           longer than two seconds: what was held goes on in its own time. Only on vehicles that report `paused`.",
     arguments: &[],
+    listens: &[Listen::Hook, Listen::Answer, Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(PausedActions::default()),
 };
 
 #[derive(Default)]
 struct PausedActions {
-    traffic: Traffic,
     /// Actions the last state showed PAUSED without a reason, and since when.
     before: BTreeMap<String, Moment>,
     accused: BTreeSet<String>,
@@ -45,12 +47,11 @@ fn is_held(state: &Value) -> bool {
 }
 
 impl Running for PausedActions {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if outside_influence(entry) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if record.outside_influence() {
             self.before.clear();
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let before = std::mem::take(&mut self.before);
@@ -62,12 +63,12 @@ impl Running for PausedActions {
         if is_held(state) {
             return !paused.is_empty() && state.get("paused").is_some();
         }
-        let now = entry.at().moment;
+        let now = record.at().moment;
         for id in paused {
             let since = before.get(id).copied().unwrap_or(now);
             if now.since(since) > GOING_ON && self.accused.len() < ACTIONS && self.accused.insert(id.to_owned()) {
                 let text = format!("action {} stays PAUSED, and nothing holds the vehicle", quote(id));
-                findings.push(broken("ASTATE-04", entry.seq(), text));
+                findings.push(broken("ASTATE-04", record.seq(), text));
             }
             self.before.insert(id.chars().take(512).collect(), since);
         }

@@ -6,16 +6,16 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use crate::finding::{broken, remark};
 use crate::rhythm::Rhythm;
 use crate::topic::looks_like;
-use crate::traffic::{Traffic, broken, outside_influence, remark, text};
 use tck_base::clock::Moment;
 use tck_base::pattern::whole;
 use tck_base::verdict::Verdict;
-use tck_check::device_publish;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
+use tck_world::members::text;
+use tck_world::{End, Listen, Observation, Topic};
 
 /// What the transport may add to an interval of the device.
 const MARGIN: Duration = Duration::from_secs(1);
@@ -29,6 +29,22 @@ pub(crate) const PERIOD: Check = Check {
           harness disturbs the link or the device is not connected does not count, and neither does what a broker does not \
           deliver: a state counts when the tap sees it, and without a tap a device of which no state ever came is not judged.",
     arguments: &[],
+    listens: &[
+        Listen::Closed,
+        Listen::Fault,
+        Listen::Disconnect,
+        Listen::Connect,
+        Listen::Connack,
+        Listen::Lag,
+        Listen::Hook,
+        Listen::Answer,
+        Listen::Elsewhere,
+        Listen::Published(Topic::State),
+        Listen::Delivered(Topic::State),
+        Listen::Delivered(Topic::Connection),
+        Listen::Delivered(Topic::Factsheet),
+    ],
+    reads: &[],
     start: |_| Box::new(Period::default()),
 };
 
@@ -39,12 +55,20 @@ pub(crate) const OWN_LIMITS: Check = Check {
     doc: "States keep the maxima that the device's own factsheet states for the arrays of a state, and its \
           minStateInterval. Zero or absent is no limit.",
     arguments: &[],
+    listens: &[
+        Listen::Fault,
+        Listen::Closed,
+        Listen::Disconnect,
+        Listen::Connect,
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(OwnLimits::default()),
 };
 
 #[derive(Default)]
 struct Period {
-    traffic: Traffic,
     /// Last state, or the moment from which one was due: time and entry.
     since: Option<(Moment, u64)>,
     remarked: Option<u64>,
@@ -59,16 +83,16 @@ struct Period {
 }
 
 impl Period {
-    fn judge(&mut self, now: Moment, seq: u64, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+    fn judge(&mut self, now: &End, seq: u64, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let Some((since, _)) = self.since else { return false };
         // Whatever becomes of a state that the device has sent, it has sent one.
-        let gap = self.sent.unwrap_or(now).since(since);
-        let limit = context.time("statePeriod").unwrap_or(Duration::from_secs(31));
+        let gap = self.sent.unwrap_or(now.moment).since(since);
+        let limit = context.time.state_period;
         let seconds = gap.as_secs_f64();
         let net = gap.saturating_sub(self.lag);
         let excuse = if net <= limit {
             Some("the harness itself was held up")
-        } else if !self.seen && !self.traffic.tap {
+        } else if !self.seen && !now.link.tap {
             Some("none ever came, and without a tap nobody can tell whether the broker keeps them to itself")
         } else {
             None
@@ -91,10 +115,14 @@ impl Period {
 }
 
 impl Running for Period {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let now = (entry.at().moment, entry.seq());
-        match entry.event() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let now = (record.at().moment, record.seq());
+        match record.event() {
             Event::Closed { .. }
             | Event::Fault { .. }
             | Event::Packet {
@@ -104,44 +132,44 @@ impl Running for Period {
             Event::Packet {
                 packet: Packet::Connack { code: 0, .. },
                 ..
-            } if !self.traffic.disturbed => self.since = Some(now),
+            } if !record.link.disturbed => self.since = Some(now),
             Event::Lag { micros, .. } => self.lag += Duration::from_micros(*micros),
-            _ if outside_influence(entry) => self.since = None,
+            _ if record.outside_influence() => self.since = None,
             _ => {}
         }
-        if let Some((_, topic, ..)) = device_publish(entry) {
-            match context.topic_name(topic) {
-                Some("state") => _ = self.sent.get_or_insert(now.0),
+        if record.device_publish().is_some() {
+            match record.topic() {
+                Some(Topic::State) => _ = self.sent.get_or_insert(now.0),
                 // States do come. That they come elsewhere is one mistake, which `topic/names` names.
-                None if entry.json().and_then(looks_like) == Some("state") => self.since = None,
+                None if record.json().and_then(looks_like) == Some("state") => self.since = None,
                 _ => {}
             }
         }
-        let Some(message) = self.traffic.delivered(entry, context) else {
+        let Some(message) = record.delivered() else {
             return false;
         };
         match message.name {
             "state" => {
                 self.seen = true;
-                let judged = !self.traffic.disturbed && self.judge(now.0, now.1, context, findings);
-                self.since = (!self.traffic.disturbed).then_some(now);
+                let judged = !record.link.disturbed && self.judge(&record.now(), now.1, context, findings);
+                self.since = (!record.link.disturbed).then_some(now);
                 self.sent = None;
                 self.lag = Duration::ZERO;
                 judged
             }
             "connection" => {
-                let online = entry
+                let online = record
                     .json()
                     .is_some_and(|value| text(value, "connectionState") == "ONLINE");
                 if !online {
                     self.since = None;
-                } else if self.since.is_none() && !self.traffic.disturbed {
+                } else if self.since.is_none() && !record.link.disturbed {
                     self.since = Some(now);
                 }
                 false
             }
             "factsheet" => {
-                let interval = entry
+                let interval = record
                     .json()
                     .and_then(|value| value.pointer("/protocolLimits/timing/defaultStateInterval")?.as_f64());
                 self.own = interval
@@ -153,9 +181,9 @@ impl Running for Period {
         }
     }
 
-    fn finish(&mut self, end: Moment, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
+    fn finish(&mut self, end: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
         let Some((_, seq)) = self.since else { return };
-        if self.remarked != Some(seq) && !self.traffic.disturbed {
+        if self.remarked != Some(seq) && !end.link.disturbed {
             self.judge(end, seq, context, findings);
             self.remarked = Some(seq);
         }
@@ -164,20 +192,18 @@ impl Running for Period {
 
 #[derive(Default)]
 struct OwnLimits {
-    traffic: Traffic,
     arrays: Map<String, Value>,
     interval: Option<Duration>,
     rhythm: Rhythm,
 }
 
 impl Running for OwnLimits {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.rhythm.note(entry);
-        let Some(message) = self.traffic.delivered(entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.rhythm.note(record);
+        let Some(message) = record.delivered() else {
             return false;
         };
-        let Some(value) = entry.json() else { return false };
+        let Some(value) = record.json() else { return false };
         match message.name {
             "factsheet" => {
                 let limits = value.pointer("/protocolLimits/maxArrayLens").and_then(Value::as_object);
@@ -210,12 +236,12 @@ impl Running for OwnLimits {
                         && length > limit
                     {
                         let text = format!("{name} has {length} elements, the factsheet allows {limit}");
-                        findings.push(broken("FACT-11", entry.seq(), text));
+                        findings.push(broken("FACT-11", record.seq(), text));
                     }
                 }
-                let gap = self.rhythm.beat(entry.at().moment, self.interval);
+                let gap = self.rhythm.beat(record.at().moment, self.interval);
                 if let (Some(least), Some(gap)) = (self.interval, gap)
-                    && !self.traffic.disturbed
+                    && !record.link.disturbed
                     // Arrival times jitter; half the interval cannot be jitter alone.
                     && gap * 2 < least
                 {
@@ -224,7 +250,7 @@ impl Running for OwnLimits {
                         gap.as_secs_f64(),
                         least.as_secs_f64()
                     );
-                    findings.push(remark("FACT-14", entry.seq(), text));
+                    findings.push(remark("FACT-14", record.seq(), text));
                 }
                 !self.arrays.is_empty() || self.interval.is_some()
             }

@@ -6,12 +6,10 @@ use std::collections::HashMap;
 
 use serde_json::Value;
 
-use crate::orders::sets_position;
-use crate::traffic::{
-    Traffic, actions, broken, elements, maybe_restarted, outside_influence, quote, state, text, to_vehicle,
-};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{actions, elements, text};
+use tck_world::{Listen, Observation, Topic, sets_position};
 
 /// See the module.
 pub(crate) const LAST_NODE_PLACE: Check = Check {
@@ -21,6 +19,16 @@ pub(crate) const LAST_NODE_PLACE: Check = Check {
           last one than to the one before, or stands within 1 m or the allowedDeviationXY of it. Judged where orders \
           gave both nodes one position each, and a pose is reported.",
     arguments: &[],
+    listens: &[
+        Listen::Connect,
+        Listen::Delivered(Topic::Connection),
+        Listen::Hook,
+        Listen::Answer,
+        Listen::ToVehicle(Topic::InstantActions),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(LastNodePlace::default()),
 };
 
@@ -59,7 +67,6 @@ impl Place {
 
 #[derive(Default)]
 struct LastNodePlace {
-    traffic: Traffic,
     places: HashMap<String, Placed>,
     /// The last node of the state before.
     last: Option<String>,
@@ -114,16 +121,15 @@ impl LastNodePlace {
 }
 
 impl Running for LastNodePlace {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        if outside_influence(entry) || maybe_restarted(self.traffic, entry, context) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if record.outside_influence() || record.may_be_a_restart() {
             self.last = None;
         }
-        if let Some(order) = to_vehicle("order", entry, context) {
+        if let Some(order) = record.to_vehicle(Topic::Order) {
             self.learn(order);
             self.stopped = false;
         }
-        if let Some(message) = to_vehicle("instantActions", entry, context) {
+        if let Some(message) = record.to_vehicle(Topic::InstantActions) {
             for action in actions(message) {
                 match text(action, "actionType") {
                     "cancelOrder" | "startPause" => self.stopped = true,
@@ -133,7 +139,7 @@ impl Running for LastNodePlace {
                 }
             }
         }
-        let Some(state) = state(self.traffic, entry, context) else {
+        let Some(state) = record.state() else {
             return false;
         };
         let now: String = text(state, "lastNodeId").chars().take(512).collect();
@@ -143,7 +149,7 @@ impl Running for LastNodePlace {
             return false;
         };
         if let Some(text) = self.contradiction(state, &before, &now) {
-            findings.push(broken("STATE-MSG-04", entry.seq(), text));
+            findings.push(broken("STATE-MSG-04", record.seq(), text));
         }
         true
     }

@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use crate::traffic::{Traffic, broken, elements, quote, remark, state, text};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
-use tck_journal::event::Event;
+use tck_world::members::{elements, text};
+use tck_world::{Listen, Observation, Seen, Topic};
 
 /// How many actions of a message are looked at.
 const ACTIONS: usize = 4096;
@@ -23,6 +23,8 @@ pub(crate) const STATUSES: Check = Check {
     doc: "A predefined action shows only the statuses that the text describes for it. WAITING and FAILED are always \
           fine, and PAUSED is while something holds the vehicle.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(Statuses::default()),
 };
 
@@ -33,20 +35,29 @@ pub(crate) const RESULTS: Check = Check {
     doc: "An action whose result the factsheet describes is reported FINISHED with a resultDescription; a missing one \
           is a warning.",
     arguments: &[],
+    listens: &[
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Stored(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     start: |_| Box::new(Results::default()),
 };
 
 #[derive(Default)]
 struct Statuses {
-    traffic: Traffic,
     /// Type and status of what was found.
     reported: BTreeSet<(String, String)>,
 }
 
 impl Running for Statuses {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(state) = state(self.traffic, entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(state) = record.state() else {
             return false;
         };
         let held = is_held(state);
@@ -65,7 +76,7 @@ impl Running for Statuses {
             }
             if self.reported.insert((kind.to_owned(), status.to_owned())) {
                 let text = format!("{kind} is {status}, which the text does not describe for it");
-                findings.push(broken("ACT-41", entry.seq(), text));
+                findings.push(broken("ACT-41", record.seq(), text));
             }
         }
         judged
@@ -84,7 +95,6 @@ fn is_held(state: &Value) -> bool {
 
 #[derive(Default)]
 struct Results {
-    traffic: Traffic,
     /// Types whose result the factsheet describes.
     described: BTreeSet<String>,
     reported: BTreeSet<String>,
@@ -92,14 +102,12 @@ struct Results {
 
 impl Results {
     /// Takes over what a factsheet describes, however old it is.
-    fn learn(&mut self, entry: &Entry, context: &CheckContext<'_>) {
-        let Event::Message { topic, .. } = entry.event() else {
-            return;
-        };
-        if context.topic_name(topic) != Some("factsheet") {
+    fn learn(&mut self, record: &Observation<'_>) {
+        let is_factsheet = |seen| record.is(seen, Topic::Factsheet);
+        if !is_factsheet(Seen::Delivered) && !is_factsheet(Seen::Stored) {
             return;
         }
-        let features = entry.json().and_then(|factsheet| factsheet.get("protocolFeatures"));
+        let features = record.json().and_then(|factsheet| factsheet.get("protocolFeatures"));
         let actions = features
             .into_iter()
             .flat_map(|features| elements(features, "agvActions"));
@@ -112,10 +120,9 @@ impl Results {
 }
 
 impl Running for Results {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.learn(entry, context);
-        let Some(state) = state(self.traffic, entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        self.learn(record);
+        let Some(state) = record.state() else {
             return false;
         };
         let mut judged = false;
@@ -127,7 +134,7 @@ impl Running for Results {
             judged = true;
             if text(action, "resultDescription").is_empty() && self.reported.insert(kind.to_owned()) {
                 let text = format!("{} is FINISHED without the result its factsheet describes", quote(kind));
-                findings.push(remark("STATE-MSG-12", entry.seq(), text));
+                findings.push(remark("STATE-MSG-12", record.seq(), text));
             }
         }
         judged

@@ -4,14 +4,10 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
-use crate::orders::{
-    Element, Orders, SentOrder, fatal_errors, last_node, may_abandon_beside, number, read_elements, sets_position,
-};
-use crate::traffic::{Traffic, actions, broken, outside_influence, quote, remark, state, text, to_vehicle};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{number, text};
+use tck_world::{Element, Fact, Listen, Observation, OrdersSent, SentOrder, Topic, read_elements};
 
 /// `state/remaining-route`.
 pub(crate) const REMAINING_ROUTE: Check = Check {
@@ -21,6 +17,8 @@ pub(crate) const REMAINING_ROUTE: Check = Check {
           whose ids the state shows, horizon included, released as in the order. The first node may be listed or \
           not. None stands there twice behind an update. Not judged after a cancelOrder, a change of mode, a fatal error or a failed action.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Shown, Fact::Orders],
     start: |_| Box::new(RemainingRoute::default()),
 };
 
@@ -31,76 +29,20 @@ pub(crate) const LAST_NODE: Check = Check {
     doc: "lastNodeId and lastNodeSequenceId move along the order in its sequence, and never onto a node that was not \
           released.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Shown, Fact::Orders],
     start: |_| Box::new(LastNode::default()),
 };
 
-/// The order a vehicle shows in its states, and whether it can still be held against it.
-#[derive(Default)]
-pub(crate) struct Shown {
-    traffic: Traffic,
-    pub orders: Orders,
-    /// orderId of the last state.
-    order: Option<String>,
-    /// orderId of an order that was cancelled or may have been abandoned.
-    abandoned: Option<String>,
-    /// Last node of the state before the order changed: not yet progress in the new one.
-    pub carried: Option<(String, u64)>,
-    pub last: Option<(String, u64)>,
-    /// FATAL errors of the last state.
-    fatal: Vec<Value>,
-    /// Those among them with which the vehicle has taken the present order over all the same: they do not hold it.
-    borne: Vec<Value>,
-}
-
-/// How many FATAL errors are kept in mind.
-const ERRORS: usize = 16;
-
-impl Shown {
-    /// Learns from an entry; gives back a state that can be held against its order.
-    pub fn state<'e>(&mut self, entry: &'e Entry, context: &CheckContext<'_>) -> Option<&'e Value> {
-        self.traffic.note(entry);
-        self.orders.note(entry, context);
-        let moved = to_vehicle("instantActions", entry, context).is_some_and(|message| {
-            actions(message).any(|action| {
-                let name = text(action, "actionType");
-                name == "cancelOrder" || sets_position(name)
-            })
-        });
-        if moved || outside_influence(entry) {
-            self.abandoned.clone_from(&self.order);
-        }
-        let state = state(self.traffic, entry, context)?;
-        let order = state.get("orderId")?.as_str()?;
-        let last = last_node(state)?;
-        if self.order.as_deref() != Some(order) {
-            self.carried = self.last.take();
-            self.order = Some(order.chars().take(512).collect());
-            self.abandoned = None;
-            self.borne = fatal_errors(state)
-                .filter(|error| self.fatal.contains(error))
-                .cloned()
-                .collect();
-        }
-        self.fatal = fatal_errors(state).take(ERRORS).cloned().collect();
-        if self.carried.as_ref().is_some_and(|carried| *carried != last) {
-            self.carried = None;
-        }
-        self.last = Some(last);
-        if may_abandon_beside(state, &self.borne) {
-            self.abandoned.clone_from(&self.order);
-        }
-        self.abandoned.is_none().then_some(state)
-    }
-}
-
 #[derive(Default)]
 struct RemainingRoute {
-    shown: Shown,
     /// orderUpdateIds of the present order that states have shown.
     adopted: BTreeSet<u64>,
     /// The next node was gone before it was the last node: its sequenceId, and what to say if it stays so.
     early: Option<(u64, Vec<CheckFinding>)>,
     of: Option<String>,
+    /// The turn of the order whose first node was reached with the last node of the order before.
+    arrived: Option<u64>,
 }
 
 /// What is right to list at some progress.
@@ -110,8 +52,14 @@ struct Remainder<'o> {
 }
 
 impl Running for RemainingRoute {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(state) = self.shown.state(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let shown = context.world.shown();
+        let Some(state) = shown.state(record) else {
             return false;
         };
         let (Some(update), Some(nodes), Some(edges)) = (
@@ -121,32 +69,36 @@ impl Running for RemainingRoute {
         ) else {
             return false;
         };
-        if self.of != self.shown.order {
-            self.of.clone_from(&self.shown.order);
+        if self.of.as_deref() != shown.order() {
+            self.of = shown.order().map(str::to_owned);
             self.adopted.clear();
         }
         if self.adopted.len() < 1024 {
             self.adopted.insert(update);
         }
+        let route = Route {
+            last: shown.last(),
+            is_carried: shown.carried().is_some() && self.arrived != Some(shown.turn()),
+            orders: context.world.orders(),
+            adopted: &self.adopted,
+        };
         let order = text(state, "orderId");
-        let candidates: Vec<&SentOrder> = self.shown.orders.candidates(order, update).collect();
+        let candidates: Vec<&SentOrder> = route.orders.candidates(order, update).collect();
         // A vehicle that adopts an order it should have refused is the business of the tests.
         if candidates.is_empty() || candidates.iter().any(|sent| !sent.sound) {
             return false;
         }
-        let seq = entry.seq();
+        let seq = record.seq();
         let best = candidates
             .into_iter()
-            .map(|sent| (self.held_against(sent, &nodes, &edges, seq), sent))
+            .map(|sent| (route.held_against(sent, &nodes, &edges, seq), sent))
             .min_by_key(|(found, _)| found.len());
         let Some((mut found, sent)) = best else { return false };
-        let mut progress = self.progress(sent);
+        let mut progress = route.progress(sent);
         // The new order may name the very node and sequenceId the last one ended with: then an equal last node
         // may be left over, or be progress already. What the lists say decides.
-        let reached = self
-            .reached(sent)
-            .filter(|_| self.shown.carried.is_some() && !found.is_empty());
-        let arrived = reached.is_some_and(|reached| self.held_at(sent, Some(reached), &nodes, &edges, seq).is_empty());
+        let reached = route.reached(sent).filter(|_| route.is_carried && !found.is_empty());
+        let arrived = reached.is_some_and(|reached| route.held_at(sent, Some(reached), &nodes, &edges, seq).is_empty());
         if arrived {
             found.clear();
             progress = reached;
@@ -160,26 +112,36 @@ impl Running for RemainingRoute {
             }
         }
         // Everything as if the next node had been reached already: perhaps the next state says so.
-        let next = self
+        let next = route
             .remainder(sent, progress, |order| &order.nodes)
             .required
             .iter()
             .map(|node| node.sequence)
             .min();
         match next.filter(|_| !found.is_empty() && progress.is_some()) {
-            Some(next) if self.held_at(sent, Some(next), &nodes, &edges, seq).is_empty() => {
+            Some(next) if route.held_at(sent, Some(next), &nodes, &edges, seq).is_empty() => {
                 self.early = Some((next, found));
             }
             _ => findings.extend(found),
         }
         if arrived {
-            self.shown.carried = None;
+            self.arrived = Some(shown.turn());
         }
         true
     }
 }
 
-impl RemainingRoute {
+/// What a state is held against.
+struct Route<'w> {
+    /// The last node, and its sequenceId.
+    last: Option<&'w (String, u64)>,
+    /// Whether that is still of the order before.
+    is_carried: bool,
+    orders: &'w OrdersSent,
+    adopted: &'w BTreeSet<u64>,
+}
+
+impl Route<'_> {
     fn held_against(&self, sent: &SentOrder, nodes: &[Element], edges: &[Element], seq: u64) -> Vec<CheckFinding> {
         self.held_at(sent, self.progress(sent), nodes, edges, seq)
     }
@@ -220,9 +182,9 @@ impl RemainingRoute {
 
     /// The sequenceId the vehicle has reached in the order; `None` while it has not begun.
     fn progress(&self, sent: &SentOrder) -> Option<u64> {
-        let (node, sequence) = self.shown.last.as_ref()?;
+        let (node, sequence) = self.last?;
         let is_last = |element: &&Element| element.id == *node && element.sequence == *sequence;
-        if self.shown.carried.is_some() {
+        if self.is_carried {
             return sent.nodes.first().filter(is_last).map(|first| first.sequence);
         }
         self.reached(sent)
@@ -230,13 +192,9 @@ impl RemainingRoute {
 
     /// The sequenceId of the last node in the order, wherever it comes from.
     fn reached(&self, sent: &SentOrder) -> Option<u64> {
-        let (node, sequence) = self.shown.last.as_ref()?;
+        let (node, sequence) = self.last?;
         let is_last = |element: &&Element| element.id == *node && element.sequence == *sequence;
-        let mut known = self
-            .shown
-            .orders
-            .of(&sent.order)
-            .filter(|other| other.update <= sent.update);
+        let mut known = self.orders.of(&sent.order).filter(|other| other.update <= sent.update);
         known
             .find_map(|other| other.nodes.iter().find(is_last))
             .map(|element| element.sequence)
@@ -253,11 +211,11 @@ impl RemainingRoute {
             required: Vec::new(),
             tolerated: Vec::new(),
         };
-        for earlier in self.shown.orders.of(&sent.order) {
+        for earlier in self.orders.of(&sent.order) {
             if earlier.update >= sent.update {
                 continue;
             }
-            let alone = self.shown.orders.candidates(&sent.order, earlier.update).count() == 1;
+            let alone = self.orders.candidates(&sent.order, earlier.update).count() == 1;
             let certain = alone && earlier.sound && self.adopted.contains(&earlier.update);
             for element in list(earlier)
                 .iter()
@@ -340,22 +298,27 @@ fn compare(
 
 #[derive(Default)]
 struct LastNode {
-    shown: Shown,
     before: Option<(String, String, u64)>,
     /// Sequence ids the state before still had to reach.
     ahead: Vec<u64>,
 }
 
 impl Running for LastNode {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let seq = entry.seq();
-        let Some(state) = self.shown.state(entry, context) else {
-            if crate::traffic::state(self.shown.traffic, entry, context).is_some() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let seq = record.seq();
+        let shown = context.world.shown();
+        let Some(state) = shown.state(record) else {
+            if record.state().is_some() {
                 self.before = None;
             }
             return false;
         };
-        let (Some(order), Some((node, sequence))) = (self.shown.order.clone(), self.shown.last.clone()) else {
+        let (Some(order), Some((node, sequence))) = (shown.order().map(str::to_owned), shown.last().cloned()) else {
             return false;
         };
         if node.is_empty() && sequence != 0 {
@@ -372,7 +335,7 @@ impl Running for LastNode {
         if (&node_before, sequence_before) == (&node, sequence) || text(state, "orderId").is_empty() {
             return true;
         }
-        let sent: Vec<&SentOrder> = self.shown.orders.of(&order).collect();
+        let sent: Vec<&SentOrder> = context.world.orders().of(&order).collect();
         if sent.is_empty() || sent.iter().any(|sent| !sent.sound || sent.places) {
             return false;
         }
@@ -399,7 +362,7 @@ impl Running for LastNode {
             ));
         }
         let was_in_order = nodes().any(|element| element.id == node_before && element.sequence == sequence_before);
-        if was_in_order && self.shown.carried.is_none() && sequence < sequence_before {
+        if was_in_order && shown.carried().is_none() && sequence < sequence_before {
             // The node before the order began may carry a higher number of an older order, which may even be the number
             // of the same node in this order; but then this order still has to reach it.
             let begun = nodes().any(|element| element.sequence == sequence_before && element.released)

@@ -4,11 +4,10 @@
 
 use std::collections::BTreeSet;
 
-use super::route::Shown;
-use crate::orders::Placed;
-use crate::traffic::{broken, elements, quote, text};
+use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Listen, Observation, Placed, Topic};
 
 /// How many actions are kept in mind from one state to the next.
 const ACTIONS: usize = 1024;
@@ -21,26 +20,37 @@ pub(crate) const TRIGGERS: Check = Check {
           front of it is. Behind its edge an action is over; one state of overlap is tolerated. Not judged after a \
           cancelOrder, a change of mode, a fatal error or a failed action.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Shown, Fact::Orders],
     start: |_| Box::new(Triggers::default()),
 };
 
 #[derive(Default)]
 struct Triggers {
-    shown: Shown,
     /// Actions reported already, and edge actions that were open behind their edge in the last state.
     early: BTreeSet<String>,
     open: BTreeSet<String>,
 }
 
 impl Running for Triggers {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(state) = self.shown.state(entry, context) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(state) = context.world.shown().state(record) else {
             return false;
         };
-        let Some((node, sequence)) = self.shown.last.as_ref().filter(|_| self.shown.carried.is_none()) else {
+        let Some((node, sequence)) = context
+            .world
+            .shown()
+            .last()
+            .filter(|_| context.world.shown().carried().is_none())
+        else {
             return false;
         };
-        let sent: Vec<_> = self.shown.orders.of(text(state, "orderId")).collect();
+        let sent: Vec<_> = context.world.orders().of(text(state, "orderId")).collect();
         let here = sent
             .iter()
             .flat_map(|sent| &sent.nodes)
@@ -74,12 +84,12 @@ impl Running for Triggers {
                     place.sequence
                 );
                 if place.on_edge {
-                    findings.push(broken("ACT-02", entry.seq(), message.clone()));
+                    findings.push(broken("ACT-02", record.seq(), message.clone()));
                 }
                 if status == "INITIALIZING" {
-                    findings.push(broken("ASTATE-03", entry.seq(), message.clone()));
+                    findings.push(broken("ASTATE-03", record.seq(), message.clone()));
                 }
-                findings.push(broken("ASTATE-02", entry.seq(), message));
+                findings.push(broken("ASTATE-02", record.seq(), message));
             }
             let unfinished = matches!(status, "WAITING" | "INITIALIZING" | "RUNNING" | "PAUSED");
             if place.on_edge && unfinished && progress > place.sequence {
@@ -90,8 +100,8 @@ impl Running for Triggers {
                         quote(id),
                         place.sequence
                     );
-                    findings.push(broken("NODE-05", entry.seq(), message.clone()));
-                    findings.push(broken("ACT-02", entry.seq(), message));
+                    findings.push(broken("NODE-05", record.seq(), message.clone()));
+                    findings.push(broken("ACT-02", record.seq(), message));
                 }
             }
         }

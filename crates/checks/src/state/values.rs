@@ -7,10 +7,10 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
-use crate::orders::Malformed;
-use crate::traffic::{Traffic, broken, elements, quote, remark, state, text};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::Entry;
+use tck_world::members::{elements, text};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// Beyond this many metres a coordinate is taken for another unit.
 const FAR: f64 = 1.0e6;
@@ -26,7 +26,9 @@ pub(crate) const IDLE_EMPTY: Check = Check {
     doc: "While there never was an order, nodeStates and edgeStates are empty and orderUpdateId is 0; without \
           nodeStates there are no edgeStates. What a malformed order of the harness left in a vehicle is not judged.",
     arguments: &[],
-    start: |_| Box::new(IdleEmpty::default()),
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[Fact::Malformed],
+    start: |_| Box::new(IdleEmpty),
 };
 
 /// `state/position-range`.
@@ -35,7 +37,9 @@ pub(crate) const POSITION_RANGE: Check = Check {
     decides: &["MAP-02"],
     doc: "theta lies between minus pi and pi, and coordinates have the magnitude of metres, which is a warning.",
     arguments: &[],
-    start: |_| Box::new(PositionRange::default()),
+    listens: &[Listen::Delivered(Topic::State), Listen::Delivered(Topic::Visualization)],
+    reads: &[],
+    start: |_| Box::new(PositionRange),
 };
 
 /// `state/identifiers`.
@@ -44,26 +48,30 @@ pub(crate) const IDENTIFIERS: Check = Check {
     decides: &["JSON-04"],
     doc: "Identifiers that the vehicle chooses itself or takes from its maps keep to the recommended characters.",
     arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[],
     start: |_| Box::new(Identifiers::default()),
 };
 
-#[derive(Default)]
-struct IdleEmpty {
-    traffic: Traffic,
-    malformed: Malformed,
-}
+struct IdleEmpty;
 
 impl Running for IdleEmpty {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        self.malformed.note(entry, context);
-        let Some(state) = state(self.traffic, entry, context).filter(|state| !self.malformed.is_shown_in(state)) else {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(state) = record
+            .state()
+            .filter(|_state| !context.world.malformed().is_shown(record))
+        else {
             return false;
         };
         let count = |name| elements(state, name).count();
         let (nodes, edges) = (count("nodeStates"), count("edgeStates"));
         let never = state.get("orderId").and_then(Value::as_str) == Some("");
-        let seq = entry.seq();
+        let seq = record.seq();
         if never && nodes + edges > 0 {
             let text = format!("{nodes} nodeStates and {edges} edgeStates without any order");
             findings.push(broken("STATE-13", seq, text));
@@ -90,19 +98,15 @@ impl Running for IdleEmpty {
     }
 }
 
-#[derive(Default)]
-struct PositionRange {
-    traffic: Traffic,
-}
+struct PositionRange;
 
 impl Running for PositionRange {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let message = self.traffic.delivered(entry, context);
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let message = record.delivered();
         if message.is_none_or(|message| !matches!(message.name, "state" | "visualization")) {
             return false;
         }
-        let Some(position) = entry.json().and_then(|value| value.get("agvPosition")?.as_object()) else {
+        let Some(position) = record.json().and_then(|value| value.get("agvPosition")?.as_object()) else {
             return false;
         };
         if position.get("positionInitialized") == Some(&Value::Bool(false)) {
@@ -111,13 +115,13 @@ impl Running for PositionRange {
         let number = |name| position.get(name).and_then(Value::as_f64);
         if let Some(theta) = number("theta").filter(|theta| theta.abs() > PI + ROUNDING) {
             let text = format!("theta {theta} is not between minus pi and pi");
-            findings.push(broken("MAP-02", entry.seq(), text));
+            findings.push(broken("MAP-02", record.seq(), text));
         }
         for name in ["x", "y"] {
             if let Some(value) = number(name).filter(|value| value.abs() > FAR) {
                 findings.push(remark(
                     "MAP-02",
-                    entry.seq(),
+                    record.seq(),
                     format!("{name} {value} can hardly be metres"),
                 ));
             }
@@ -128,14 +132,12 @@ impl Running for PositionRange {
 
 #[derive(Default)]
 struct Identifiers {
-    traffic: Traffic,
     reported: BTreeSet<String>,
 }
 
 impl Running for Identifiers {
-    fn observe(&mut self, entry: &Entry, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        self.traffic.note(entry);
-        let Some(state) = state(self.traffic, entry, context) else {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(state) = record.state() else {
             return false;
         };
         let position = state
@@ -151,7 +153,7 @@ impl Running for Identifiers {
             let short: String = id.chars().take(128).collect();
             if odd && self.reported.len() < IDENTIFIERS_KEPT && self.reported.insert(short) {
                 let text = format!("{name} {} holds characters that are not recommended", quote(id));
-                findings.push(remark("JSON-04", entry.seq(), text));
+                findings.push(remark("JSON-04", record.seq(), text));
             }
         }
         true

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use tck_journal::Entry;
-use tck_journal::event::Packet;
+use tck_journal::event::{Origin, Packet};
 
 /// How many entries of a bystander are kept, in case it turns out to be the device.
 const HELD: usize = 16;
@@ -70,6 +70,8 @@ pub(super) struct Client {
     pub listens: bool,
     /// The journal number of its CONNECT.
     pub seq: u64,
+    /// Whose it is, where the system tells.
+    pub origin: Option<Origin>,
     /// What was left out of it.
     pub held: Vec<Arc<Entry>>,
 }
@@ -84,13 +86,39 @@ impl Client {
             publishes: BTreeSet::new(),
             listens: false,
             seq,
+            origin: None,
+            held: Vec::new(),
+        }
+    }
+
+    /// Whether it is known not to be what was started.
+    pub fn is_foreign(&self) -> bool {
+        self.origin.as_ref().is_some_and(Origin::is_foreign)
+    }
+
+    /// Whether it is known to be what was started.
+    pub fn is_own(&self) -> bool {
+        matches!(self.origin, Some(Origin::Started { .. }))
+    }
+
+    /// Who it is, without what was left out of it.
+    pub fn named(&self) -> Self {
+        Self {
+            id: self.id.clone(),
+            peer: self.peer.clone(),
+            look: Look::default(),
+            who: self.who,
+            publishes: BTreeSet::new(),
+            listens: false,
+            seq: self.seq,
+            origin: self.origin.clone(),
             held: Vec::new(),
         }
     }
 
     /// Keeps what is left out.
     pub fn hold(&mut self, entry: &Arc<Entry>) {
-        if self.who == Who::Bystander && self.held.len() < HELD {
+        if self.who == Who::Bystander && !self.is_foreign() && self.held.len() < HELD {
             self.held.push(Arc::clone(entry));
         }
     }
@@ -104,6 +132,10 @@ pub(super) struct Stranger {
     messages: u64,
     topics: BTreeSet<String>,
     pub takeovers: u64,
+    /// The program that has the connection, where the system tells.
+    program: Option<String>,
+    /// It is taken for the device: it carries its last will, or goes by its client id.
+    poses: bool,
 }
 
 impl Stranger {
@@ -115,7 +147,26 @@ impl Stranger {
             messages: 0,
             topics: BTreeSet::new(),
             takeovers: 0,
+            program: None,
+            poses: false,
         }
+    }
+
+    /// It is not what was started: another program has it.
+    pub fn is_of(&mut self, origin: &Origin) {
+        let Origin::Other { process, name } = origin else {
+            return;
+        };
+        let name = name.as_deref().unwrap_or("whose name may not be seen");
+        self.program = Some(match process {
+            Some(process) => format!("process {process}, {name:?}"),
+            None => "a process that may not be seen".to_owned(),
+        });
+    }
+
+    /// It is taken for the device.
+    pub fn poses(&mut self) {
+        self.poses = true;
     }
 
     /// It has published on a topic.
@@ -128,7 +179,13 @@ impl Stranger {
 
     /// Whether it did what may show in the findings.
     pub fn is_busy(&self) -> bool {
-        self.messages > 0 || self.takeovers > 0
+        self.messages > 0 || self.takeovers > 0 || self.poses
+    }
+
+    /// Whether it may have been taken for the device: it went by its client id or its last will, or is known to be another
+    /// program and spoke in its name.
+    pub fn is_rival(&self) -> bool {
+        self.poses || self.takeovers > 0 || (self.program.is_some() && self.messages > 0)
     }
 
     /// The limit that it sets to the statement.
@@ -148,9 +205,16 @@ impl Stranger {
                 topics.join(", ")
             ));
         }
+        if self.poses && did.is_empty() {
+            did.push("goes by the client id or the last will of the device".to_owned());
+        }
+        let is = match &self.program {
+            Some(program) => format!("which is not what `device.command` has started but {program}"),
+            None => "which is not the device".to_owned(),
+        };
         format!(
-            "The client {id:?} at {}, which is not the device, {} (from #{} on). What it sent was not judged, and what it may \
-             have caused is held against nobody.",
+            "The client {id:?} at {}, {is}, {} (from #{} on). What it sent was not judged, and what it may have caused is \
+             undecided.",
             self.peer,
             did.join(", and "),
             self.first

@@ -15,14 +15,22 @@ const NAMES: [&str; 5] = ["order", "instantActions", "state", "visualization", "
 
 impl Tap {
     fn new() -> Self {
+        Self::of(Role::Agv)
+    }
+
+    fn of(role: Role) -> Self {
         let packs = Packs::load(&Assets::of_source_tree().unwrap()).unwrap();
         let topics = NAMES
             .iter()
             .map(|name| ((*name).to_owned(), format!("v/{name}")))
             .collect();
+        let header = RunHeader {
+            topics,
+            ..RunHeader::default()
+        };
         Self {
             journal: Journal::new(),
-            company: Company::of(Role::Agv, &topics, packs.latest()).unwrap(),
+            company: Company::of(role, &header, packs.latest()),
             seconds: 0,
         }
     }
@@ -207,7 +215,14 @@ fn who_takes_the_client_id_of_the_device_is_not_the_device() {
 fn a_device_may_come_back_while_its_former_connection_seems_open() {
     let mut tap = Tap::vehicle();
     assert!(tap.connect(2, "agv", Some("connection")) && tap.publish(2, "state", "2"));
-    assert!(!tap.disturbs());
+    assert!(tap.disturbs(), "there may be two");
+    assert!(
+        tap.limits().contains("either the device came back, or there are two"),
+        "{}",
+        tap.limits()
+    );
+    assert_eq!(tap.company.mixed(), None);
+    let before = tap.limits();
     tap.see(Event::Fault {
         fault: LinkFault::Silence { direction: None },
     });
@@ -216,7 +231,107 @@ fn a_device_may_come_back_while_its_former_connection_seems_open() {
         "a device that forgets its will is still the device"
     );
     assert!(tap.publish(3, "state", "3"));
-    assert!(tap.limits().is_empty());
+    assert_eq!(tap.limits(), before, "the link was played with");
+}
+
+#[test]
+fn two_that_throw_each_other_out_are_not_one_device() {
+    let mut tap = Tap::vehicle();
+    for connection in 2..4 {
+        tap.seconds += 5;
+        assert!(tap.connect(connection, "agv", Some("connection")));
+        assert!(tap.publish(connection, "state", "1"));
+    }
+    assert!(
+        tap.company.mixed().is_some_and(|why| why.contains("agv")),
+        "{:?}",
+        tap.company.mixed()
+    );
+    let mut tap = Tap::vehicle();
+    for connection in 2..4 {
+        tap.seconds += 600;
+        assert!(tap.connect(connection, "agv", Some("connection")));
+        assert!(tap.publish(connection, "state", "1"));
+    }
+    assert_eq!(tap.company.mixed(), None, "it comes back over a bad link");
+}
+
+#[test]
+fn two_that_publish_in_turn_are_not_one_device() {
+    let mut tap = Tap::vehicle();
+    assert!(tap.connect(2, "agv-2", Some("connection")));
+    assert!(tap.publish(2, "state", "2"));
+    assert_eq!(tap.company.mixed(), None, "it may have taken the place of the other");
+    assert!(tap.publish(1, "state", "3"));
+    assert!(tap.company.mixed().is_some_and(|why| why.contains("v/state")));
+    assert!(tap.limits().contains("in turn"), "{}", tap.limits());
+}
+
+fn origin(tap: &mut Tap, connection: u64, origin: Origin) {
+    tap.see(Event::Traced { connection, origin });
+}
+
+fn other() -> Origin {
+    Origin::Other {
+        process: Some(7),
+        name: Some("old-agv".to_owned()),
+    }
+}
+
+#[test]
+fn whoever_is_not_what_was_started_is_a_stranger_whatever_it_says_and_however_it_looks() {
+    let mut tap = Tap::new();
+    origin(&mut tap, 1, other());
+    assert!(!tap.connect(1, "agv", Some("connection")), "nobody else is there");
+    assert!(!tap.subscribe(1, "v/order"));
+    assert!(!tap.publish(1, "connection", "online") && !tap.delivered("connection", "online"));
+    assert!(!tap.publish(1, "state", "1") && !tap.delivered("state", "1"));
+    assert!(
+        !tap.delivered("connection", "gone"),
+        "the broker has said its last will"
+    );
+    origin(&mut tap, 2, Origin::Started { process: 9 });
+    assert!(tap.connect(2, "agv", Some("connection")), "it has the same client id");
+    assert!(tap.publish(2, "state", "2") && tap.delivered("state", "2"));
+    assert!(!tap.close(1));
+    assert!(tap.limits().contains("process 7, \"old-agv\""), "{}", tap.limits());
+    assert!(tap.company.mixed().is_some());
+}
+
+#[test]
+fn an_onlooker_that_is_not_what_was_started_costs_nothing() {
+    let mut tap = Tap::vehicle();
+    origin(&mut tap, 2, other());
+    assert!(!tap.connect(2, "explorer", None) && !tap.subscribe(2, "#") && !tap.close(2));
+    assert!(!tap.disturbs() && tap.limits().is_empty());
+    assert_eq!(tap.company.mixed(), None);
+}
+
+#[test]
+fn what_cannot_be_traced_is_judged_and_said() {
+    let mut tap = Tap::new();
+    tap.see(Event::Opened {
+        connection: 1,
+        peer: "192.0.2.9:5".to_owned(),
+    });
+    origin(&mut tap, 1, Origin::Elsewhere);
+    assert!(tap.connect(1, "agv", Some("connection")) && tap.publish(1, "state", "1"));
+    assert!(tap.limits().contains("192.0.2.9"), "{}", tap.limits());
+    assert_eq!(tap.company.mixed(), None);
+}
+
+#[test]
+fn of_a_master_control_only_another_program_is_a_stranger() {
+    let mut tap = Tap::of(Role::MasterControl);
+    for connection in [1, 2] {
+        assert!(tap.connect(connection, "fleet", None) && tap.publish(connection, "order", "1"));
+    }
+    assert!(tap.limits().is_empty() && !tap.disturbs());
+    origin(&mut tap, 3, other());
+    assert!(!tap.connect(3, "old-fleet", None));
+    assert!(!tap.publish(3, "order", "2") && !tap.delivered("order", "2"));
+    assert!(tap.delivered("order", "1") && tap.disturbs());
+    assert!(tap.company.mixed().is_some());
 }
 
 #[test]

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::super::company::Company;
 use super::super::decide::mood;
 use super::super::joined;
 use super::super::opinions::Opinions;
@@ -13,8 +12,12 @@ use super::RunJudge;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::event::Gate;
 use tck_pack::Decided;
-use tck_result::{Capability, Decision, DeviceIdentity, RequirementResult, RunResult, TestResult};
+use tck_result::{Capability, Decision, DeviceIdentity, ProgramResult, RequirementResult, RunResult, TestResult};
 use tck_suite::model::Test;
+
+/// What restricts a run whose connections cannot be traced to the program that it has started.
+const UNTRACED: &str = "Whether it was the program of `device.command` that was judged is not known here: only on Linux, and at \
+                        the tap, it is seen which program has a connection.";
 
 /// Format of `result.json`.
 pub const RESULT_FORMAT: &str = "vda5050-tck.result/1";
@@ -27,6 +30,9 @@ impl RunJudge {
             Vec::new()
         } else {
             let mut tests = joined::repetitions(&self.done);
+            if self.end.is_some() {
+                self.complain_of_left_out(&mut tests);
+            }
             tests.extend(self.set_aside());
             tests
         };
@@ -62,15 +68,15 @@ impl RunJudge {
             None => (true, Some("the run has not ended yet".to_owned())),
         };
         // Nobody knows what the rest would have shown. A failure stands on its evidence.
-        let unknown = (partial && !self.is_stranger).then_some(Verdict::Inconclusive);
-        let verdict = verdict.into_iter().chain(unknown).collect::<Accumulated>().get();
+        let says_nothing = self.is_stranger && self.earlier.is_none();
+        let unknown = (partial && !says_nothing).then_some(Verdict::Inconclusive);
         let header = &self.header;
         let joined = self.joined();
         let fleet = match &self.earlier {
             Some(earlier) => self.reactions.after(&earlier.reactions).result(),
             None => self.reactions.result(),
         };
-        RunResult {
+        let mut result = RunResult {
             format: RESULT_FORMAT.to_owned(),
             tool: header.tool.clone(),
             run: header.run.clone(),
@@ -83,6 +89,8 @@ impl RunJudge {
             partial,
             partial_reason: reason.filter(|_| partial),
             verdict,
+            program: self.program(),
+            mixed: self.mixed(),
             device: DeviceIdentity {
                 manufacturer: header.manufacturer.clone(),
                 serial_number: header.serial_number.clone(),
@@ -111,7 +119,25 @@ impl RunJudge {
             limits: self.limits(),
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
+        };
+        let all = result.verdict.into_iter().chain(unknown).chain(result.aside());
+        result.verdict = all.collect::<Accumulated>().get();
+        result
+    }
+
+    /// What became of the program that was started, in this run and in the one before it.
+    fn program(&self) -> Option<ProgramResult> {
+        let before = self.earlier.as_ref().and_then(|earlier| earlier.program());
+        match before {
+            Some(before) => Some(before.and(self.program.result())),
+            None => self.program.result(),
         }
+    }
+
+    /// Why it is not certain that it was the device that was judged.
+    fn mixed(&self) -> Option<String> {
+        let before = self.earlier.as_ref().and_then(|earlier| earlier.mixed());
+        before.or_else(|| self.company.mixed())
     }
 
     /// What restricts the statement, the harness's own lag included.
@@ -124,11 +150,30 @@ impl RunJudge {
                 lag.as_secs_f64()
             ));
         }
-        limits.extend(self.company.iter().flat_map(Company::limits));
+        if let Some(story) = self.program.result().and_then(|program| program.story()) {
+            limits.push(format!("{story}.").replacen("the program", "The program", 1));
+        }
+        if self.program.is_there() && !self.program.traces() {
+            limits.push(UNTRACED.to_owned());
+        }
+        limits.extend(self.company.limits());
         let before = self.earlier.iter().flat_map(|earlier| earlier.limits());
         let before: Vec<String> = before.filter(|limit| !limits.contains(limit)).collect();
         limits.extend(before);
         limits
+    }
+
+    /// A repetition that was asked for and not done is undecided, and so is its test.
+    fn complain_of_left_out(&self, tests: &mut [TestResult]) {
+        let Some(repeat) = self.plan.repeat else { return };
+        for test in tests {
+            let planned = self.plan.tests.iter().find(|planned| planned.test == test.id);
+            let why = match planned.map(|planned| &planned.gate) {
+                Some(Gate::Unobservable(why) | Gate::NotApplicable(why)) => why.as_str(),
+                Some(Gate::Runs) | None => "the run ended before",
+            };
+            joined::left_out(test, repeat, why);
+        }
     }
 
     /// The planned tests that did not run, with the reason.

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde_json::Value;
+
 use super::super::joined;
 use super::super::rules::{JudgeError, Rules};
 use super::super::watches::Watched;
@@ -36,6 +38,17 @@ impl RunJudge {
         }
         next.earlier = Some(Box::new(self));
         Ok(next)
+    }
+
+    /// The factsheet that the device had in the run that this one goes on with, or in one before that.
+    pub fn factsheet_before(&self) -> Option<&Value> {
+        let earlier = self.earlier.as_deref()?;
+        let own = earlier
+            .ground
+            .bindings
+            .get("device")
+            .and_then(|device| device.get("factsheet"));
+        own.or_else(|| earlier.factsheet_before())
     }
 
     /// The runs before this one.

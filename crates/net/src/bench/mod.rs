@@ -6,6 +6,7 @@ pub mod dial;
 pub mod endpoint;
 mod heard;
 pub mod inbox;
+pub mod kin;
 pub mod listen;
 pub mod own;
 pub mod stream;

@@ -58,8 +58,19 @@ pub(super) async fn serve(
     };
     let report = async |direction, event| shared.reporter.report(Source::Tap, direction, event).await;
     let cuts = admitted.control.borrow().cuts;
+    let own = socket.local_addr();
     let set_up = async {
         report(Some(Direction::FromDevice), opened).await;
+        // Before it says anything: who it is decides whether what it says counts.
+        if let Ok(own) = own
+            && let Some(origin) = shared.kin.origin(peer, own).await
+        {
+            let traced = Event::Traced {
+                connection: number,
+                origin,
+            };
+            report(None, traced).await;
+        }
         let device = device_side(socket, &shared).await?;
         Ok::<_, SetUpError>((device, broker_side(&shared).await?))
     };

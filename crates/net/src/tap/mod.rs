@@ -20,6 +20,7 @@ use tokio_rustls::rustls::ServerConfig;
 use crate::bench::LinkError;
 use crate::bench::endpoint::Endpoint;
 use crate::bench::inbox::Reporter;
+use crate::bench::kin::Kin;
 use crate::bench::listen::{cannot_listen, listen_on};
 use faults::{Change, Faults};
 use tck_journal::event::{Direction, Event, LinkFault, Source};
@@ -49,6 +50,8 @@ struct Shared {
     reporter: Reporter,
     upstream: Upstream,
     tls: Option<TlsAcceptor>,
+    /// What belongs to the program that the run has started.
+    kin: Kin,
     faults: Mutex<Faults>,
     control: watch::Sender<Control>,
     /// Number of open connections.
@@ -79,6 +82,7 @@ impl Tap {
             reporter,
             upstream,
             tls: tls.map(TlsAcceptor::from),
+            kin: Kin::default(),
             faults: Mutex::default(),
             control: watch::Sender::default(),
             open: watch::Sender::default(),
@@ -95,6 +99,12 @@ impl Tap {
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// What belongs to the program that the run has started: connections of others are told from its own.
+    #[must_use]
+    pub fn kin(&self) -> Kin {
+        self.shared.kin.clone()
     }
 
     /// Changes what the tap does. In effect when this returns: after a cut all connections are closed.

@@ -10,7 +10,7 @@ use super::row::{Lane, Row, What};
 use super::thin::{flagged, repeats, shorten, twins};
 use crate::clean::{line, short};
 use crate::headline::{self, headline};
-use tck_journal::event::{Close, LinkFault, StepEnd};
+use tck_journal::event::{Close, LinkFault, Program, StepEnd};
 use tck_journal::{Direction, Entry, Event, Journal, Packet};
 
 /// The rows of a window, and what was not drawn.
@@ -214,7 +214,30 @@ fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &O
             row.class = "trouble";
             row
         }
+        Event::Program { program } => {
+            let (title, detail) = match program {
+                Program::Started { process, .. } => ("the program is started".to_owned(), format!("process {process}")),
+                Program::Asked { by } => ("the program is asked to end".to_owned(), format!("by {}", text(by))),
+                Program::Ended { how, words } => (format!("the program has ended: {how}"), text(words)),
+            };
+            let mut row = plain(entry, What::Box(Device), title, detail);
+            if matches!(program, Program::Ended { .. }) {
+                row.class = "trouble";
+            }
+            row
+        }
+        Event::Interrupted => {
+            let mut row = plain(entry, What::Box(Harness), "the run is interrupted", "");
+            row.class = "trouble";
+            row
+        }
+        Event::Traced { origin, .. } if origin.is_foreign() => {
+            let mut row = plain(entry, What::Box(Broker), "not of the program that was started", "");
+            row.class = "trouble";
+            row
+        }
         Event::RunBegun { .. }
+        | Event::Traced { .. }
         | Event::Planned { .. }
         | Event::RunEnded { .. }
         | Event::TestBegun { .. }

@@ -17,6 +17,7 @@ use tokio::time::{Instant, sleep_until, timeout};
 use crate::bench::client::Client;
 use crate::bench::endpoint::Endpoint;
 use crate::bench::inbox::Inbox;
+use crate::bench::kin::Kin;
 use crate::bench::own::{OwnNames, User};
 use crate::bench::{LinkError, Offer, Outgoing};
 use crate::broker::EmbeddedBroker;
@@ -70,6 +71,13 @@ impl MqttLink {
     #[must_use]
     pub fn reporter(&self) -> Reporter {
         self.reporter.clone()
+    }
+
+    /// What belongs to the program that the run has started, where connections can be traced to it.
+    #[must_use]
+    pub fn kin(&self) -> Option<Kin> {
+        let tap = self.tap.as_ref().filter(|_| Kin::TELLS)?;
+        Some(tap.kin())
     }
 
     /// Takes the bench down: connections, ports, broker.

@@ -1,0 +1,63 @@
+//! Findings, and how values of a device are shown in them.
+
+use serde_json::Value;
+use tck_base::verdict::Verdict;
+use tck_check::CheckFinding;
+use tck_pack::RequirementId;
+use tck_world::members::text;
+
+/// The header fields of every message.
+pub(crate) const HEADER: [&str; 5] = ["headerId", "timestamp", "version", "manufacturer", "serialNumber"];
+
+/// Whether a connection message says that the connection is broken. Spelled with or without underscore
+/// depending on the version.
+pub(crate) fn says_broken(message: &Value) -> bool {
+    text(message, "connectionState")
+        .bytes()
+        .filter(|byte| *byte != b'_')
+        .eq(b"CONNECTIONBROKEN".iter().copied())
+}
+
+/// A finding on `requirement` that follows its mood.
+pub(crate) fn broken(requirement: &str, seq: u64, message: impl Into<String>) -> CheckFinding {
+    CheckFinding {
+        requirement: Some(RequirementId::from(requirement)),
+        verdict: None,
+        seq,
+        message: message.into(),
+    }
+}
+
+/// A finding that a ruling of the catalogue makes a warning.
+pub(crate) fn remark(requirement: &str, seq: u64, message: impl Into<String>) -> CheckFinding {
+    CheckFinding {
+        verdict: Some(Verdict::Warning),
+        ..broken(requirement, seq, message)
+    }
+}
+
+/// A fact that cannot be observed from here.
+pub(crate) fn unclear(requirement: &str, seq: u64, message: impl Into<String>) -> CheckFinding {
+    CheckFinding {
+        verdict: Some(Verdict::Inconclusive),
+        ..broken(requirement, seq, message)
+    }
+}
+
+/// A value of a device, escaped and cut to a readable length.
+pub(crate) fn show(value: &Value) -> String {
+    shorten(&value.to_string())
+}
+
+/// A text of a device in quotes, escaped and cut to a readable length.
+pub(crate) fn quote(text: &str) -> String {
+    shorten(&format!("{:?}", text.chars().take(100).collect::<String>()))
+}
+
+fn shorten(text: &str) -> String {
+    let mut short: String = text.chars().take(80).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    short
+}

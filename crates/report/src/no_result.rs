@@ -1,0 +1,83 @@
+//! A run that never came to be: the command line, the profile, a suite or the bench stood in its way. What a pipeline reads is
+//! written all the same, and is red, so that nobody takes the file of an earlier run for this one.
+
+use std::fmt::Write as _;
+
+use super::clean::{block, line};
+use super::junit::{self, JunitError, Plain, RUN_CASE, RUN_SUITE};
+use super::markdown::escaped;
+use tck_base::verdict::Verdict;
+
+/// A run without a result.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NoResult {
+    /// Name and version of the tool.
+    pub tool: String,
+    /// The exit code of the process.
+    pub exit: u8,
+    /// What that code means.
+    pub meaning: String,
+    /// The profile, if one was named.
+    pub profile: Option<String>,
+    /// What stood in the way; at least one.
+    pub problems: Vec<Obstacle>,
+}
+
+/// One thing that stood in the way of a run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Obstacle {
+    /// What it is, in one line.
+    pub title: String,
+    /// The same with place and hint, as the terminal shows it.
+    pub text: String,
+    /// File and line, where it stands in one.
+    pub place: Option<(String, usize)>,
+}
+
+impl NoResult {
+    /// JUnit XML: the case of the run, red.
+    ///
+    /// # Errors
+    /// When the XML writer refuses; it has no reason to.
+    pub fn junit(&self) -> Result<String, JunitError> {
+        let titles: Vec<&str> = self.problems.iter().map(|problem| problem.title.as_str()).collect();
+        let texts: Vec<&str> = self.problems.iter().map(|problem| problem.text.as_str()).collect();
+        junit::plain(&[Plain {
+            suite: RUN_SUITE.to_owned(),
+            name: RUN_CASE.to_owned(),
+            verdict: Some(Verdict::Error),
+            // The first line becomes the message of the case.
+            text: format!("{}\n\n{}", titles.join("; "), texts.join("\n\n")),
+        }])
+    }
+
+    /// Markdown for a summary page.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut text = format!("## NO RESULT\n\nExit code {}: {}.\n", self.exit, escaped(&self.meaning));
+        for problem in &self.problems {
+            let _ = write!(text, "\n- {}", escaped(&problem.title));
+            if let Some((file, at)) = &problem.place {
+                let _ = write!(text, " ({}:{at})", escaped(&line(file)));
+            }
+        }
+        text.push('\n');
+        text
+    }
+
+    /// Workflow commands of GitHub: an annotation for each problem, at its place.
+    #[must_use]
+    pub fn annotations(&self) -> String {
+        let mut text = String::new();
+        for problem in self.problems.iter().take(super::markdown::ANNOTATIONS) {
+            let place = match (&problem.place, &self.profile) {
+                (Some((file, line)), _) => format!("file={},line={line},", super::markdown::property(file)),
+                (None, Some(file)) => format!("file={},", super::markdown::property(file)),
+                (None, None) => String::new(),
+            };
+            let message = super::markdown::command(&block(&problem.title));
+            let _ = writeln!(text, "::error {place}title=vda5050-tck::{message}");
+        }
+        text
+    }
+}

@@ -1,0 +1,258 @@
+//! What a mock vehicle showed of itself of late, and what the harness did to it.
+
+use std::collections::VecDeque;
+
+use serde_json::Value;
+use tck_base::clock::Moment;
+use tck_journal::event::Event;
+
+use crate::members::{ELEMENTS, elements, number, released, short, text};
+use crate::observation::Observation;
+use crate::setting::Setting;
+use crate::shown::is_taken_out;
+use crate::topic::Topic;
+
+/// How many states are kept.
+const STATES: usize = 64;
+
+/// One state of the vehicle.
+#[derive(Clone, Debug, Default)]
+pub struct ShownState {
+    /// When it was sent.
+    pub at: Moment,
+    /// orderId.
+    pub order: String,
+    /// orderUpdateId.
+    pub update: u64,
+    /// lastNodeId.
+    pub last_node: String,
+    /// Position and map, where the vehicle knows them.
+    pub pose: Option<(f64, f64, String)>,
+    /// Whether it says that it drives.
+    pub driving: bool,
+    /// Released elements that are left.
+    pub base: usize,
+    /// Elements that are left and not released.
+    pub horizon: usize,
+    /// operatingMode.
+    pub mode: String,
+    /// Whether it shows something that may end an order without a word; of a failed action its states tell the rest.
+    pub taken_out: bool,
+    /// Action ids with their status.
+    pub actions: Vec<(String, String)>,
+    /// orderUpdateIds of its order that an error names.
+    pub refused: Vec<u64>,
+}
+
+impl ShownState {
+    fn read(state: &Value, at: Moment) -> Self {
+        let left = |wanted: bool| {
+            let of = |list| elements(state, list).take(ELEMENTS);
+            let all = of("nodeStates").chain(of("edgeStates"));
+            all.filter(|element| released(element) == Some(wanted)).count()
+        };
+        let position = state
+            .get("agvPosition")
+            .filter(|position| position.get("positionInitialized") == Some(&Value::Bool(true)));
+        let pose = position.and_then(|position| {
+            let member = |name: &str| position.get(name).and_then(Value::as_f64);
+            Some((member("x")?, member("y")?, short(position, "mapId").unwrap_or_default()))
+        });
+        let actions: Vec<_> = elements(state, "actionStates")
+            .take(ELEMENTS)
+            .map(|action| {
+                let member = |name| short(action, name).unwrap_or_default();
+                (member("actionId"), member("actionStatus"))
+            })
+            .collect();
+        Self {
+            at,
+            order: short(state, "orderId").unwrap_or_default(),
+            update: number(state, "orderUpdateId").unwrap_or_default(),
+            last_node: short(state, "lastNodeId").unwrap_or_default(),
+            pose,
+            driving: state.get("driving") == Some(&Value::Bool(true)),
+            base: left(true),
+            horizon: left(false),
+            mode: text(state, "operatingMode").chars().take(64).collect(),
+            taken_out: is_taken_out(state),
+            actions,
+            refused: refused(state),
+        }
+    }
+
+    /// Whether nothing is left of an order.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.base + self.horizon == 0 && !self.driving
+    }
+}
+
+/// The orderUpdateIds of the order of this state that errors name.
+fn refused(state: &Value) -> Vec<u64> {
+    let order = text(state, "orderId");
+    let errors = elements(state, "errors").take(ELEMENTS);
+    let named = errors.filter_map(|error| {
+        let value = |key: &str| {
+            let mut all = elements(error, "errorReferences").take(ELEMENTS);
+            let found = all.find(|reference| text(reference, "referenceKey") == key)?;
+            Some(text(found, "referenceValue"))
+        };
+        let own = value("orderId").is_none_or(|id| id == order);
+        value("orderUpdateId").filter(|_| own)?.parse().ok()
+    });
+    named.collect()
+}
+
+/// What the harness can do to a vehicle, as far as its master control has to find its bearings again.
+const MOVES: [&str; 14] = [
+    "reset",
+    "power-cycle",
+    "shutdown",
+    "start",
+    "break-off",
+    "place-on",
+    "move-to",
+    "push-out",
+    "drive-manually",
+    "lose-position",
+    "find-position",
+    "use-lift",
+    "set-mode",
+    "well-behaved",
+];
+
+/// What makes the states or the answers of a vehicle less than the truth.
+const DEVIATES: [&str; 11] = [
+    "answer-after",
+    "state-interval",
+    "lose-states",
+    "stay-silent",
+    "ignore-orders",
+    "reject-orders",
+    "reject-updates",
+    "show",
+    "publish",
+    "speak-version",
+    "stale-will",
+];
+
+/// What happened to the vehicle from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outside {
+    /// Nothing.
+    No,
+    /// It deviates from now on.
+    Deviates,
+    /// It was moved, restarted or relieved of its order.
+    Moved,
+    /// The harness plays with the link, or the master control was started anew.
+    Lost,
+}
+
+/// A mock vehicle of the harness: what it showed of late, and what the harness did to it.
+#[derive(Debug, Default)]
+pub struct MockVehicle {
+    number: Option<usize>,
+    states: VecDeque<ShownState>,
+    /// When something happened to it from outside, and with which record.
+    outside: Option<(Moment, u64, Outside)>,
+}
+
+impl MockVehicle {
+    /// Learns from the next record.
+    pub(crate) fn learn(&mut self, record: &Observation<'_>, setting: &Setting<'_>) {
+        let outside = self.outside(record, setting);
+        if outside != Outside::No {
+            self.outside = Some((record.at().moment, record.seq(), outside));
+        }
+        if matches!(outside, Outside::Moved | Outside::Lost) {
+            self.states.clear();
+        }
+        if let Some(state) = record.said(Topic::State) {
+            if self.states.len() == STATES {
+                self.states.pop_front();
+            }
+            self.states.push_back(ShownState::read(state, record.at().moment));
+        }
+    }
+}
+
+impl MockVehicle {
+    fn outside(&mut self, record: &Observation<'_>, setting: &Setting<'_>) -> Outside {
+        match record.event() {
+            Event::RunBegun { header } => {
+                let mut all = header.vehicles.iter();
+                self.number =
+                    all.position(|one| (one.manufacturer.as_str(), one.serial_number.as_str()) == setting.identity);
+                Outside::No
+            }
+            Event::Vehicle { vehicle, what, .. } if self.number.is_none_or(|number| number == *vehicle) => {
+                let what = what.as_str();
+                if MOVES.contains(&what) {
+                    Outside::Moved
+                } else if DEVIATES.contains(&what) {
+                    Outside::Deviates
+                } else {
+                    Outside::No
+                }
+            }
+            Event::Fault { .. } => Outside::Lost,
+            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => Outside::Lost,
+            _ => Outside::No,
+        }
+    }
+
+    /// What happens to it from outside with this record.
+    #[must_use]
+    pub fn now(&self, record: &Observation<'_>) -> Outside {
+        match self.outside {
+            Some((_, seq, outside)) if seq == record.seq() => outside,
+            _ => Outside::No,
+        }
+    }
+
+    /// Whether it is moved, restarted or lost from sight with this record.
+    #[must_use]
+    pub fn is_lost(&self, record: &Observation<'_>) -> bool {
+        matches!(self.now(record), Outside::Moved | Outside::Lost)
+    }
+
+    /// The last state, if nothing has happened to it since.
+    #[must_use]
+    pub fn last(&self) -> Option<&ShownState> {
+        self.states.back()
+    }
+
+    /// The states since something happened to it, oldest first; bounded.
+    pub fn states(&self) -> impl Iterator<Item = &ShownState> {
+        self.states.iter()
+    }
+
+    /// Whether something happened from outside that the master control may not have seen yet: a moment ago, or so that
+    /// only states of this moment show what it has come to.
+    #[must_use]
+    pub fn unsettled(&self, record: &Observation<'_>, setting: &Setting<'_>) -> bool {
+        let (now, notice) = (record.at().moment, setting.time.notice);
+        let first = self.states.front();
+        self.outside.is_some_and(|(at, ..)| {
+            now.since(at) < notice || first.is_none_or(|first| first.at >= at && now.since(first.at) < notice)
+        })
+    }
+
+    /// The states a master control may go by, newest first: those that may still be under way, and the one before.
+    pub fn recent<'a>(
+        &'a self,
+        record: &Observation<'_>,
+        setting: &Setting<'_>,
+    ) -> impl Iterator<Item = &'a ShownState> + use<'a> {
+        let (now, notice) = (record.at().moment, setting.time.notice);
+        let fresh = self
+            .states
+            .iter()
+            .rev()
+            .take_while(|seen| now.since(seen.at) < notice)
+            .count();
+        self.states.iter().rev().take(fresh + 1)
+    }
+}

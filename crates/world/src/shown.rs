@@ -1,0 +1,143 @@
+//! The order a vehicle shows in its states, and whether it can still be held against it.
+
+use serde_json::Value;
+
+use crate::members::{actions, elements, number, text};
+use crate::observation::Observation;
+use crate::orders::sets_position;
+use crate::topic::Topic;
+
+/// How many FATAL errors are kept in mind.
+const ERRORS: usize = 16;
+
+/// The order whose ids the states show. Which order had to be accepted is left to the tests.
+#[derive(Debug, Default)]
+pub struct ShownOrder {
+    /// orderId of the last state.
+    order: Option<String>,
+    /// How often that has become another one.
+    turn: u64,
+    /// orderId of an order that was cancelled or may have been abandoned.
+    abandoned: Option<String>,
+    carried: Option<(String, u64)>,
+    last: Option<(String, u64)>,
+    /// FATAL errors of the last state.
+    fatal: Vec<Value>,
+    /// Those among them with which the vehicle has taken the present order over all the same: they do not hold it.
+    borne: Vec<Value>,
+    /// The last record that can be held against its order.
+    held: Option<u64>,
+}
+
+impl ShownOrder {
+    /// The state that this record is, if it can be held against its order.
+    #[must_use]
+    pub fn state<'e>(&self, record: &Observation<'e>) -> Option<&'e Value> {
+        record.state().filter(|_| self.held == Some(record.seq()))
+    }
+
+    /// orderId of the last state.
+    #[must_use]
+    pub fn order(&self) -> Option<&str> {
+        self.order.as_deref()
+    }
+
+    /// A number that is another one whenever another order is shown.
+    #[must_use]
+    pub fn turn(&self) -> u64 {
+        self.turn
+    }
+
+    /// Last node of the state before the order changed: not yet progress in the new one.
+    #[must_use]
+    pub fn carried(&self) -> Option<&(String, u64)> {
+        self.carried.as_ref()
+    }
+
+    /// The last node, and its sequenceId.
+    #[must_use]
+    pub fn last(&self) -> Option<&(String, u64)> {
+        self.last.as_ref()
+    }
+}
+
+impl ShownOrder {
+    /// Learns from the next record.
+    pub(crate) fn learn(&mut self, record: &Observation<'_>) {
+        let moved = record.to_vehicle(Topic::InstantActions).is_some_and(|message| {
+            actions(message).any(|action| {
+                let name = text(action, "actionType");
+                name == "cancelOrder" || sets_position(name)
+            })
+        });
+        if moved || record.outside_influence() {
+            self.abandoned.clone_from(&self.order);
+        }
+        let Some(state) = record.state() else { return };
+        let (Some(order), Some(last)) = (state.get("orderId").and_then(Value::as_str), last_node(state)) else {
+            return;
+        };
+        if self.order.as_deref() != Some(order) {
+            self.carried = self.last.take();
+            self.order = Some(order.chars().take(512).collect());
+            self.turn += 1;
+            self.abandoned = None;
+            self.borne = fatal_errors(state)
+                .filter(|error| self.fatal.contains(error))
+                .cloned()
+                .collect();
+        }
+        self.fatal = fatal_errors(state).take(ERRORS).cloned().collect();
+        if self.carried.as_ref().is_some_and(|carried| *carried != last) {
+            self.carried = None;
+        }
+        self.last = Some(last);
+        if may_abandon_beside(state, &self.borne) {
+            self.abandoned.clone_from(&self.order);
+        }
+        if self.abandoned.is_none() {
+            self.held = Some(record.seq());
+        }
+    }
+}
+
+/// Where a state says the vehicle was last: node and sequenceId.
+#[must_use]
+pub fn last_node(state: &Value) -> Option<(String, u64)> {
+    let node = state.get("lastNodeId")?.as_str()?;
+    Some((node.chars().take(512).collect(), number(state, "lastNodeSequenceId")?))
+}
+
+/// Whether a state reports something that may end an order without a word: another operating mode than the
+/// automatic ones, an emergency stop (a word that is none of the standard is neither, and a finding of its own), a fatal error, or a failed action.
+#[must_use]
+pub fn may_abandon(state: &Value) -> bool {
+    may_abandon_beside(state, &[])
+}
+
+/// Whether it does so beside errors that are known not to hold the vehicle.
+fn may_abandon_beside(state: &Value, borne: &[Value]) -> bool {
+    let failed = elements(state, "actionStates").any(|action| text(action, "actionStatus") == "FAILED");
+    failed || is_taken_out_beside(state, borne)
+}
+
+/// The errors of a state that ask for a person.
+pub fn fatal_errors(state: &Value) -> impl Iterator<Item = &Value> {
+    elements(state, "errors").filter(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"))
+}
+
+/// Whether a state reports what [`may_abandon`] asks for but a failed action: whatever is left of the order is still to be
+/// seen then.
+#[must_use]
+pub fn is_taken_out(state: &Value) -> bool {
+    is_taken_out_beside(state, &[])
+}
+
+fn is_taken_out_beside(state: &Value, borne: &[Value]) -> bool {
+    let manual = matches!(text(state, "operatingMode"), "MANUAL" | "SERVICE" | "TEACHIN");
+    let stopped = state
+        .pointer("/safetyState/eStop")
+        .is_some_and(|stop| matches!(stop.as_str(), Some("AUTOACK" | "MANUAL" | "REMOTE")));
+    let fatal = fatal_errors(state).any(|error| !borne.contains(error));
+    manual || stopped || fatal
+}
